@@ -46,8 +46,7 @@ from .message import (
     Package,
     Service,
     complete,
-    dataclass,
-    table,
+    define,
 )
 from .names import lazily
 from .objects import equal, same
@@ -70,8 +69,6 @@ from .sequences import (
     sequence_reader,
     sequence_writer,
     several,
-    to_array,
-    to_list,
 )
 
 #: What generated code expects of the runtime. Each runtime serves all code of its number.
@@ -79,7 +76,6 @@ PROTOCOL = 1
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from .hints import Any as Any
     from .hints import Floats as Floats
     from .hints import Integers as Integers
     from .hints import Iterable as Iterable
@@ -88,7 +84,7 @@ if TYPE_CHECKING:
     from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
 else:
-    _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
+    _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "hints"))
 
 __all__ = [
@@ -128,7 +124,7 @@ __all__ = [
     "array_of",
     "complete",
     "construct",
-    "dataclass",
+    "define",
     "equal",
     "flags",
     "flags_writer",
@@ -151,12 +147,9 @@ __all__ = [
     "several",
     "sizes",
     "strings_reader",
-    "table",
     "text_block",
     "text_phases",
     "texts_reader",
-    "to_array",
-    "to_list",
     "unsized",
     "wide_block",
     "wide_text",

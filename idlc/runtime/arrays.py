@@ -33,22 +33,11 @@ else:
 Element = TypeVar("Element", bound="np.generic")
 
 
-def to_ndarray(dtype: Any, size: int, values: Any, name: str) -> Any:
+def converted(dtype: Any, size: int, values: Any) -> Any:
     """Return `values` as a new array of `size` elements, as rosidl's classes do.
 
-    Raises FieldTypeError, FieldRangeError or ValidationError with the `name` of the field.
+    Errors are those of numpy, and ValueError for another size.
     """
-    try:
-        return converted(dtype, size, values)
-    except (TypeError, ValueError, OverflowError) as error:
-        failure = error
-    from .typeinfo import refused
-
-    raise refused(name, dtype.name, size, values, failure) from None
-
-
-def converted(dtype: Any, size: int, values: Any) -> Any:
-    """Return the same; errors are those of numpy, and ValueError for another size."""
     if dtype.itemsize == 1 and isinstance(values, bytes):
         values = bytearray(values)
     result = np.array(values, dtype)
@@ -71,7 +60,6 @@ FLOAT32 = np.dtype("float32")
 FLOAT64 = np.dtype("float64")
 
 zeros = np.zeros
-array = np.array
 
 
 class NumberArray(Generic[Element]):
@@ -92,9 +80,21 @@ class NumberArray(Generic[Element]):
         store = slot.__set__
 
         def setter(message: object, values: Any) -> None:
-            store(message, to_ndarray(dtype, size, values, name))
+            try:
+                store(message, converted(dtype, size, values))
+                return
+            except (TypeError, ValueError, OverflowError) as error:
+                failure = error
+            from .typeinfo import refused
+
+            raise refused(name, dtype.name, size, values, failure) from None
 
         return property(slot.__get__, setter)
+
+    @classmethod
+    def of(cls, values: tuple[float, ...]) -> NDArray[Element]:
+        """Return what the field holds for some values."""
+        return np.array(values, cls.dtype)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
@@ -247,11 +247,9 @@ __all__ = [
     "UInt16Array",
     "UInt32Array",
     "UInt64Array",
-    "array",
     "array_reader",
     "array_writer",
     "buffer_writer",
-    "to_ndarray",
     "view_reader",
     "zeros",
 ]

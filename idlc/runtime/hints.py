@@ -34,7 +34,6 @@ class Options(TypedDict, total=False):
 
 
 __all__ = [
-    "Any",
     "Floats",
     "Integers",
     "Iterable",

@@ -8,7 +8,6 @@ import sys
 import pytest
 
 from idlc.generate.python import lines
-from idlc.generate.python.render import render_package
 from tests.support import generated, values
 
 PARTS = {
@@ -46,34 +45,6 @@ def every_kind(length):
     """Return fields of all kinds as text, every other time in reverse."""
     fields = [f"{kind} {named(number, length)}\n" for number, kind in enumerate(KINDS)]
     return "".join(fields[:: 1 if length % 2 else -1])
-
-
-@pytest.fixture
-def rendered(monkeypatch):
-    """Return a function that renders a model with lines of some width."""
-
-    def render(model, width):
-        monkeypatch.setattr(lines, "WIDTH", width)
-        return {file.path: file.text for file in render_package(model) if "/_" in file.path}
-
-    return render
-
-
-@pytest.mark.long
-def test_statements_say_the_same_in_lines_of_every_width(rendered):
-    files = {**PARTS, "msg/Defaults.msg": DEFAULTS, "srv/Ask.srv": "Number a\n---\nWords[] b\n"}
-    for number, kind in enumerate(kind for kind in KINDS if "<=" not in kind):
-        files[f"msg/Alone{number}.msg"] = f"{kind} value_of_this\n"
-        files[f"msg/Amid{number}.msg"] = f"string a\n{kind} value_of_this\nstring c\n"
-    model = generated.model_of("widths_msgs", files)
-    wanted = {path: ast.dump(ast.parse(text)) for path, text in rendered(model, 10**6).items()}
-    seen = set()
-    for width in range(44, 96):
-        for path, text in rendered(model, width).items():
-            if text not in seen:
-                seen.add(text)
-                assert ast.dump(ast.parse(text)) == wanted[path], (path, width)
-    assert len(seen) > 6 * len(wanted)
 
 
 def test_one_target_that_does_not_fit_on_a_line_remains_a_tuple():

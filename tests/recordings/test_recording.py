@@ -382,7 +382,7 @@ def test_messages_show_the_names_of_generated_ones(tmp_path):
     assert repr(message).startswith("sensor_msgs.msg.Imu(header=std_msgs.msg.Header(stamp=builtin")
     assert "loaded" not in repr(message)
     assert "loaded" not in pretty(message)
-    assert inspect.getsource(type(message)).startswith("@_idlc.dataclass")
+    assert inspect.getsource(type(message)).startswith("@_idlc.define")
     assert pickle.loads(pickle.dumps(message)) == message
 
 

@@ -360,7 +360,7 @@ class _Decoder(UnpackBuilder):
     def rows(self, step: plan.Items, repeat: plan.Fixed) -> None:
         """Read structures of constant size: one Struct yields the values of each."""
         count = self.begin(step)
-        self.line("[]", f"{step.place.local}: list[_idlc.Any]")
+        self.line("[]", f"{step.place.local}: list[Any]")
         self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)

@@ -2,67 +2,38 @@
 
 from __future__ import annotations
 
+from textwrap import dedent
 from typing import NamedTuple
 
 import msgspec
 
-from idlc.generate.python import lines
+from idlc.generate.python import literals
 from idlc.generate.python.imports import References
-from idlc.generate.python.lines import (
-    WIDTH,
-    Group,
-    Node,
-    assign,
-    call,
-    docstring,
-    flat,
-    prose,
-    tuple_of,
-    wrapped,
-)
 from idlc.model import derive, ir, python_names
 from idlc.model.ir import spell
 from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES
 
 
-class DocstringSection(msgspec.Struct, frozen=True):
-    """A list in a docstring, such as that of the attributes."""
-
-    title: Text
-    entries: tuple[Text, ...]
-
-
 class Docstring(msgspec.Struct, frozen=True):
-    """A class's docstring: `text` of one or more lines, and lists after it."""
+    """A docstring: its first line, which may be empty for none at all, and those after a blank."""
 
-    text: Text
-    sections: tuple[DocstringSection, ...] = ()
-
-    @property
-    def is_one_line(self) -> bool:
-        """True if the closing quotes are on the line of the opening ones."""
-        return not self.sections and "\n" not in self.text
+    line: Text
+    more: tuple[Text, ...] = ()
 
 
-def message(structure: ir.Message, purpose: str, entries: tuple[Text, ...], file: str) -> Docstring:
-    """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries.
+def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
+    """Return a class's docstring: the structure's comment, or else its `purpose`.
 
     `file` is the one that defines it, within its package.
     """
-    lines = [prose(line) for line in structure.comment] or [purpose]
-    if len(lines) > 1 and lines[1]:
-        lines.insert(1, "")
-    lines += _hidden(structure)
-    place = _place(structure, file)
-    lines += ["", f"Defined in {place}"] if place else []
-    constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
-    sections = (
-        DocstringSection(Text("Attributes"), entries),
-        DocstringSection(Text("Constants"), constants),
-    )
-    filled = tuple(section for section in sections if section.entries)
-    return Docstring(Text(docstring(lines, one_line=not filled)), filled)
+    line, *more = _lines(structure.comment) or [purpose]
+    if more and not more[0]:
+        del more[0]
+    for paragraph in (_hidden(structure), _place(structure, file)):
+        if paragraph:
+            more += ["", *paragraph] if more else paragraph
+    return Docstring(literals.between_quotes(line), tuple(map(Text, more)))
 
 
 def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
@@ -110,15 +81,14 @@ def _hidden(structure: ir.Message) -> list[str]:
     if not hidden:
         return []
     name = python_names.class_(structure.name)
-    text = (
-        f"Fields hide the methods of the same name ({', '.join(hidden)}): "
-        f"`super({name}, message)` still has them, and `super({name}, {name})` those of the class."
-    )
-    return ["", *lines.wrapped(text, 4)]
+    return [
+        f"Fields hide the methods of the same name ({', '.join(hidden)}):",
+        f"`super({name}, message)` still has them, and `super({name}, {name})` those of the class.",
+    ]
 
 
-def _place(structure: ir.Message, file: str) -> str:
-    """Return the file and line where a structure begins; empty if nobody wrote any of it.
+def _place(structure: ir.Message, file: str) -> list[str]:
+    """Return in which file and line a structure begins; nothing if nobody wrote any of it.
 
     Later sections have no line: it would change with each field of those before, and people review
     what one more field changes.
@@ -126,83 +96,81 @@ def _place(structure: ir.Message, file: str) -> str:
     described: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
     spans = [definition.name_span for definition in described if definition.name_span]
     if not spans:
-        return ""
+        return []
     first = min(spans, key=lambda span: span.start)
     if "\n---" in f"\n{first.source.text[: first.start]}":
-        return file
-    return f"{file}:{first.source.position(first.start)[0]}"
+        return [f"Defined in {file}"]
+    return [f"Defined in {file}:{first.source.position(first.start)[0]}"]
 
 
-def _constant(constant: ir.Constant) -> Text:
-    return entry(constant.name, constant, field_words(constant))
+def attribute(described: ir.Field | ir.Constant, file: str) -> Docstring:
+    """Return what editors show of a field or constant: its definition and comment.
 
-
-def field_words(described: ir.Field | ir.Constant) -> str:
-    """Return the unit and comment of a field or constant, the suffix of its type or name."""
-    unit = f" [{lines.prose(described.unit)}]" if described.unit else ""
-    comment = " ".join(lines.prose(line).strip() for line in described.comment).strip()
-    return unit + (f". {comment}" if comment else "")
-
-
-def entry(name: str, described: ir.Field | ir.Constant, suffix: str) -> Text:
-    """Return the entry of a field or constant in a list, on as many lines as it takes."""
-    text = f"{name}: {spell(described.type)}{suffix}"
-    return Text("\n".join(lines.wrapped(text, 8, hanging=4)))
-
-
-def attribute(described: ir.Field | ir.Constant, suffix: str, file: str) -> Text:
-    """Return the statement that editors show of a field or constant: its definition and comment.
-
-    The file is named without a line number, which other lines would change. The statement is empty
-    for fields that ROS 2 adds: their annotation says it all.
+    The file is named without a line number, which other lines would change. There is nothing for
+    fields that ROS 2 adds: their annotation says it all.
     """
     if described.name_span is None:
-        return Text("")
-    lines = wrapped(f"{spell(described.type)} {described.name}{suffix} ({file})", 6)
-    text = docstring(lines, one_line=True)
-    return Text(f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""')
+        return Docstring(Text(""))
+    unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
+    definition = f"{spell(described.type)} {described.name}{unit}"
+    comment = _lines(described.comment)
+    if len(comment) > 1:
+        return Docstring(Text(f"{definition} ({file})"), tuple(map(Text, comment)))
+    words = f". {comment[0]}" if comment else ""
+    return Docstring(Text(f"{definition}{words} ({file})"))
+
+
+def _lines(comment: tuple[str, ...]) -> list[str]:
+    """Return a comment as lines of a docstring; blank ones around it are left out."""
+    text = dedent("\n".join(map(literals.prose, comment))).strip("\n")
+    return text.split("\n") if text else []
 
 
 ANNOTATIONS = {"bool": "bool", "byte": "bytes", "float32": "float", "float64": "float"}
-BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
+BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "locals", "object", "str"})
 
 
 class FieldView(msgspec.Struct, frozen=True, kw_only=True):
-    """A field, as text; `store` is a statement on as many lines as it takes.
+    """A field. `wire_name` and `idl` are its name and type in rosidl.
 
-    `wire_name` and `idl` are its name and type in rosidl.
+    `fresh` is the default of a field whose parameter is None without an argument. Assigning to a
+    field of `numbers` takes longer than to its slot, because it converts them. `is_array`: the
+    field is equal to another with the same elements, whatever holds them.
     """
 
     name: Code
     wire_name: Code
+    slot: Code
     idl: Code
-    description: Text
-    docstring: Text
     annotation: Code
     parameter: Code
-    store: Code
+    fresh: Code
+    docstring: Docstring
+    numbers: bool
+    is_scalar: bool
+    is_array: bool
 
 
 class Naming(msgspec.Struct, frozen=True):
     """The names in a class of what its fields could hide: `self` and builtins."""
 
-    receiver: str
-    options: str
-    builtins: str
+    receiver: Code
+    options: Code
+    builtins: Code
 
     @classmethod
     def of(cls, structure: ir.Message) -> Naming:
         """Return the naming of a structure's class; no field can begin with an underscore."""
         names = {field.name for field in structure.fields}
         return cls(
-            receiver="_self" if "self" in names else "self",
-            options="_options" if "options" in names else "options",
-            builtins="_builtins." if shadows(structure) else "",
+            receiver=Code("_self" if "self" in names else "self"),
+            options=Code("_options" if "options" in names else "options"),
+            builtins=Code("_builtins." if shadows(structure) else ""),
         )
 
 
 def shadows(structure: ir.Message) -> bool:
-    """Return whether the class needs a builtin whose name a field has."""
+    """Return whether a field has the name of a builtin that the class needs."""
     return any(python_names.field(field.name) in BUILTINS for field in structure.fields)
 
 
@@ -220,9 +188,9 @@ def support(type_: ir.FieldType) -> str:
 def numeric_class(type_: ir.Sequence | ir.Array) -> str:
     """Return the descriptor class of a numeric array."""
     assert isinstance(type_.element, ir.Primitive)
-    name = ir.PRIMITIVES[type_.element.name].dtype
+    name = type_.element.info.dtype
     stem = name.replace("uint", "UInt") if name.startswith("u") else name.capitalize()
-    return stem + ("Sequence" if isinstance(type_, ir.Sequence) else "Array")
+    return f"_idlc.{stem}Sequence" if isinstance(type_, ir.Sequence) else f"_arrays.{stem}Array"
 
 
 def idl_text(type_: ir.FieldType) -> str:
@@ -251,85 +219,73 @@ def view(
     With `converts`, `None` is the default of any field, and a list is made of any iterable.
     """
     name = python_names.field(field.name)
-    slot = f"{naming.receiver}.{python_names.slot(field.name)}"
     shape = _shape(field, references, naming, converts=converts)
-    words = field_words(field)
+    # type checkers take a field of a method's name for a mistake
+    ignored = "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
+    is_list = isinstance(field.type, (ir.Array, ir.Sequence))
     return FieldView(
         name=Code(name),
         wire_name=Code(field.name),
+        slot=Code(python_names.slot(field.name)),
         idl=Code(idl_text(field.type)),
-        description=entry(name, field, words),
-        docstring=attribute(field, words, file),
-        annotation=Code(shape.annotation + _ignored(name)),
+        annotation=Code(shape.annotation + ignored),
         parameter=Code(shape.parameter),
-        store=Code("\n".join(_store(slot, name, shape)).lstrip()),
+        fresh=Code(shape.fresh),
+        docstring=attribute(field, file),
+        numbers=shape.numbers,
+        is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
+        is_array=(is_list and isinstance(ir.element_of(field.type), ir.Primitive))
+        or not references.knows(ir.element_of(field.type)),
     )
 
 
-def doubt(
-    structure: ir.Message, references: References, naming: Naming, *, converts: bool
-) -> tuple[str, ...]:
-    """Return conditions that all hold for a first argument that is perhaps not of its field's type.
-
-    There are none for a field of numbers, which converts any argument.
-    """
-    first = structure.fields[:1]
-    return _shape(first[0], references, naming, converts=converts).doubt if first else ()
+def usual_class(field: ir.Field, references: References, naming: Naming) -> Code:
+    """Return the class of what is usually assigned to a field; empty if it takes any values."""
+    if support(field.type):
+        return Code("")
+    if isinstance(field.type, (ir.Array, ir.Sequence)):
+        return Code(f"{naming.builtins}list")
+    if not references.knows(field.type):
+        return Code("")
+    return Code(_builtin(_element(field.type, references), naming))
 
 
 class _Shape(NamedTuple):
-    """The code that fields of one kind share: annotations, and the value stored in the slot.
-
-    `fresh` is the default of a field whose parameter is None without an argument.
-    """
+    """The code that fields of one kind share."""
 
     annotation: str
     parameter: str
-    stored: Node
-    fresh: Node = ""
-    doubt: tuple[str, ...] = ()
+    fresh: str = ""
+    numbers: bool = False
 
 
 def _shape(field: ir.Field, references: References, naming: Naming, *, converts: bool) -> _Shape:
-    name = python_names.field(field.name)
-    kind = f"{name}.__class__"  # faster than a call, and no field can hide it
+    element = _builtin(_element(ir.element_of(field.type), references), naming)
     if isinstance(field.type, (ir.Primitive, ir.String)):
-        annotation = naming.builtins + _element(field.type, references)
         default = _scalar_default(field)
-        unlike = f"{kind} is not {annotation}"
-        if not converts:
-            return _Shape(annotation, f"{annotation} = {default}", name, doubt=(unlike,))
-        parameter = f"{annotation} | None = None"
-        return _Shape(annotation, parameter, name, default, (f"{name} is not None", unlike))
-    if support(field.type):
-        return _numbers(field, name)
+        if converts:
+            return _Shape(element, f"{element} | None = None", default)
+        return _Shape(element, f"{element} = {default}")
     if isinstance(field.type, ir.Ref):
-        annotation = _element(field.type, references)
-        fresh: Node = f"{annotation}()"
-        expected = "" if field.type.target in references.implied else annotation
+        return _Shape(element, f"{element} | None = None", f"{element}()")
+    numbers = support(field.type)
+    if numbers:
+        return _numbers(field, numbers, naming)
+    if field.default is not None:
+        fresh = f"{naming.receiver}.{default_name(field)}"
     else:
-        element = _element(ir.element_of(field.type), references)
-        inner = naming.builtins + element if element in BUILTINS else element
-        expected = f"{naming.builtins}list"
-        annotation = f"{expected}[{inner}]"
         fresh = _fresh_list(field, references)
-    doubt = (f"{name} is not None", *([f"{kind} is not {expected}"] if expected else []))
-    if converts and not isinstance(field.type, ir.Ref):
+    if converts:
         inside = getattr(ir.element_of(field.type), "name", "")
-        read = [f"_idlc.read_{LIST_PRIMITIVES[inside]}"] if inside in LIST_PRIMITIVES else []
-        stored = call("_idlc.to_list", name, f'"{name}"', *read)
-        declared = assign(f"{name}: _idlc.ListOf[{inner}]", f"_idlc.ListOf({', '.join(read)})", 4)
-        annotation = "\n".join(declared).strip().removeprefix(f"{name}: ")
-        parameter = f"_idlc.Iterable[{inner}] | None = None"
-        if len(name) + len(parameter) + 11 > WIDTH:
-            parameter = parameter.replace(" |", "\n        |")
-        return _Shape(annotation, parameter, stored, fresh, doubt)
-    return _Shape(annotation, f"{annotation} | None = None", name, fresh, doubt)
+        read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
+        annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({read})"
+        return _Shape(annotation, f"_idlc.Iterable[{element}] | None = None", fresh)
+    annotation = f"{naming.builtins}list[{element}]"
+    return _Shape(annotation, f"{annotation} | None = None", fresh)
 
 
-def _ignored(name: str) -> str:
-    # type checkers take a field of a method's name for a mistake
-    return "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
+def _builtin(name: str, naming: Naming) -> str:
+    return naming.builtins + name if name in BUILTINS else name
 
 
 def _element(element: ir.Element, references: References) -> str:
@@ -344,25 +300,10 @@ def _element(element: ir.Element, references: References) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def _store(slot: str, name: str, shape: _Shape) -> list[str]:
-    """Return the statement that gives a slot its value, indented as in the constructor."""
-    if not shape.fresh:
-        return assign(slot, shape.stored, 8)
-    line = f"        {slot} = {flat(shape.fresh)} if {name} is None else {flat(shape.stored)}"
-    if len(line) <= WIDTH:
-        return [line]
-    return [
-        f"        if {name} is None:",
-        *assign(slot, shape.fresh, 12),
-        "        else:",
-        *assign(slot, shape.stored, 12),
-    ]
-
-
 def _scalar_default(field: ir.Field) -> str:
     assert isinstance(field.type, (ir.Primitive, ir.String))
     if field.default is not None and not isinstance(field.default.value, tuple):
-        return lines.scalar(field.type, field.default.value)
+        return literals.scalar(field.type, field.default.value)
     return zero(field.type)
 
 
@@ -381,64 +322,53 @@ def zero(element: ir.Element) -> str:
             return "0"
 
 
-def _values(field: ir.Field) -> tuple[str, ...] | None:
+def _values(field: ir.Field) -> tuple[Code, ...]:
     if field.default is None:
-        return None
+        return ()
     values = field.default.value
     assert isinstance(values, tuple)
-    return tuple(lines.scalar(ir.element_of(field.type), value) for value in values)
+    return tuple(Code(literals.scalar(ir.element_of(field.type), value)) for value in values)
 
 
-def _fresh_list(field: ir.Field, references: References) -> Node:
-    values = _values(field)
-    if values is not None:
-        return Group("", values, brackets="[]")
+def _fresh_list(field: ir.Field, references: References) -> str:
     if isinstance(field.type, ir.Array):
         element = field.type.element
         if isinstance(element, ir.Ref):
-            return call("_idlc.several", references.name(element.target), str(field.type.size))
+            return f"_idlc.several({references.name(element.target)}, {field.type.size})"
         return f"[{zero(element)}] * {field.type.size}"
     return "[]"
 
 
-def _fresh_numbers(field: ir.Field) -> Node:
-    values = _values(field)
+def _numbers(field: ir.Field, kind: str, naming: Naming) -> _Shape:
     assert isinstance(field.type, (ir.Sequence, ir.Array))
     assert isinstance(field.type.element, ir.Primitive)
-    if isinstance(field.type, ir.Sequence):
-        code = f'"{field.type.element.info.code}"'
-        return call("_array", code, *([tuple_of(*values)] if values else []))
-    dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
-    if values is None:
-        return call("_arrays.zeros", str(field.type.size), dtype)
-    return call("_arrays.array", tuple_of(*values), dtype)
-
-
-def _numbers(field: ir.Field, name: str) -> _Shape:
-    assert isinstance(field.type, (ir.Sequence, ir.Array))
-    assert isinstance(field.type.element, ir.Primitive)
-    kind = numeric_class(field.type)
-    fresh = _fresh_numbers(field)
-    if isinstance(field.type, ir.Sequence):
-        code = f'"{field.type.element.info.code}"'
-        values = "_idlc.Floats" if kind.startswith("Float") else "_idlc.Integers"
-        annotation = f"_idlc.{kind} = _idlc.{kind}()"
-        stored = call("_idlc.to_array", code, name, f'"{name}"')
+    descriptor = numeric_class(field.type)
+    if kind == "sequence":
+        values = "_idlc.Floats" if "Float" in descriptor else "_idlc.Integers"
+        annotation = f"{descriptor} = {descriptor}()"
+        fresh = f'_array("{field.type.element.info.code}")'
     else:
-        dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
+        assert isinstance(field.type, ir.Array)
+        size = field.type.size
         values = "_arrays.Values"
-        annotation = f"_arrays.{kind} = _arrays.{kind}({field.type.size})"
-        stored = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')
-    return _Shape(annotation, f"{values} | None = None", stored, fresh)
+        annotation = f"{descriptor} = {descriptor}({size})"
+        fresh = f"_arrays.zeros({size}, _arrays.{field.type.element.info.dtype.upper()})"
+    if field.default is not None:
+        fresh = f"{naming.receiver}.{default_name(field)}"
+    return _Shape(annotation, f"{values} | None = None", fresh, True)
 
 
-def default_constant(field: ir.Field) -> list[str]:
-    """Return the lines of the class attribute FIELD__DEFAULT."""
-    name = f"{field.name.upper()}__DEFAULT"
+def default_name(field: ir.Field) -> str:
+    """Return the class attribute that holds a field's declared default."""
+    return f"{field.name.upper()}__DEFAULT"
+
+
+def default(field: ir.Field) -> tuple[Code, tuple[Code, ...]]:
+    """Return the value of a field's declared default: an expression, or a function's arguments."""
     if isinstance(field.type, (ir.Primitive, ir.String)):
-        return assign(name, _scalar_default(field), 4)
-    if not support(field.type):
-        return assign(name, call("_idlc.FreshList", *(_values(field) or ())), 4)
-    fresh = _fresh_numbers(field)
-    assert isinstance(fresh, Group)
-    return assign(name, call("_idlc.Fresh", fresh.before, *fresh.items), 4)
+        return Code(_scalar_default(field)), ()
+    values = _values(field)
+    if support(field.type):
+        assert isinstance(field.type, (ir.Sequence, ir.Array))
+        return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type)}.of"), *values)
+    return Code("_idlc.FreshList" if values else "_idlc.FreshList()"), values

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.generate.python import lines
 from idlc.model import derive, ir, link, python_names
 from idlc.project.templates import Code, Text
 from idlc.wire import plan
@@ -32,7 +31,18 @@ def statements(module: str, names: Collection[str], indent: int = 0) -> list[str
     statements = [(name,) for name in names if " as " in name]
     plain = sorted((name for name in names if " as " not in name), key=_order)
     ordered = sorted([*statements, *([tuple(plain)] if plain else [])])
-    return [line for group in ordered for line in lines.import_from(module, group, indent)]
+    return [line for group in ordered for line in _import_from(module, group, " " * indent)]
+
+
+def _import_from(module: str, names: tuple[str, ...], margin: str) -> list[str]:
+    if len(names) == 1:
+        return [f"{margin}from {module} import {names[0]}"]
+    items = (f"{margin}    {name}," for name in names)
+    return [f"{margin}from {module} import (", *items, f"{margin})"]
+
+
+#: Classes of Python that generated modules name.
+_TAKEN = {*dir(builtins), "Any"}
 
 
 class Surroundings(NamedTuple):
@@ -127,7 +137,7 @@ class References:
             by_class[python_names.class_(name)].append(name)
         return {
             name: python_names.class_(name)
-            if name in own or (len(same) == 1 and not hasattr(builtins, class_))
+            if name in own or (len(same) == 1 and class_ not in _TAKEN)
             else python_names.qualified_class(name)
             for class_, same in by_class.items()
             for name in same
@@ -142,6 +152,10 @@ class References:
         if type_ in self.implied:
             return f"{_module(type_)}.{python_names.class_(type_)}"
         return self.name(type_)
+
+    def knows(self, element: ir.Element) -> bool:
+        """Return whether the class of an element is imported with the module."""
+        return not (isinstance(element, ir.Ref) and element.target in self.implied)
 
     def modules(self) -> list[tuple[str, str]]:
         """Return the modules of implied types, with their names in this module."""

@@ -7,20 +7,13 @@ own and a trailing comma, which formatters keep.
 
 from __future__ import annotations
 
-import math
-import textwrap
-import unicodedata
 from collections.abc import Sequence
 from typing import TypeAlias
 
 import msgspec
 
-from idlc.model import ir
-
 #: Columns in generated packages; other files get a width of their own.
 WIDTH = 88
-#: Columns of docstrings, whose text depends on where it is broken.
-PROSE_WIDTH = WIDTH
 
 
 class Group(msgspec.Struct, frozen=True):
@@ -116,15 +109,6 @@ def import_from(module: str, names: Sequence[str], indent: int = 0, width: int =
     return [f"{margin}from {module} import (", *items, f"{margin})"]
 
 
-def all_of(conditions: Sequence[str], indent: int) -> list[str]:
-    """Return lines that return whether all conditions are true."""
-    margin = " " * indent
-    line = f"{margin}return {' and '.join(conditions)}"
-    if len(line) <= WIDTH:
-        return [line]
-    return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
-
-
 def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     """Return conditions joined by a word, on one line, or on one each."""
     margin = " " * indent
@@ -132,17 +116,6 @@ def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     if len(line) <= WIDTH:
         return [line]
     return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
-
-
-def if_one_or_all(first: str, rest: tuple[str, ...], indent: int) -> list[str]:
-    """Return the head of an `if` of one condition, or else all of the others."""
-    margin = " " * indent
-    if len(rest) < 2:
-        return any_of([first, *rest], indent, "if ", ":")
-    line = f"{margin}if {first} or ({' and '.join(rest)}):"
-    if len(line) <= WIDTH:
-        return [line]
-    return [f"{margin}if {first} or (", *_spread(rest, "and", indent + 4), f"{margin}):"]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:
@@ -176,86 +149,3 @@ def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[
     if len(margin) + 4 + len(value) <= WIDTH:
         return [f"{margin}{left} {operator} (", f"{margin}    {value}", f"{margin})"]
     return [line]
-
-
-def string_literal(value: str) -> str:
-    """Return a string literal with the quotes that formatters choose."""
-    quote = '"' if value.count('"') <= value.count("'") else "'"
-    if value.isascii() and value.isprintable():
-        return quote + value.replace("\\", "\\\\").replace(quote, "\\" + quote) + quote
-    return quote + "".join(_escaped(c, quote) for c in value) + quote
-
-
-def octet(value: int) -> str:
-    """Return a bytes literal of one byte."""
-    quote = "'" if value == ord('"') else '"'
-    if value == ord("\\"):
-        return 'b"\\\\"'
-    return f"b{quote}{chr(value)}{quote}" if 0x20 <= value < 0x7F else f'b"\\x{value:02x}"'
-
-
-def number(value: ir.Scalar) -> str:
-    """Return a bool, int or float literal."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return f'float("{value}")'
-    return repr(value)
-
-
-def scalar(type_: ir.Element, value: ir.Scalar) -> str:
-    """Return the literal of a value of a primitive or string type."""
-    if isinstance(type_, ir.String):
-        return string_literal(str(value))
-    if isinstance(type_, ir.Primitive) and type_.name == "byte":
-        return octet(int(value))
-    if isinstance(type_, ir.Primitive) and type_.name.startswith("float"):
-        return number(float(value))
-    return number(value)
-
-
-def _escaped(character: str, quote: str) -> str:
-    if character == quote or character == "\\":
-        return "\\" + character
-    return printable(character)
-
-
-def printable(character: str) -> str:
-    """Return a character, or its escape if it does not print or reorders what does."""
-    if character.isprintable() and unicodedata.category(character) not in {"Cf", "Zl", "Zp"}:
-        return character
-    return repr(character)[1:-1] if not character.isprintable() else f"\\u{ord(character):04x}"
-
-
-def prose(line: str) -> str:
-    """Return a line of a docstring."""
-    if line.isascii() and line.isprintable():
-        shown = line.replace("\\", "\\\\")
-    else:
-        shown = "".join("\\\\" if c == "\\" else printable(c) for c in line.expandtabs(4))
-    return shown.replace('"""', '\\"\\"\\"').rstrip()
-
-
-def docstring(lines: list[str], *, one_line: bool) -> str:
-    """Return finished lines (see `prose`) as they stand after the opening quotes of a docstring.
-
-    With `one_line`, the closing quotes follow if there is but one.
-    """
-    first = lines[0].lstrip()
-    if one_line and len(lines) == 1 and first.endswith('"') and not first.endswith('\\"'):
-        first = first[:-1] + '\\"'  # would join the closing quotes
-    if first.startswith('"'):
-        first = "\\" + first
-    return "\n".join([first, *lines[1:]])
-
-
-def wrapped(words: str, indent: int, hanging: int = 0) -> list[str]:
-    """Return words on lines that fit when they are indented, all but the first by `hanging` too."""
-    width = PROSE_WIDTH - 4 - indent
-    if len(words) <= width:
-        return [words]
-    return textwrap.wrap(
-        words,
-        width,
-        subsequent_indent=" " * hanging,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )

@@ -20,7 +20,8 @@ from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
 from idlc.generate.python.encode import encode
 from idlc.generate.python.imports import ALONE, Homes, References, Surroundings
-from idlc.generate.python.lines import assign, call, string_literal
+from idlc.generate.python.lines import assign, call
+from idlc.generate.python.literals import string_literal
 from idlc.generate.python.positions import Tables
 from idlc.model import derive, ir, link, python_names
 from idlc.model.describe import IndividualDict
@@ -284,9 +285,10 @@ def _hides_methods(structure: ir.Message) -> bool:
 
 
 def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
-    used = {fields.support(field.type) for message in structures for field in message.fields}
+    every = [field for message in structures for field in message.fields]
+    used = {fields.support(field.type) for field in every}
     standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
-    if "sequence" in used:
+    if any(fields.support(field.type) == "sequence" and not field.default for field in every):
         standard.append("from array import array as _array")
     inside, outside = references.imports(references.direct)
     yield from (*standard, "") if standard else ()

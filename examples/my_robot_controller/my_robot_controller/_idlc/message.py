@@ -26,19 +26,24 @@ from .objects import (
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
-    from dataclasses import Field, dataclass
-    from typing import Any, ClassVar, Literal
+    from dataclasses import Field
+    from typing import Any, ClassVar, Literal, TypeVar
 
     import typing_extensions
+    from typing_extensions import dataclass_transform
+
+    Kind = TypeVar("Kind", bound=type)
+
+    @dataclass_transform(kw_only_default=True)
+    def define(kind: Kind) -> Kind:
+        """Return a generated class, in which type checkers see the dataclass that it is."""
+        return kind
+
 else:
 
-    def dataclass(**_options):
-        """Leave the class as it is: the generated class already is what a dataclass has."""
-        return lambda cls: cls
-
-
-#: `dict` for generated classes, in which linters object to a display.
-table = dict
+    def define(kind):
+        """Return a generated class as it is."""
+        return kind
 
 
 # attributes on first access
@@ -558,6 +563,5 @@ __all__ = [
     "Package",
     "Service",
     "complete",
-    "dataclass",
-    "table",
+    "define",
 ]

@@ -46,24 +46,12 @@ MANY = 1 << 16
 _TAKEN = (list, tuple, array, bytes, bytearray)
 
 
-def to_array(code: str, values: Any, name: str) -> Any:
+def converted(code: str, values: Any) -> Any:
     """Return `values` as a new array of type `code`, as rosidl's classes do.
 
     Bytes are the memory of the elements. Buffers of the same type (of numpy, memoryview) are
-    copied whole. Raises FieldTypeError, FieldRangeError or ValidationError with the `name` of
-    the field.
+    copied whole. Errors are those of `array`.
     """
-    try:
-        return converted(code, values)
-    except (TypeError, ValueError, OverflowError) as error:
-        failure = error
-    from .typeinfo import refused
-
-    raise refused(name, code, None, values, failure) from None
-
-
-def converted(code: str, values: Any) -> Any:
-    """Return the same; errors are those of `array`."""
     if isinstance(values, _TAKEN):
         return array(code, values)
     try:
@@ -95,9 +83,21 @@ class NumberSequence(Generic[Number]):
         store = slot.__set__
 
         def setter(message: object, values: Any) -> None:
-            store(message, to_array(code, values, name))
+            try:
+                store(message, converted(code, values))
+                return
+            except (TypeError, ValueError, OverflowError) as error:
+                failure = error
+            from .typeinfo import refused
+
+            raise refused(name, code, None, values, failure) from None
 
         return property(slot.__get__, setter)
+
+    @classmethod
+    def of(cls, values: tuple[Number, ...]) -> array[Number]:
+        """Return what the field holds for some values."""
+        return array(cls.code, values)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
@@ -300,20 +300,20 @@ def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], 
 class Fresh(Generic[Value]):
     """A class attribute whose value is created at each access, for mutable defaults."""
 
-    def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
+    def __init__(self, make: Callable[[Any], Value], *values: Any) -> None:
         self._make = make
-        self._arguments = arguments
+        self._values = values
 
     def __get__(self, instance: object, owner: type | None = None) -> Value:
         """Return a new value."""
-        return self._make(*self._arguments)
+        return self._make(self._values)
 
 
 class FreshList(Fresh[list[Value]]):
     """A class attribute whose value is a new list of the same values at each access."""
 
     def __init__(self, *values: Value) -> None:
-        super().__init__(list, values)
+        super().__init__(list, *values)
 
 
 def several(kind: Any, count: int) -> list[Any]:

@@ -6,27 +6,20 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_Goal(_idlc.Message):  # noqa
     """The goal of the action my_robot_controller/action/ExecuteTask.
 
     Defined in action/ExecuteTask.action:1
-
-    Attributes:
-        task_name: string. The task to execute, e.g. "dock"
     """
 
     __match_args__ = ("task_name",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "task_name": "string",
-        },
-    )
+    _fields_and_field_types = {
+        "task_name": "string",
+    }
 
     task_name: str
     """string task_name. The task to execute, e.g. "dock" (action/ExecuteTask.action)"""
@@ -36,34 +29,32 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
         task_name: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or task_name.__class__ is not str:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._task_name = task_name
+        self.task_name = task_name
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_Goal):
             return _idlc.equal(self, other)
-        return bool(self._task_name == other._task_name)
+        if self.task_name != other.task_name:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_Result(_idlc.Message):  # noqa
     """The result of the action my_robot_controller/action/ExecuteTask.
 
     Defined in action/ExecuteTask.action
-
-    Attributes:
-        success: bool
     """
 
     __match_args__ = ("success",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "success": "boolean",
-        },
-    )
+    _fields_and_field_types = {
+        "success": "boolean",
+    }
 
     success: bool
     """bool success (action/ExecuteTask.action)"""
@@ -73,55 +64,54 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
         success: bool = False,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or success.__class__ is not bool:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._success = success
+        self.success = success
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_Result):
             return _idlc.equal(self, other)
-        return bool(self._success == other._success)
+        if self.success != other.success:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_Feedback(_idlc.Message):  # noqa
     """The feedback of the action my_robot_controller/action/ExecuteTask.
 
     Defined in action/ExecuteTask.action
-
-    Attributes:
-        current_status: string. What the robot is doing now, for people to read
     """
 
     __match_args__ = ("current_status",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "current_status": "string",
-        },
-    )
+    _fields_and_field_types = {
+        "current_status": "string",
+    }
 
     current_status: str
-    """string current_status. What the robot is doing now, for people to read
-    (action/ExecuteTask.action)
-    """
+    """string current_status. What the robot is doing now, for people to read (action/ExecuteTask.action)"""
 
     def __init__(
         self,
         current_status: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or current_status.__class__ is not str:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._current_status = current_status
+        self.current_status = current_status
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_Feedback):
             return _idlc.equal(self, other)
-        return bool(self._current_status == other._current_status)
+        if self.current_status != other.current_status:
+            return False
+        return True
 
 
 class ExecuteTask(_idlc.Action):  # noqa
@@ -131,4 +121,6 @@ class ExecuteTask(_idlc.Action):  # noqa
     Result: _idlc.TypeAlias = ExecuteTask_Result
     Feedback: _idlc.TypeAlias = ExecuteTask_Feedback
     if TYPE_CHECKING:
-        from ._execute_task__protocol import ExecuteTask_Impl as Impl
+        from ._execute_task__protocol import (
+            ExecuteTask_Impl as Impl,
+        )

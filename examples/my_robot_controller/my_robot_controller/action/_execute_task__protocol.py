@@ -7,7 +7,11 @@
 from __future__ import annotations
 
 from .. import _idlc
-from ._execute_task import ExecuteTask_Feedback, ExecuteTask_Goal, ExecuteTask_Result
+from ._execute_task import (
+    ExecuteTask_Feedback,
+    ExecuteTask_Goal,
+    ExecuteTask_Result,
+)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,25 +23,19 @@ else:
     _service_msgs_msg = _idlc.Package("service_msgs.msg")
     _unique_identifier_msgs_msg = _idlc.Package("unique_identifier_msgs.msg")
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_SendGoal_Request(_idlc.Message):  # noqa
-    """Sent by a client to start a ExecuteTask goal. Added by ROS 2.
+    """Sent by a client to start a ExecuteTask goal. Added by ROS 2."""
 
-    Attributes:
-        goal_id: unique_identifier_msgs/UUID
-        goal: my_robot_controller/ExecuteTask_Goal
-    """
-
-    __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types = _idlc.table(
-        {
-            "goal_id": "unique_identifier_msgs/UUID",
-            "goal": "my_robot_controller/ExecuteTask_Goal",
-        },
+    __match_args__ = (
+        "goal_id",
+        "goal",
     )
+    _fields_and_field_types = {
+        "goal_id": "unique_identifier_msgs/UUID",
+        "goal": "my_robot_controller/ExecuteTask_Goal",
+    }
 
     goal_id: _unique_identifier_msgs_msg.UUID
     goal: ExecuteTask_Goal
@@ -48,40 +46,42 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):  # noqa
         goal: ExecuteTask_Goal | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or goal_id is not None:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if options:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         if goal_id is None:
-            self._goal_id = _unique_identifier_msgs_msg.UUID()
-        else:
-            self._goal_id = goal_id
-        self._goal = ExecuteTask_Goal() if goal is None else goal
+            goal_id = _unique_identifier_msgs_msg.UUID()
+        self.goal_id = goal_id
+        if goal is None:
+            goal = ExecuteTask_Goal()
+        self.goal = goal
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Request):
             return _idlc.equal(self, other)
-        if not _idlc.same(self._goal_id, other._goal_id):
+        if not _idlc.same(
+            self.goal_id,
+            other.goal_id,
+        ):
             return False
-        return self._goal == other._goal
+        if not self.goal == other.goal:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_SendGoal_Response(_idlc.Message):  # noqa
-    """Tells a client whether a ExecuteTask goal was accepted, and when. Added by ROS 2.
+    """Tells a client whether a ExecuteTask goal was accepted, and when. Added by ROS 2."""
 
-    Attributes:
-        accepted: bool
-        stamp: builtin_interfaces/Time
-    """
-
-    __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types = _idlc.table(
-        {
-            "accepted": "boolean",
-            "stamp": "builtin_interfaces/Time",
-        },
+    __match_args__ = (
+        "accepted",
+        "stamp",
     )
+    _fields_and_field_types = {
+        "accepted": "boolean",
+        "stamp": "builtin_interfaces/Time",
+    }
 
     accepted: bool
     stamp: _builtin_interfaces_msg.Time
@@ -92,39 +92,43 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):  # noqa
         stamp: _builtin_interfaces_msg.Time | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or accepted.__class__ is not bool:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._accepted = accepted
-        self._stamp = _builtin_interfaces_msg.Time() if stamp is None else stamp
+        self.accepted = accepted
+        if stamp is None:
+            stamp = _builtin_interfaces_msg.Time()
+        self.stamp = stamp
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Response):
             return _idlc.equal(self, other)
-        if self._accepted != other._accepted:
+        if self.accepted != other.accepted:
             return False
-        return _idlc.same(self._stamp, other._stamp)
+        if not _idlc.same(
+            self.stamp,
+            other.stamp,
+        ):
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_SendGoal_Event(_idlc.Message):  # noqa
-    """Published about a call that starts a ExecuteTask goal, where services are introspected. Added by ROS 2.
+    """Published about a call that starts a ExecuteTask goal, where services are introspected. Added by ROS 2."""
 
-    Attributes:
-        info: service_msgs/ServiceEventInfo
-        request: my_robot_controller/ExecuteTask_SendGoal_Request[<=1]
-        response: my_robot_controller/ExecuteTask_SendGoal_Response[<=1]
-    """
-
-    __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.table(
-        {
-            "info": "service_msgs/ServiceEventInfo",
-            "request": "sequence<my_robot_controller/ExecuteTask_SendGoal_Request, 1>",
-            "response": "sequence<my_robot_controller/ExecuteTask_SendGoal_Response, 1>",
-        },
+    __match_args__ = (
+        "info",
+        "request",
+        "response",
     )
+    _fields_and_field_types = {
+        "info": "service_msgs/ServiceEventInfo",
+        "request": "sequence<my_robot_controller/ExecuteTask_SendGoal_Request, 1>",
+        "response": "sequence<my_robot_controller/ExecuteTask_SendGoal_Response, 1>",
+    }
 
     info: _service_msgs_msg.ServiceEventInfo
     request: list[ExecuteTask_SendGoal_Request]
@@ -137,36 +141,43 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):  # noqa
         response: list[ExecuteTask_SendGoal_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or info is not None:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if options:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
-        self._request = [] if request is None else request
-        self._response = [] if response is None else response
+        if info is None:
+            info = _service_msgs_msg.ServiceEventInfo()
+        self.info = info
+        if request is None:
+            request = []
+        self.request = request
+        if response is None:
+            response = []
+        self.response = response
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Event):
             return _idlc.equal(self, other)
-        if not _idlc.same(self._info, other._info):
+        if not _idlc.same(
+            self.info,
+            other.info,
+        ):
             return False
-        return self._request == other._request and self._response == other._response
+        if not self.request == other.request:
+            return False
+        if not self.response == other.response:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_GetResult_Request(_idlc.Message):  # noqa
-    """Sent by a client to wait for the result of a ExecuteTask goal. Added by ROS 2.
-
-    Attributes:
-        goal_id: unique_identifier_msgs/UUID
-    """
+    """Sent by a client to wait for the result of a ExecuteTask goal. Added by ROS 2."""
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "goal_id": "unique_identifier_msgs/UUID",
-        },
-    )
+    _fields_and_field_types = {
+        "goal_id": "unique_identifier_msgs/UUID",
+    }
 
     goal_id: _unique_identifier_msgs_msg.UUID
 
@@ -175,37 +186,37 @@ class ExecuteTask_GetResult_Request(_idlc.Message):  # noqa
         goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or goal_id is not None:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if options:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         if goal_id is None:
-            self._goal_id = _unique_identifier_msgs_msg.UUID()
-        else:
-            self._goal_id = goal_id
+            goal_id = _unique_identifier_msgs_msg.UUID()
+        self.goal_id = goal_id
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Request):
             return _idlc.equal(self, other)
-        return _idlc.same(self._goal_id, other._goal_id)
+        if not _idlc.same(
+            self.goal_id,
+            other.goal_id,
+        ):
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_GetResult_Response(_idlc.Message):  # noqa
-    """Tells a client how a ExecuteTask goal ended, and its result. Added by ROS 2.
+    """Tells a client how a ExecuteTask goal ended, and its result. Added by ROS 2."""
 
-    Attributes:
-        status: int8
-        result: my_robot_controller/ExecuteTask_Result
-    """
-
-    __match_args__ = ("status", "result")
-    _fields_and_field_types = _idlc.table(
-        {
-            "status": "int8",
-            "result": "my_robot_controller/ExecuteTask_Result",
-        },
+    __match_args__ = (
+        "status",
+        "result",
     )
+    _fields_and_field_types = {
+        "status": "int8",
+        "result": "my_robot_controller/ExecuteTask_Result",
+    }
 
     status: int
     result: ExecuteTask_Result
@@ -216,39 +227,40 @@ class ExecuteTask_GetResult_Response(_idlc.Message):  # noqa
         result: ExecuteTask_Result | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or status.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._status = status
-        self._result = ExecuteTask_Result() if result is None else result
+        self.status = status
+        if result is None:
+            result = ExecuteTask_Result()
+        self.result = result
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Response):
             return _idlc.equal(self, other)
-        if self._status != other._status:
+        if self.status != other.status:
             return False
-        return self._result == other._result
+        if not self.result == other.result:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_GetResult_Event(_idlc.Message):  # noqa
-    """Published about a call that waits for a result, where services are introspected. Added by ROS 2.
+    """Published about a call that waits for a result, where services are introspected. Added by ROS 2."""
 
-    Attributes:
-        info: service_msgs/ServiceEventInfo
-        request: my_robot_controller/ExecuteTask_GetResult_Request[<=1]
-        response: my_robot_controller/ExecuteTask_GetResult_Response[<=1]
-    """
-
-    __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.table(
-        {
-            "info": "service_msgs/ServiceEventInfo",
-            "request": "sequence<my_robot_controller/ExecuteTask_GetResult_Request, 1>",
-            "response": "sequence<my_robot_controller/ExecuteTask_GetResult_Response, 1>",
-        },
+    __match_args__ = (
+        "info",
+        "request",
+        "response",
     )
+    _fields_and_field_types = {
+        "info": "service_msgs/ServiceEventInfo",
+        "request": "sequence<my_robot_controller/ExecuteTask_GetResult_Request, 1>",
+        "response": "sequence<my_robot_controller/ExecuteTask_GetResult_Response, 1>",
+    }
 
     info: _service_msgs_msg.ServiceEventInfo
     request: list[ExecuteTask_GetResult_Request]
@@ -261,38 +273,47 @@ class ExecuteTask_GetResult_Event(_idlc.Message):  # noqa
         response: list[ExecuteTask_GetResult_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or info is not None:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if options:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
-        self._request = [] if request is None else request
-        self._response = [] if response is None else response
+        if info is None:
+            info = _service_msgs_msg.ServiceEventInfo()
+        self.info = info
+        if request is None:
+            request = []
+        self.request = request
+        if response is None:
+            response = []
+        self.response = response
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Event):
             return _idlc.equal(self, other)
-        if not _idlc.same(self._info, other._info):
+        if not _idlc.same(
+            self.info,
+            other.info,
+        ):
             return False
-        return self._request == other._request and self._response == other._response
+        if not self.request == other.request:
+            return False
+        if not self.response == other.response:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class ExecuteTask_FeedbackMessage(_idlc.Message):  # noqa
-    """Published while a ExecuteTask goal is executed. Added by ROS 2.
+    """Published while a ExecuteTask goal is executed. Added by ROS 2."""
 
-    Attributes:
-        goal_id: unique_identifier_msgs/UUID
-        feedback: my_robot_controller/ExecuteTask_Feedback
-    """
-
-    __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types = _idlc.table(
-        {
-            "goal_id": "unique_identifier_msgs/UUID",
-            "feedback": "my_robot_controller/ExecuteTask_Feedback",
-        },
+    __match_args__ = (
+        "goal_id",
+        "feedback",
     )
+    _fields_and_field_types = {
+        "goal_id": "unique_identifier_msgs/UUID",
+        "feedback": "my_robot_controller/ExecuteTask_Feedback",
+    }
 
     goal_id: _unique_identifier_msgs_msg.UUID
     feedback: ExecuteTask_Feedback
@@ -303,22 +324,28 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):  # noqa
         feedback: ExecuteTask_Feedback | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or goal_id is not None:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if options:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         if goal_id is None:
-            self._goal_id = _unique_identifier_msgs_msg.UUID()
-        else:
-            self._goal_id = goal_id
-        self._feedback = ExecuteTask_Feedback() if feedback is None else feedback
+            goal_id = _unique_identifier_msgs_msg.UUID()
+        self.goal_id = goal_id
+        if feedback is None:
+            feedback = ExecuteTask_Feedback()
+        self.feedback = feedback
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_FeedbackMessage):
             return _idlc.equal(self, other)
-        if not _idlc.same(self._goal_id, other._goal_id):
+        if not _idlc.same(
+            self.goal_id,
+            other.goal_id,
+        ):
             return False
-        return self._feedback == other._feedback
+        if not self.feedback == other.feedback:
+            return False
+        return True
 
 
 class ExecuteTask_SendGoal(_idlc.Service):  # noqa

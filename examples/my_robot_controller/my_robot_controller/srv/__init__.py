@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # to import it would take longer than this module does
 if TYPE_CHECKING:
-    from ._add_two_ints import AddTwoInts, AddTwoInts_Request, AddTwoInts_Response
+    from ._add_two_ints import (
+        AddTwoInts,
+        AddTwoInts_Request,
+        AddTwoInts_Response,
+    )
     from ._add_two_ints__protocol import AddTwoInts_Event
 
 __all__ = [

@@ -6,29 +6,24 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class AddTwoInts_Request(_idlc.Message):  # noqa
     """The request of the service my_robot_controller/srv/AddTwoInts.
 
     Defined in srv/AddTwoInts.srv:1
-
-    Attributes:
-        a: int64
-        b: int64
     """
 
-    __match_args__ = ("a", "b")
-    _fields_and_field_types = _idlc.table(
-        {
-            "a": "int64",
-            "b": "int64",
-        },
+    __match_args__ = (
+        "a",
+        "b",
     )
+    _fields_and_field_types = {
+        "a": "int64",
+        "b": "int64",
+    }
 
     a: int
     """int64 a (srv/AddTwoInts.srv)"""
@@ -41,35 +36,35 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
         b: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._a = a
-        self._b = b
+        self.a = a
+        self.b = b
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, AddTwoInts_Request):
             return _idlc.equal(self, other)
-        return not (self._a != other._a or self._b != other._b)
+        if self.a != other.a:
+            return False
+        if self.b != other.b:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class AddTwoInts_Response(_idlc.Message):  # noqa
     """The response of the service my_robot_controller/srv/AddTwoInts.
 
     Defined in srv/AddTwoInts.srv
-
-    Attributes:
-        sum: int64. a + b
     """
 
     __match_args__ = ("sum",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "sum": "int64",
-        },
-    )
+    _fields_and_field_types = {
+        "sum": "int64",
+    }
 
     sum: int
     """int64 sum. a + b (srv/AddTwoInts.srv)"""
@@ -79,16 +74,19 @@ class AddTwoInts_Response(_idlc.Message):  # noqa
         sum: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or sum.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._sum = sum
+        self.sum = sum
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, AddTwoInts_Response):
             return _idlc.equal(self, other)
-        return bool(self._sum == other._sum)
+        if self.sum != other.sum:
+            return False
+        return True
 
 
 class AddTwoInts(_idlc.Service):  # noqa
@@ -97,4 +95,6 @@ class AddTwoInts(_idlc.Service):  # noqa
     Request: _idlc.TypeAlias = AddTwoInts_Request
     Response: _idlc.TypeAlias = AddTwoInts_Response
     if TYPE_CHECKING:
-        from ._add_two_ints__protocol import AddTwoInts_Event as Event
+        from ._add_two_ints__protocol import (
+            AddTwoInts_Event as Event,
+        )

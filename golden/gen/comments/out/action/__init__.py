@@ -6,9 +6,14 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # to import it would take longer than this module does
 if TYPE_CHECKING:
-    from ._fill import Fill, Fill_Feedback, Fill_Goal, Fill_Result
+    from ._fill import (
+        Fill,
+        Fill_Feedback,
+        Fill_Goal,
+        Fill_Result,
+    )
     from ._fill__protocol import (
         Fill_FeedbackMessage,
         Fill_GetResult,

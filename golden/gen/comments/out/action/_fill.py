@@ -6,27 +6,20 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Fill_Goal(_idlc.Message):  # noqa
     """Fills a gauge.
 
     Defined in action/Fill.action:2
-
-    Attributes:
-        level: float32 [l]. to here
     """
 
     __match_args__ = ("level",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "level": "float",
-        },
-    )
+    _fields_and_field_types = {
+        "level": "float",
+    }
 
     level: float
     """float32 level [l]. to here (action/Fill.action)"""
@@ -36,34 +29,32 @@ class Fill_Goal(_idlc.Message):  # noqa
         level: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not float:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._level = level
+        self.level = level
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Fill_Goal):
             return _idlc.equal(self, other)
-        return bool(self._level == other._level)
+        if self.level != other.level:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Fill_Result(_idlc.Message):  # noqa
     """The result of the action comments_msgs/action/Fill.
 
     Defined in action/Fill.action
-
-    Attributes:
-        reached: float32 [l]
     """
 
     __match_args__ = ("reached",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "reached": "float",
-        },
-    )
+    _fields_and_field_types = {
+        "reached": "float",
+    }
 
     reached: float
     """float32 reached [l] (action/Fill.action)"""
@@ -73,34 +64,32 @@ class Fill_Result(_idlc.Message):  # noqa
         reached: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or reached.__class__ is not float:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._reached = reached
+        self.reached = reached
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Fill_Result):
             return _idlc.equal(self, other)
-        return bool(self._reached == other._reached)
+        if self.reached != other.reached:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Fill_Feedback(_idlc.Message):  # noqa
     """The feedback of the action comments_msgs/action/Fill.
 
     Defined in action/Fill.action
-
-    Attributes:
-        level: float32
     """
 
     __match_args__ = ("level",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "level": "float",
-        },
-    )
+    _fields_and_field_types = {
+        "level": "float",
+    }
 
     level: float
     """float32 level (action/Fill.action)"""
@@ -110,16 +99,19 @@ class Fill_Feedback(_idlc.Message):  # noqa
         level: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not float:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._level = level
+        self.level = level
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Fill_Feedback):
             return _idlc.equal(self, other)
-        return bool(self._level == other._level)
+        if self.level != other.level:
+            return False
+        return True
 
 
 class Fill(_idlc.Action):  # noqa
@@ -129,4 +121,6 @@ class Fill(_idlc.Action):  # noqa
     Result: _idlc.TypeAlias = Fill_Result
     Feedback: _idlc.TypeAlias = Fill_Feedback
     if TYPE_CHECKING:
-        from ._fill__protocol import Fill_Impl as Impl
+        from ._fill__protocol import (
+            Fill_Impl as Impl,
+        )

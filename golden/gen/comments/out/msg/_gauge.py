@@ -4,15 +4,11 @@
 
 from __future__ import annotations
 
-from array import array as _array
-
 from .. import _idlc
 from .._idlc import arrays as _arrays
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Gauge(_idlc.Message):  # noqa
     """The state of a gauge, "quoted" and with a \\\\ backslash.
 
@@ -21,19 +17,6 @@ class Gauge(_idlc.Message):  # noqa
       Indented, for who reads it.
 
     Defined in msg/Gauge.msg:7
-
-    Attributes:
-        rate: float32 [Hz]. How often it is read
-        level: uint8. 0 is empty
-        label: string<=20. what stands on it
-        notes: string[<=3]. at most three, in a comment that goes on for so long
-            that the line has to be broken somewhere
-        samples: int16[]
-        covariance: float64[9] [m^2]. row by row
-        flags: byte
-
-    Constants:
-        EMPTY: uint8 [l]. nothing
     """
 
     __match_args__ = (
@@ -45,17 +28,15 @@ class Gauge(_idlc.Message):  # noqa
         "covariance",
         "flags",
     )
-    _fields_and_field_types = _idlc.table(
-        {
-            "rate": "float",
-            "level": "uint8",
-            "label": "string<20>",
-            "notes": "sequence<string, 3>",
-            "samples": "sequence<int16>",
-            "covariance": "double[9]",
-            "flags": "octet",
-        },
-    )
+    _fields_and_field_types = {
+        "rate": "float",
+        "level": "uint8",
+        "label": "string<20>",
+        "notes": "sequence<string, 3>",
+        "samples": "sequence<int16>",
+        "covariance": "double[9]",
+        "flags": "octet",
+    }
 
     EMPTY = 0
     """uint8 EMPTY [l]. nothing (msg/Gauge.msg)"""
@@ -63,8 +44,16 @@ class Gauge(_idlc.Message):  # noqa
     """uint8 FULL (msg/Gauge.msg)"""
     RATE__DEFAULT = 10.0
     LABEL__DEFAULT = 'it\'s "full"'
-    NOTES__DEFAULT = _idlc.FreshList("a", "it's")
-    SAMPLES__DEFAULT = _idlc.Fresh(_array, "h", (-1, 0, 1))
+    NOTES__DEFAULT = _idlc.FreshList(
+        "a",
+        "it's",
+    )
+    SAMPLES__DEFAULT = _idlc.Fresh(
+        _idlc.Int16Sequence.of,
+        -1,
+        0,
+        1,
+    )
     FLAGS__DEFAULT = b"\x07"
 
     rate: float
@@ -74,9 +63,7 @@ class Gauge(_idlc.Message):  # noqa
     label: str
     """string<=20 label. what stands on it (msg/Gauge.msg)"""
     notes: list[str]
-    """string[<=3] notes. at most three, in a comment that goes on for so long that
-    the line has to be broken somewhere (msg/Gauge.msg)
-    """
+    """string[<=3] notes. at most three, in a comment that goes on for so long that the line has to be broken somewhere (msg/Gauge.msg)"""
     samples: _idlc.Int16Sequence = _idlc.Int16Sequence()
     """int16[] samples (msg/Gauge.msg)"""
     covariance: _arrays.Float64Array = _arrays.Float64Array(9)
@@ -95,42 +82,48 @@ class Gauge(_idlc.Message):  # noqa
         flags: bytes = b"\x07",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or rate.__class__ is not float:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._rate = rate
-        self._level = level
-        self._label = label
-        self._notes = ["a", "it's"] if notes is None else notes
+        self.rate = rate
+        self.level = level
+        self.label = label
+        if notes is None:
+            notes = self.NOTES__DEFAULT
+        self.notes = notes
         if samples is None:
-            self._samples = _array("h", (-1, 0, 1))
+            self._samples = self.SAMPLES__DEFAULT
         else:
-            self._samples = _idlc.to_array("h", samples, "samples")
+            self.samples = samples
         if covariance is None:
             self._covariance = _arrays.zeros(9, _arrays.FLOAT64)
         else:
-            self._covariance = _arrays.to_ndarray(
-                _arrays.FLOAT64,
-                9,
-                covariance,
-                "covariance",
-            )
-        self._flags = flags
+            self.covariance = covariance
+        self.flags = flags
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Gauge):
             return _idlc.equal(self, other)
-        if self._rate != other._rate:
+        if self.rate != other.rate:
             return False
-        if self._level != other._level:
+        if self.level != other.level:
             return False
-        if self._label != other._label:
+        if self.label != other.label:
             return False
-        if self._flags != other._flags:
+        if self.flags != other.flags:
             return False
-        if not _idlc.same(self._samples, other._samples):
+        if not self.notes == other.notes:
             return False
-        if not _idlc.same(self._covariance, other._covariance):
+        if not _idlc.same(
+            self._samples,
+            other._samples,
+        ):
             return False
-        return bool(self._notes == other._notes)
+        if not _idlc.same(
+            self._covariance,
+            other._covariance,
+        ):
+            return False
+        return True

@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # to import it would take longer than this module does
 if TYPE_CHECKING:
-    from ._reset import Reset, Reset_Request, Reset_Response
+    from ._reset import (
+        Reset,
+        Reset_Request,
+        Reset_Response,
+    )
     from ._reset__protocol import Reset_Event
 
 __all__ = [

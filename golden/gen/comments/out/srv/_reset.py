@@ -6,27 +6,20 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Reset_Request(_idlc.Message):  # noqa
     """Sets a gauge back.
 
     Defined in srv/Reset.srv:2
-
-    Attributes:
-        reason: string. why
     """
 
     __match_args__ = ("reason",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "reason": "string",
-        },
-    )
+    _fields_and_field_types = {
+        "reason": "string",
+    }
 
     reason: str
     """string reason. why (srv/Reset.srv)"""
@@ -36,34 +29,32 @@ class Reset_Request(_idlc.Message):  # noqa
         reason: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or reason.__class__ is not str:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._reason = reason
+        self.reason = reason
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Reset_Request):
             return _idlc.equal(self, other)
-        return bool(self._reason == other._reason)
+        if self.reason != other.reason:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Reset_Response(_idlc.Message):  # noqa
     """Whether it worked.
 
     Defined in srv/Reset.srv
-
-    Attributes:
-        ok: bool
     """
 
     __match_args__ = ("ok",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "ok": "boolean",
-        },
-    )
+    _fields_and_field_types = {
+        "ok": "boolean",
+    }
 
     ok: bool
     """bool ok (srv/Reset.srv)"""
@@ -73,16 +64,19 @@ class Reset_Response(_idlc.Message):  # noqa
         ok: bool = False,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or ok.__class__ is not bool:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._ok = ok
+        self.ok = ok
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Reset_Response):
             return _idlc.equal(self, other)
-        return bool(self._ok == other._ok)
+        if self.ok != other.ok:
+            return False
+        return True
 
 
 class Reset(_idlc.Service):  # noqa
@@ -91,4 +85,6 @@ class Reset(_idlc.Service):  # noqa
     Request: _idlc.TypeAlias = Reset_Request
     Response: _idlc.TypeAlias = Reset_Response
     if TYPE_CHECKING:
-        from ._reset__protocol import Reset_Event as Event
+        from ._reset__protocol import (
+            Reset_Event as Event,
+        )

@@ -7,7 +7,10 @@
 from __future__ import annotations
 
 from .. import _idlc
-from ._reset import Reset_Request, Reset_Response
+from ._reset import (
+    Reset_Request,
+    Reset_Response,
+)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -15,27 +18,21 @@ if TYPE_CHECKING:
 else:
     _service_msgs_msg = _idlc.Package("service_msgs.msg")
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Reset_Event(_idlc.Message):  # noqa
-    """Published about a call of Reset, where services are introspected. Added by ROS 2.
+    """Published about a call of Reset, where services are introspected. Added by ROS 2."""
 
-    Attributes:
-        info: service_msgs/ServiceEventInfo
-        request: comments_msgs/Reset_Request[<=1]
-        response: comments_msgs/Reset_Response[<=1]
-    """
-
-    __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.table(
-        {
-            "info": "service_msgs/ServiceEventInfo",
-            "request": "sequence<comments_msgs/Reset_Request, 1>",
-            "response": "sequence<comments_msgs/Reset_Response, 1>",
-        },
+    __match_args__ = (
+        "info",
+        "request",
+        "response",
     )
+    _fields_and_field_types = {
+        "info": "service_msgs/ServiceEventInfo",
+        "request": "sequence<comments_msgs/Reset_Request, 1>",
+        "response": "sequence<comments_msgs/Reset_Response, 1>",
+    }
 
     info: _service_msgs_msg.ServiceEventInfo
     request: list[Reset_Request]
@@ -48,20 +45,33 @@ class Reset_Event(_idlc.Message):  # noqa
         response: list[Reset_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or info is not None:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if options:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
-        self._request = [] if request is None else request
-        self._response = [] if response is None else response
+        if info is None:
+            info = _service_msgs_msg.ServiceEventInfo()
+        self.info = info
+        if request is None:
+            request = []
+        self.request = request
+        if response is None:
+            response = []
+        self.response = response
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Reset_Event):
             return _idlc.equal(self, other)
-        if not _idlc.same(self._info, other._info):
+        if not _idlc.same(
+            self.info,
+            other.info,
+        ):
             return False
-        return self._request == other._request and self._response == other._response
+        if not self.request == other.request:
+            return False
+        if not self.response == other.response:
+            return False
+        return True
 
 
 _idlc.complete(__name__)

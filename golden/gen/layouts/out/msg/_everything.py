@@ -17,32 +17,12 @@ from ._row import Row
 with _idlc.importing():
     from builtin_interfaces.msg import Time
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Everything(_idlc.Message):  # noqa
     """layouts_msgs/msg/Everything.
 
     Defined in msg/Everything.msg:1
-
-    Attributes:
-        flag: bool
-        inner: layouts_msgs/Inner
-        inners: layouts_msgs/Inner[]
-        rows: layouts_msgs/Row[<=4]
-        pair: layouts_msgs/Row[2]
-        nothing: layouts_msgs/Nothing
-        nothings: layouts_msgs/Nothing[]
-        doubles: float64[]
-        shorts: int16[<=3]
-        flags: bool[]
-        octets: byte[2]
-        texts: string[]
-        wides: wstring[2]
-        stamps: builtin_interfaces/Time[]
-        weights: float32[4]
-        last: int64
     """
 
     __match_args__ = (
@@ -63,26 +43,24 @@ class Everything(_idlc.Message):  # noqa
         "weights",
         "last",
     )
-    _fields_and_field_types = _idlc.table(
-        {
-            "flag": "boolean",
-            "inner": "layouts_msgs/Inner",
-            "inners": "sequence<layouts_msgs/Inner>",
-            "rows": "sequence<layouts_msgs/Row, 4>",
-            "pair": "layouts_msgs/Row[2]",
-            "nothing": "layouts_msgs/Nothing",
-            "nothings": "sequence<layouts_msgs/Nothing>",
-            "doubles": "sequence<double>",
-            "shorts": "sequence<int16, 3>",
-            "flags": "sequence<boolean>",
-            "octets": "octet[2]",
-            "texts": "sequence<string>",
-            "wides": "wstring[2]",
-            "stamps": "sequence<builtin_interfaces/Time>",
-            "weights": "float[4]",
-            "last": "int64",
-        },
-    )
+    _fields_and_field_types = {
+        "flag": "boolean",
+        "inner": "layouts_msgs/Inner",
+        "inners": "sequence<layouts_msgs/Inner>",
+        "rows": "sequence<layouts_msgs/Row, 4>",
+        "pair": "layouts_msgs/Row[2]",
+        "nothing": "layouts_msgs/Nothing",
+        "nothings": "sequence<layouts_msgs/Nothing>",
+        "doubles": "sequence<double>",
+        "shorts": "sequence<int16, 3>",
+        "flags": "sequence<boolean>",
+        "octets": "octet[2]",
+        "texts": "sequence<string>",
+        "wides": "wstring[2]",
+        "stamps": "sequence<builtin_interfaces/Time>",
+        "weights": "float[4]",
+        "last": "int64",
+    }
 
     flag: bool
     """bool flag (msg/Everything.msg)"""
@@ -137,61 +115,107 @@ class Everything(_idlc.Message):  # noqa
         last: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or flag.__class__ is not bool:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._flag = flag
-        self._inner = Inner() if inner is None else inner
-        self._inners = [] if inners is None else inners
-        self._rows = [] if rows is None else rows
-        self._pair = _idlc.several(Row, 2) if pair is None else pair
-        self._nothing = Nothing() if nothing is None else nothing
-        self._nothings = [] if nothings is None else nothings
+        self.flag = flag
+        if inner is None:
+            inner = Inner()
+        self.inner = inner
+        if inners is None:
+            inners = []
+        self.inners = inners
+        if rows is None:
+            rows = []
+        self.rows = rows
+        if pair is None:
+            pair = _idlc.several(Row, 2)
+        self.pair = pair
+        if nothing is None:
+            nothing = Nothing()
+        self.nothing = nothing
+        if nothings is None:
+            nothings = []
+        self.nothings = nothings
         if doubles is None:
             self._doubles = _array("d")
         else:
-            self._doubles = _idlc.to_array("d", doubles, "doubles")
+            self.doubles = doubles
         if shorts is None:
             self._shorts = _array("h")
         else:
-            self._shorts = _idlc.to_array("h", shorts, "shorts")
-        self._flags = [] if flags is None else flags
-        self._octets = [b"\x00"] * 2 if octets is None else octets
-        self._texts = [] if texts is None else texts
-        self._wides = [""] * 2 if wides is None else wides
-        self._stamps = [] if stamps is None else stamps
+            self.shorts = shorts
+        if flags is None:
+            flags = []
+        self.flags = flags
+        if octets is None:
+            octets = [b"\x00"] * 2
+        self.octets = octets
+        if texts is None:
+            texts = []
+        self.texts = texts
+        if wides is None:
+            wides = [""] * 2
+        self.wides = wides
+        if stamps is None:
+            stamps = []
+        self.stamps = stamps
         if weights is None:
             self._weights = _arrays.zeros(4, _arrays.FLOAT32)
         else:
-            self._weights = _arrays.to_ndarray(_arrays.FLOAT32, 4, weights, "weights")
-        self._last = last
+            self.weights = weights
+        self.last = last
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Everything):
             return _idlc.equal(self, other)
-        if self._flag != other._flag:
+        if self.flag != other.flag:
             return False
-        if self._last != other._last:
+        if self.last != other.last:
             return False
-        if not _idlc.same(self._doubles, other._doubles):
+        if not self.inner == other.inner:
             return False
-        if not _idlc.same(self._shorts, other._shorts):
+        if not self.inners == other.inners:
             return False
-        if not _idlc.same(self._flags, other._flags):
+        if not self.rows == other.rows:
             return False
-        if not _idlc.same(self._octets, other._octets):
+        if not self.pair == other.pair:
             return False
-        if not _idlc.same(self._weights, other._weights):
+        if not self.nothing == other.nothing:
             return False
-        return (
-            self._inner == other._inner
-            and self._inners == other._inners
-            and self._rows == other._rows
-            and self._pair == other._pair
-            and self._nothing == other._nothing
-            and self._nothings == other._nothings
-            and self._texts == other._texts
-            and self._wides == other._wides
-            and self._stamps == other._stamps
-        )
+        if not self.nothings == other.nothings:
+            return False
+        if not _idlc.same(
+            self._doubles,
+            other._doubles,
+        ):
+            return False
+        if not _idlc.same(
+            self._shorts,
+            other._shorts,
+        ):
+            return False
+        if not _idlc.same(
+            self.flags,
+            other.flags,
+        ):
+            return False
+        if not _idlc.same(
+            self.octets,
+            other.octets,
+        ):
+            return False
+        if not self.texts == other.texts:
+            return False
+        if not self.wides == other.wides:
+            return False
+        if not self.stamps == other.stamps:
+            return False
+        if not _idlc.same(
+            self._weights,
+            other._weights,
+        ):
+            return False
+        return True

@@ -6,31 +6,26 @@ from __future__ import annotations
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Inner(_idlc.Message):  # noqa
     """layouts_msgs/msg/Inner.
 
     Defined in msg/Inner.msg:1
-
-    Attributes:
-        a: uint8
-        b: float64
-        c: string
-        d: wstring
     """
 
-    __match_args__ = ("a", "b", "c", "d")
-    _fields_and_field_types = _idlc.table(
-        {
-            "a": "uint8",
-            "b": "double",
-            "c": "string",
-            "d": "wstring",
-        },
+    __match_args__ = (
+        "a",
+        "b",
+        "c",
+        "d",
     )
+    _fields_and_field_types = {
+        "a": "uint8",
+        "b": "double",
+        "c": "string",
+        "d": "wstring",
+    }
 
     a: int
     """uint8 a (msg/Inner.msg)"""
@@ -49,21 +44,25 @@ class Inner(_idlc.Message):  # noqa
         d: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._a = a
-        self._b = b
-        self._c = c
-        self._d = d
+        self.a = a
+        self.b = b
+        self.c = c
+        self.d = d
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Inner):
             return _idlc.equal(self, other)
-        return not (
-            self._a != other._a
-            or self._b != other._b
-            or self._c != other._c
-            or self._d != other._d
-        )
+        if self.a != other.a:
+            return False
+        if self.b != other.b:
+            return False
+        if self.c != other.c:
+            return False
+        if self.d != other.d:
+            return False
+        return True

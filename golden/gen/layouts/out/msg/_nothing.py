@@ -6,26 +6,24 @@ from __future__ import annotations
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Nothing(_idlc.Message):  # noqa
     """layouts_msgs/msg/Nothing."""
 
     __match_args__ = ()
-    _fields_and_field_types = _idlc.table({})
+    _fields_and_field_types = {}
 
     def __init__(
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Nothing):
             return _idlc.equal(self, other)
         return True

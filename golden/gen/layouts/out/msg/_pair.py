@@ -6,27 +6,22 @@ from __future__ import annotations
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Pair(_idlc.Message):  # noqa
     """layouts_msgs/msg/Pair.
 
     Defined in msg/Pair.msg:1
-
-    Attributes:
-        key: string
-        value: string
     """
 
-    __match_args__ = ("key", "value")
-    _fields_and_field_types = _idlc.table(
-        {
-            "key": "string",
-            "value": "string",
-        },
+    __match_args__ = (
+        "key",
+        "value",
     )
+    _fields_and_field_types = {
+        "key": "string",
+        "value": "string",
+    }
 
     key: str
     """string key (msg/Pair.msg)"""
@@ -39,14 +34,19 @@ class Pair(_idlc.Message):  # noqa
         value: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or key.__class__ is not str:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._key = key
-        self._value = value
+        self.key = key
+        self.value = value
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Pair):
             return _idlc.equal(self, other)
-        return not (self._key != other._key or self._value != other._value)
+        if self.key != other.key:
+            return False
+        if self.value != other.value:
+            return False
+        return True

@@ -7,29 +7,24 @@ from __future__ import annotations
 from .. import _idlc
 from .._idlc import arrays as _arrays
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Row(_idlc.Message):  # noqa
     """layouts_msgs/msg/Row.
 
     Defined in msg/Row.msg:1
-
-    Attributes:
-        a: uint32
-        b: uint16
-        c: uint8[3]
     """
 
-    __match_args__ = ("a", "b", "c")
-    _fields_and_field_types = _idlc.table(
-        {
-            "a": "uint32",
-            "b": "uint16",
-            "c": "uint8[3]",
-        },
+    __match_args__ = (
+        "a",
+        "b",
+        "c",
     )
+    _fields_and_field_types = {
+        "a": "uint32",
+        "b": "uint16",
+        "c": "uint8[3]",
+    }
 
     a: int
     """uint32 a (msg/Row.msg)"""
@@ -45,22 +40,28 @@ class Row(_idlc.Message):  # noqa
         c: _arrays.Values | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._a = a
-        self._b = b
+        self.a = a
+        self.b = b
         if c is None:
             self._c = _arrays.zeros(3, _arrays.UINT8)
         else:
-            self._c = _arrays.to_ndarray(_arrays.UINT8, 3, c, "c")
+            self.c = c
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Row):
             return _idlc.equal(self, other)
-        if self._a != other._a:
+        if self.a != other.a:
             return False
-        if self._b != other._b:
+        if self.b != other.b:
             return False
-        return _idlc.same(self._c, other._c)
+        if not _idlc.same(
+            self._c,
+            other._c,
+        ):
+            return False
+        return True

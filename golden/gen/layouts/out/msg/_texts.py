@@ -8,31 +8,26 @@ from .. import _idlc
 from ._pair import Pair
 from ._titled import Titled
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Texts(_idlc.Message):  # noqa
     """layouts_msgs/msg/Texts.
 
     Defined in msg/Texts.msg:1
-
-    Attributes:
-        pairs: layouts_msgs/Pair[]
-        few: layouts_msgs/Pair[<=2]
-        titled: layouts_msgs/Titled[]
-        last: string
     """
 
-    __match_args__ = ("pairs", "few", "titled", "last")
-    _fields_and_field_types = _idlc.table(
-        {
-            "pairs": "sequence<layouts_msgs/Pair>",
-            "few": "sequence<layouts_msgs/Pair, 2>",
-            "titled": "sequence<layouts_msgs/Titled>",
-            "last": "string",
-        },
+    __match_args__ = (
+        "pairs",
+        "few",
+        "titled",
+        "last",
     )
+    _fields_and_field_types = {
+        "pairs": "sequence<layouts_msgs/Pair>",
+        "few": "sequence<layouts_msgs/Pair, 2>",
+        "titled": "sequence<layouts_msgs/Titled>",
+        "last": "string",
+    }
 
     pairs: list[Pair]
     """layouts_msgs/Pair[] pairs (msg/Texts.msg)"""
@@ -51,22 +46,31 @@ class Texts(_idlc.Message):  # noqa
         last: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (pairs is not None and pairs.__class__ is not list):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if pairs is None:
+            pairs = []
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or pairs.__class__ is not list:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._pairs = [] if pairs is None else pairs
-        self._few = [] if few is None else few
-        self._titled = [] if titled is None else titled
-        self._last = last
+        self.pairs = pairs
+        if few is None:
+            few = []
+        self.few = few
+        if titled is None:
+            titled = []
+        self.titled = titled
+        self.last = last
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Texts):
             return _idlc.equal(self, other)
-        if self._last != other._last:
+        if self.last != other.last:
             return False
-        return (
-            self._pairs == other._pairs
-            and self._few == other._few
-            and self._titled == other._titled
-        )
+        if not self.pairs == other.pairs:
+            return False
+        if not self.few == other.few:
+            return False
+        if not self.titled == other.titled:
+            return False
+        return True

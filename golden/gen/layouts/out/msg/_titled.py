@@ -7,31 +7,26 @@ from __future__ import annotations
 from .. import _idlc
 from ._pair import Pair
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Titled(_idlc.Message):  # noqa
     """layouts_msgs/msg/Titled.
 
     Defined in msg/Titled.msg:1
-
-    Attributes:
-        level: uint8
-        title: string
-        pairs: layouts_msgs/Pair[]
-        number: float64
     """
 
-    __match_args__ = ("level", "title", "pairs", "number")
-    _fields_and_field_types = _idlc.table(
-        {
-            "level": "uint8",
-            "title": "string",
-            "pairs": "sequence<layouts_msgs/Pair>",
-            "number": "double",
-        },
+    __match_args__ = (
+        "level",
+        "title",
+        "pairs",
+        "number",
     )
+    _fields_and_field_types = {
+        "level": "uint8",
+        "title": "string",
+        "pairs": "sequence<layouts_msgs/Pair>",
+        "number": "double",
+    }
 
     level: int
     """uint8 level (msg/Titled.msg)"""
@@ -50,22 +45,27 @@ class Titled(_idlc.Message):  # noqa
         number: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._level = level
-        self._title = title
-        self._pairs = [] if pairs is None else pairs
-        self._number = number
+        self.level = level
+        self.title = title
+        if pairs is None:
+            pairs = []
+        self.pairs = pairs
+        self.number = number
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Titled):
             return _idlc.equal(self, other)
-        if self._level != other._level:
+        if self.level != other.level:
             return False
-        if self._title != other._title:
+        if self.title != other.title:
             return False
-        if self._number != other._number:
+        if self.number != other.number:
             return False
-        return self._pairs == other._pairs
+        if not self.pairs == other.pairs:
+            return False
+        return True

@@ -11,26 +11,12 @@ from .. import _idlc
 from .._idlc import arrays as _arrays
 from ._words import Words
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Lists(_idlc.Message):  # noqa
     """lyrical_msgs/msg/Lists.
 
     Defined in msg/Lists.msg:1
-
-    Attributes:
-        names: string[]
-        words: lyrical_msgs/Words[]
-        three: lyrical_msgs/Words[3]
-        flags: bool[<=4]
-        raw: byte[2]
-        wide: wstring[2]
-        str: string[<=2]
-        position: float32[3]
-        data: uint8[]
-        texts_in_a_field_with_one_long_name: string[]
     """
 
     __match_args__ = (
@@ -43,24 +29,25 @@ class Lists(_idlc.Message):  # noqa
         "str",
         "position",
         "data",
-        "texts_in_a_field_with_one_long_name",
+        "texts_in_a_long_field_name",
     )
-    _fields_and_field_types = _idlc.table(
-        {
-            "names": "sequence<string>",
-            "words": "sequence<lyrical_msgs/Words>",
-            "three": "lyrical_msgs/Words[3]",
-            "flags": "sequence<boolean, 4>",
-            "raw": "octet[2]",
-            "wide": "wstring[2]",
-            "str": "sequence<string, 2>",
-            "position": "float[3]",
-            "data": "sequence<uint8>",
-            "texts_in_a_field_with_one_long_name": "sequence<string>",
-        },
-    )
+    _fields_and_field_types = {
+        "names": "sequence<string>",
+        "words": "sequence<lyrical_msgs/Words>",
+        "three": "lyrical_msgs/Words[3]",
+        "flags": "sequence<boolean, 4>",
+        "raw": "octet[2]",
+        "wide": "wstring[2]",
+        "str": "sequence<string, 2>",
+        "position": "float[3]",
+        "data": "sequence<uint8>",
+        "texts_in_a_long_field_name": "sequence<string>",
+    }
 
-    NAMES__DEFAULT = _idlc.FreshList("a", "b")
+    NAMES__DEFAULT = _idlc.FreshList(
+        "a",
+        "b",
+    )
 
     names: _idlc.ListOf[_builtins.str] = _idlc.ListOf()
     """string[] names (msg/Lists.msg)"""
@@ -80,8 +67,8 @@ class Lists(_idlc.Message):  # noqa
     """float32[3] position (msg/Lists.msg)"""
     data: _idlc.UInt8Sequence = _idlc.UInt8Sequence()
     """uint8[] data (msg/Lists.msg)"""
-    texts_in_a_field_with_one_long_name: _idlc.ListOf[_builtins.str] = _idlc.ListOf()
-    """string[] texts_in_a_field_with_one_long_name (msg/Lists.msg)"""
+    texts_in_a_long_field_name: _idlc.ListOf[_builtins.str] = _idlc.ListOf()
+    """string[] texts_in_a_long_field_name (msg/Lists.msg)"""
 
     def __init__(
         self,
@@ -94,68 +81,80 @@ class Lists(_idlc.Message):  # noqa
         str: _idlc.Iterable[_builtins.str] | None = None,
         position: _arrays.Values | None = None,
         data: _idlc.Integers | None = None,
-        texts_in_a_field_with_one_long_name: _idlc.Iterable[_builtins.str]
-        | None = None,
+        texts_in_a_long_field_name: _idlc.Iterable[_builtins.str] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (names is not None and names.__class__ is not _builtins.list):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if names is None:
+            names = self.NAMES__DEFAULT
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or names.__class__ is not _builtins.list:
+            _done = _idlc.construct(self, options, _builtins.locals())
+            if _done:
                 return
-        self._names = ["a", "b"] if names is None else _idlc.to_list(names, "names")
-        self._words = [] if words is None else _idlc.to_list(words, "words")
+        self.names = names
+        if words is None:
+            words = []
+        self.words = words
         if three is None:
-            self._three = _idlc.several(Words, 3)
-        else:
-            self._three = _idlc.to_list(three, "three")
+            three = _idlc.several(Words, 3)
+        self.three = three
         if flags is None:
-            self._flags = []
-        else:
-            self._flags = _idlc.to_list(flags, "flags", _idlc.read_flags)
+            flags = []
+        self.flags = flags
         if raw is None:
-            self._raw = [b"\x00"] * 2
-        else:
-            self._raw = _idlc.to_list(raw, "raw", _idlc.read_octets)
-        self._wide = [""] * 2 if wide is None else _idlc.to_list(wide, "wide")
-        self._str = [] if str is None else _idlc.to_list(str, "str")
+            raw = [b"\x00"] * 2
+        self.raw = raw
+        if wide is None:
+            wide = [""] * 2
+        self.wide = wide
+        if str is None:
+            str = []
+        self.str = str
         if position is None:
             self._position = _arrays.zeros(3, _arrays.FLOAT32)
         else:
-            self._position = _arrays.to_ndarray(
-                _arrays.FLOAT32,
-                3,
-                position,
-                "position",
-            )
-        self._data = _array("B") if data is None else _idlc.to_array("B", data, "data")
-        if texts_in_a_field_with_one_long_name is None:
-            self._texts_in_a_field_with_one_long_name = []
+            self.position = position
+        if data is None:
+            self._data = _array("B")
         else:
-            self._texts_in_a_field_with_one_long_name = _idlc.to_list(
-                texts_in_a_field_with_one_long_name,
-                "texts_in_a_field_with_one_long_name",
-            )
+            self.data = data
+        if texts_in_a_long_field_name is None:
+            texts_in_a_long_field_name = []
+        self.texts_in_a_long_field_name = texts_in_a_long_field_name
 
-    def __eq__(self, other: _idlc.Any) -> _builtins.bool:
+    def __eq__(self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Lists):
             return _idlc.equal(self, other)
-        if not _idlc.same(self._flags, other._flags):
+        if not self.names == other.names:
             return False
-        if not _idlc.same(self._raw, other._raw):
+        if not self.words == other.words:
             return False
-        if not _idlc.same(self._position, other._position):
-            return False
-        if not _idlc.same(self._data, other._data):
+        if not self.three == other.three:
             return False
         if not _idlc.same(
-            self._texts_in_a_field_with_one_long_name,
-            other._texts_in_a_field_with_one_long_name,
+            self.flags,
+            other.flags,
         ):
             return False
-        return (
-            self._names == other._names
-            and self._words == other._words
-            and self._three == other._three
-            and self._wide == other._wide
-            and self._str == other._str
-        )
+        if not _idlc.same(
+            self.raw,
+            other.raw,
+        ):
+            return False
+        if not self.wide == other.wide:
+            return False
+        if not self.str == other.str:
+            return False
+        if not _idlc.same(
+            self._position,
+            other._position,
+        ):
+            return False
+        if not _idlc.same(
+            self._data,
+            other._data,
+        ):
+            return False
+        if not self.texts_in_a_long_field_name == other.texts_in_a_long_field_name:
+            return False
+        return True

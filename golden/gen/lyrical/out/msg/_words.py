@@ -8,33 +8,28 @@ import builtins as _builtins
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Words(_idlc.Message):  # noqa
     """lyrical_msgs/msg/Words.
 
     Defined in msg/Words.msg:1
-
-    Attributes:
-        text: string
-        count: int32
-        raw: byte
-        list: bool
-        d: float64
     """
 
-    __match_args__ = ("text", "count", "raw", "list", "d")
-    _fields_and_field_types = _idlc.table(
-        {
-            "text": "string",
-            "count": "int32",
-            "raw": "octet",
-            "list": "boolean",
-            "d": "double",
-        },
+    __match_args__ = (
+        "text",
+        "count",
+        "raw",
+        "list",
+        "d",
     )
+    _fields_and_field_types = {
+        "text": "string",
+        "count": "int32",
+        "raw": "octet",
+        "list": "boolean",
+        "d": "double",
+    }
 
     TEXT__DEFAULT = "none"
     COUNT__DEFAULT = -1
@@ -60,23 +55,38 @@ class Words(_idlc.Message):  # noqa
         d: _builtins.float | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (text is not None and text.__class__ is not _builtins.str):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if text is None:
+            text = "none"
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or text.__class__ is not _builtins.str:
+            _done = _idlc.construct(self, options, _builtins.locals())
+            if _done:
                 return
-        self._text = "none" if text is None else text
-        self._count = -1 if count is None else count
-        self._raw = b"\x00" if raw is None else raw
-        self._list = False if list is None else list
-        self._d = 0.5 if d is None else d
+        self.text = text
+        if count is None:
+            count = -1
+        self.count = count
+        if raw is None:
+            raw = b"\x00"
+        self.raw = raw
+        if list is None:
+            list = False
+        self.list = list
+        if d is None:
+            d = 0.5
+        self.d = d
 
-    def __eq__(self, other: _idlc.Any) -> _builtins.bool:
+    def __eq__(self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Words):
             return _idlc.equal(self, other)
-        return not (
-            self._text != other._text
-            or self._count != other._count
-            or self._raw != other._raw
-            or self._list != other._list
-            or self._d != other._d
-        )
+        if self.text != other.text:
+            return False
+        if self.count != other.count:
+            return False
+        if self.raw != other.raw:
+            return False
+        if self.list != other.list:
+            return False
+        if self.d != other.d:
+            return False
+        return True

@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # to import it would take longer than this module does
 if TYPE_CHECKING:
-    from ._run import Run, Run_Request, Run_Response
+    from ._run import (
+        Run,
+        Run_Request,
+        Run_Response,
+    )
     from ._run__protocol import Run_Event
 
 __all__ = [

@@ -11,29 +11,24 @@ from .. import _idlc
 with _idlc.importing():
     from builtin_interfaces.msg import Time
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Run_Request(_idlc.Message):  # noqa
     """The request of the service lyrical_msgs/srv/Run.
 
     Defined in srv/Run.srv:1
-
-    Attributes:
-        args: string[]
-        wait: bool
     """
 
-    __match_args__ = ("args", "wait")
-    _fields_and_field_types = _idlc.table(
-        {
-            "args": "sequence<string>",
-            "wait": "boolean",
-        },
+    __match_args__ = (
+        "args",
+        "wait",
     )
+    _fields_and_field_types = {
+        "args": "sequence<string>",
+        "wait": "boolean",
+    }
 
     args: _idlc.ListOf[str] = _idlc.ListOf()
     """string[] args (srv/Run.srv)"""
@@ -46,39 +41,43 @@ class Run_Request(_idlc.Message):  # noqa
         wait: bool | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (args is not None and args.__class__ is not list):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if args is None:
+            args = []
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or args.__class__ is not list:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._args = [] if args is None else _idlc.to_list(args, "args")
-        self._wait = False if wait is None else wait
+        self.args = args
+        if wait is None:
+            wait = False
+        self.wait = wait
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run_Request):
             return _idlc.equal(self, other)
-        if self._wait != other._wait:
+        if self.wait != other.wait:
             return False
-        return bool(self._args == other._args)
+        if not self.args == other.args:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Run_Response(_idlc.Message):  # noqa
     """The response of the service lyrical_msgs/srv/Run.
 
     Defined in srv/Run.srv
-
-    Attributes:
-        status: int32
-        stamps: builtin_interfaces/Time[]
     """
 
-    __match_args__ = ("status", "stamps")
-    _fields_and_field_types = _idlc.table(
-        {
-            "status": "int32",
-            "stamps": "sequence<builtin_interfaces/Time>",
-        },
+    __match_args__ = (
+        "status",
+        "stamps",
     )
+    _fields_and_field_types = {
+        "status": "int32",
+        "stamps": "sequence<builtin_interfaces/Time>",
+    }
 
     STATUS__DEFAULT = -1
 
@@ -93,19 +92,26 @@ class Run_Response(_idlc.Message):  # noqa
         stamps: _idlc.Iterable[Time] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (status is not None and status.__class__ is not int):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if status is None:
+            status = -1
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or status.__class__ is not int:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._status = -1 if status is None else status
-        self._stamps = [] if stamps is None else _idlc.to_list(stamps, "stamps")
+        self.status = status
+        if stamps is None:
+            stamps = []
+        self.stamps = stamps
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run_Response):
             return _idlc.equal(self, other)
-        if self._status != other._status:
+        if self.status != other.status:
             return False
-        return bool(self._stamps == other._stamps)
+        if not self.stamps == other.stamps:
+            return False
+        return True
 
 
 class Run(_idlc.Service):  # noqa
@@ -114,4 +120,6 @@ class Run(_idlc.Service):  # noqa
     Request: _idlc.TypeAlias = Run_Request
     Response: _idlc.TypeAlias = Run_Response
     if TYPE_CHECKING:
-        from ._run__protocol import Run_Event as Event
+        from ._run__protocol import (
+            Run_Event as Event,
+        )

@@ -11,25 +11,18 @@ from .. import _idlc
 with _idlc.importing():
     from geometry_msgs.msg import Pose
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Any(_idlc.Message):  # noqa
     """names_msgs/msg/Any.
 
     Defined in msg/Any.msg:1
-
-    Attributes:
-        pose: geometry_msgs/Pose
     """
 
     __match_args__ = ("pose",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "pose": "geometry_msgs/Pose",
-        },
-    )
+    _fields_and_field_types = {
+        "pose": "geometry_msgs/Pose",
+    }
 
     pose: Pose
     """geometry_msgs/Pose pose (msg/Any.msg)"""
@@ -39,13 +32,18 @@ class Any(_idlc.Message):  # noqa
         pose: Pose | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (pose is not None and pose.__class__ is not Pose):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if pose is None:
+            pose = Pose()
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or pose.__class__ is not Pose:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._pose = Pose() if pose is None else pose
+        self.pose = pose
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Any):
             return _idlc.equal(self, other)
-        return bool(self._pose == other._pose)
+        if not self.pose == other.pose:
+            return False
+        return True

@@ -7,25 +7,18 @@ from __future__ import annotations
 from .. import _idlc
 from ._foo_bar_2 import FooBar
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class FOOBar(_idlc.Message):  # noqa
     """names_msgs/msg/FOOBar.
 
     Defined in msg/FOOBar.msg:1
-
-    Attributes:
-        inner: names_msgs/FooBar
     """
 
     __match_args__ = ("inner",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "inner": "names_msgs/FooBar",
-        },
-    )
+    _fields_and_field_types = {
+        "inner": "names_msgs/FooBar",
+    }
 
     inner: FooBar
     """names_msgs/FooBar inner (msg/FOOBar.msg)"""
@@ -35,13 +28,18 @@ class FOOBar(_idlc.Message):  # noqa
         inner: FooBar | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (inner is not None and inner.__class__ is not FooBar):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if inner is None:
+            inner = FooBar()
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or inner.__class__ is not FooBar:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._inner = FooBar() if inner is None else inner
+        self.inner = inner
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, FOOBar):
             return _idlc.equal(self, other)
-        return self._inner == other._inner
+        if not self.inner == other.inner:
+            return False
+        return True

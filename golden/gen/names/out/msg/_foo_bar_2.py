@@ -6,25 +6,18 @@ from __future__ import annotations
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class FooBar(_idlc.Message):  # noqa
     """names_msgs/msg/FooBar.
 
     Defined in msg/FooBar.msg:1
-
-    Attributes:
-        a: int32
     """
 
     __match_args__ = ("a",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "a": "int32",
-        },
-    )
+    _fields_and_field_types = {
+        "a": "int32",
+    }
 
     a: int
     """int32 a (msg/FooBar.msg)"""
@@ -34,13 +27,16 @@ class FooBar(_idlc.Message):  # noqa
         a: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._a = a
+        self.a = a
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, FooBar):
             return _idlc.equal(self, other)
-        return bool(self._a == other._a)
+        if self.a != other.a:
+            return False
+        return True

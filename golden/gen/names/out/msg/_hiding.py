@@ -11,37 +11,31 @@ from .. import _idlc
 from .._idlc import arrays as _arrays
 from ._point import Point
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Hiding(_idlc.Message):  # noqa
     """Fields that are called like methods.
 
-    Fields hide the methods of the same name (validate, serialize, deserialize,
-    from_dict, to_dict): `super(Hiding, message)` still has them, and `super(Hiding,
-    Hiding)` those of the class.
+    Fields hide the methods of the same name (validate, serialize, deserialize, from_dict, to_dict):
+    `super(Hiding, message)` still has them, and `super(Hiding, Hiding)` those of the class.
 
     Defined in msg/Hiding.msg:2
-
-    Attributes:
-        validate: names_msgs/Point
-        serialize: uint8
-        deserialize: float32[]
-        from_dict: int32[3]
-        to_dict: string[]
     """
 
-    __match_args__ = ("validate", "serialize", "deserialize", "from_dict", "to_dict")
-    _fields_and_field_types = _idlc.table(
-        {
-            "validate": "names_msgs/Point",
-            "serialize": "uint8",
-            "deserialize": "sequence<float>",
-            "from_dict": "int32[3]",
-            "to_dict": "sequence<string>",
-        },
+    __match_args__ = (
+        "validate",
+        "serialize",
+        "deserialize",
+        "from_dict",
+        "to_dict",
     )
+    _fields_and_field_types = {
+        "validate": "names_msgs/Point",
+        "serialize": "uint8",
+        "deserialize": "sequence<float>",
+        "from_dict": "int32[3]",
+        "to_dict": "sequence<string>",
+    }
 
     SERIALIZE__DEFAULT = 1
 
@@ -65,34 +59,44 @@ class Hiding(_idlc.Message):  # noqa
         to_dict: list[str] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (validate is not None and validate.__class__ is not Point):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if validate is None:
+            validate = Point()
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or validate.__class__ is not Point:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._validate = Point() if validate is None else validate
-        self._serialize = serialize
+        self.validate = validate
+        self.serialize = serialize
         if deserialize is None:
             self._deserialize = _array("f")
         else:
-            self._deserialize = _idlc.to_array("f", deserialize, "deserialize")
+            self.deserialize = deserialize
         if from_dict is None:
             self._from_dict = _arrays.zeros(3, _arrays.INT32)
         else:
-            self._from_dict = _arrays.to_ndarray(
-                _arrays.INT32,
-                3,
-                from_dict,
-                "from_dict",
-            )
-        self._to_dict = [] if to_dict is None else to_dict
+            self.from_dict = from_dict
+        if to_dict is None:
+            to_dict = []
+        self.to_dict = to_dict
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hiding):
             return _idlc.equal(self, other)
-        if self._serialize != other._serialize:
+        if self.serialize != other.serialize:
             return False
-        if not _idlc.same(self._deserialize, other._deserialize):
+        if not self.validate == other.validate:
             return False
-        if not _idlc.same(self._from_dict, other._from_dict):
+        if not _idlc.same(
+            self._deserialize,
+            other._deserialize,
+        ):
             return False
-        return self._validate == other._validate and self._to_dict == other._to_dict
+        if not _idlc.same(
+            self._from_dict,
+            other._from_dict,
+        ):
+            return False
+        if not self.to_dict == other.to_dict:
+            return False
+        return True

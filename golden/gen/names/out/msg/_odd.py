@@ -11,35 +11,15 @@ from .. import _idlc
 from .._idlc import arrays as _arrays
 from ._point import Point
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Odd(_idlc.Message):  # noqa
     """names_msgs/msg/Odd.
 
-    Fields hide the methods of the same name (serialize): `super(Odd, message)`
-    still has them, and `super(Odd, Odd)` those of the class.
+    Fields hide the methods of the same name (serialize):
+    `super(Odd, message)` still has them, and `super(Odd, Odd)` those of the class.
 
     Defined in msg/Odd.msg:1
-
-    Attributes:
-        class_: int32
-        serialize: int32
-        self: int32
-        fields_and_field_types: int32
-        int: int32
-        list: string
-        bytes: byte
-        bool: bool
-        float: float32
-        str: string[]
-        message: int32
-        data: int32
-        at: int32
-        item: names_msgs/Point[]
-        array: names_msgs/Point
-        order: int32[3]
     """
 
     __match_args__ = (
@@ -60,31 +40,37 @@ class Odd(_idlc.Message):  # noqa
         "array",
         "order",
     )
-    _fields_and_field_types = _idlc.table(
-        {
-            "class": "int32",
-            "serialize": "int32",
-            "self": "int32",
-            "fields_and_field_types": "int32",
-            "int": "int32",
-            "list": "string",
-            "bytes": "octet",
-            "bool": "boolean",
-            "float": "float",
-            "str": "sequence<string>",
-            "message": "int32",
-            "data": "int32",
-            "at": "int32",
-            "item": "sequence<names_msgs/Point>",
-            "array": "names_msgs/Point",
-            "order": "int32[3]",
-        },
-    )
+    _fields_and_field_types = {
+        "class": "int32",
+        "serialize": "int32",
+        "self": "int32",
+        "fields_and_field_types": "int32",
+        "int": "int32",
+        "list": "string",
+        "bytes": "octet",
+        "bool": "boolean",
+        "float": "float",
+        "str": "sequence<string>",
+        "message": "int32",
+        "data": "int32",
+        "at": "int32",
+        "item": "sequence<names_msgs/Point>",
+        "array": "names_msgs/Point",
+        "order": "int32[3]",
+    }
 
     SERIALIZE__DEFAULT = 3
     INT__DEFAULT = 4
-    STR__DEFAULT = _idlc.FreshList("a", 'b "c"')
-    ORDER__DEFAULT = _idlc.Fresh(_arrays.array, (1, 2, 3), _arrays.INT32)
+    STR__DEFAULT = _idlc.FreshList(
+        "a",
+        'b "c"',
+    )
+    ORDER__DEFAULT = _idlc.Fresh(
+        _arrays.Int32Array.of,
+        1,
+        2,
+        3,
+    )
 
     class_: _builtins.int
     """int32 class (msg/Odd.msg)"""
@@ -139,61 +125,73 @@ class Odd(_idlc.Message):  # noqa
         order: _arrays.Values | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or class_.__class__ is not _builtins.int:
-            _given = locals()
-            if _idlc.construct(_self, options, _given):
+            _done = _idlc.construct(_self, options, _builtins.locals())
+            if _done:
                 return
-        _self._class = class_
-        _self._serialize = serialize
-        _self._self = self
-        _self._fields_and_field_types_ = fields_and_field_types
-        _self._int = int
-        _self._list = list
-        _self._bytes = bytes
-        _self._bool = bool
-        _self._float = float
-        _self._str = ["a", 'b "c"'] if str is None else str
-        _self._message = message
-        _self._data = data
-        _self._at = at
-        _self._item = [] if item is None else item
-        _self._array = Point() if array is None else array
+        _self.class_ = class_
+        _self.serialize = serialize
+        _self.self = self
+        _self.fields_and_field_types = fields_and_field_types
+        _self.int = int
+        _self.list = list
+        _self.bytes = bytes
+        _self.bool = bool
+        _self.float = float
+        if str is None:
+            str = _self.STR__DEFAULT
+        _self.str = str
+        _self.message = message
+        _self.data = data
+        _self.at = at
+        if item is None:
+            item = []
+        _self.item = item
+        if array is None:
+            array = Point()
+        _self.array = array
         if order is None:
-            _self._order = _arrays.array((1, 2, 3), _arrays.INT32)
+            _self._order = _self.ORDER__DEFAULT
         else:
-            _self._order = _arrays.to_ndarray(_arrays.INT32, 3, order, "order")
+            _self.order = order
 
-    def __eq__(_self, other: _idlc.Any) -> _builtins.bool:
+    def __eq__(_self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Odd):
             return _idlc.equal(_self, other)
-        if _self._class != other._class:
+        if _self.class_ != other.class_:
             return False
-        if _self._serialize != other._serialize:
+        if _self.serialize != other.serialize:
             return False
-        if _self._self != other._self:
+        if _self.self != other.self:
             return False
-        if _self._fields_and_field_types_ != other._fields_and_field_types_:
+        if _self.fields_and_field_types != other.fields_and_field_types:
             return False
-        if _self._int != other._int:
+        if _self.int != other.int:
             return False
-        if _self._list != other._list:
+        if _self.list != other.list:
             return False
-        if _self._bytes != other._bytes:
+        if _self.bytes != other.bytes:
             return False
-        if _self._bool != other._bool:
+        if _self.bool != other.bool:
             return False
-        if _self._float != other._float:
+        if _self.float != other.float:
             return False
-        if _self._message != other._message:
+        if _self.message != other.message:
             return False
-        if _self._data != other._data:
+        if _self.data != other.data:
             return False
-        if _self._at != other._at:
+        if _self.at != other.at:
             return False
-        if not _idlc.same(_self._order, other._order):
+        if not _self.str == other.str:
             return False
-        return (
-            _self._str == other._str
-            and _self._item == other._item
-            and _self._array == other._array
-        )
+        if not _self.item == other.item:
+            return False
+        if not _self.array == other.array:
+            return False
+        if not _idlc.same(
+            _self._order,
+            other._order,
+        ):
+            return False
+        return True

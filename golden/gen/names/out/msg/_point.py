@@ -6,27 +6,22 @@ from __future__ import annotations
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Point(_idlc.Message):  # noqa
     """names_msgs/msg/Point.
 
     Defined in msg/Point.msg:1
-
-    Attributes:
-        x: float64
-        y: float64
     """
 
-    __match_args__ = ("x", "y")
-    _fields_and_field_types = _idlc.table(
-        {
-            "x": "double",
-            "y": "double",
-        },
+    __match_args__ = (
+        "x",
+        "y",
     )
+    _fields_and_field_types = {
+        "x": "double",
+        "y": "double",
+    }
 
     x: float
     """float64 x (msg/Point.msg)"""
@@ -39,14 +34,19 @@ class Point(_idlc.Message):  # noqa
         y: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or x.__class__ is not float:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._x = x
-        self._y = y
+        self.x = x
+        self.y = y
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Point):
             return _idlc.equal(self, other)
-        return not (self._x != other._x or self._y != other._y)
+        if self.x != other.x:
+            return False
+        if self.y != other.y:
+            return False
+        return True

@@ -7,65 +7,67 @@
 from __future__ import annotations
 
 from .. import _idlc
-from ._any import Any
+from ._any import Any as names_msgs_Any
 from ._point import Point as names_msgs_Point
 
 with _idlc.importing():
     from geometry_msgs.msg import Point as geometry_msgs_Point
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Text(_idlc.Message):  # noqa
     """names_msgs/msg/Text.
 
     Defined in msg/Text.msg:1
-
-    Attributes:
-        other: geometry_msgs/Point
-        own: names_msgs/Point
-        any: names_msgs/Any[<=2]
     """
 
-    __match_args__ = ("other", "own", "any")
-    _fields_and_field_types = _idlc.table(
-        {
-            "other": "geometry_msgs/Point",
-            "own": "names_msgs/Point",
-            "any": "sequence<names_msgs/Any, 2>",
-        },
+    __match_args__ = (
+        "other",
+        "own",
+        "any",
     )
+    _fields_and_field_types = {
+        "other": "geometry_msgs/Point",
+        "own": "names_msgs/Point",
+        "any": "sequence<names_msgs/Any, 2>",
+    }
 
     other: geometry_msgs_Point
     """geometry_msgs/Point other (msg/Text.msg)"""
     own: names_msgs_Point
     """names_msgs/Point own (msg/Text.msg)"""
-    any: list[Any]
+    any: list[names_msgs_Any]
     """names_msgs/Any[<=2] any (msg/Text.msg)"""
 
     def __init__(
         self,
         other: geometry_msgs_Point | None = None,
         own: names_msgs_Point | None = None,
-        any: list[Any] | None = None,
+        any: list[names_msgs_Any] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options or (
-            other is not None and other.__class__ is not geometry_msgs_Point
-        ):
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+        if other is None:
+            other = geometry_msgs_Point()
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
+        if options or other.__class__ is not geometry_msgs_Point:
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._other = geometry_msgs_Point() if other is None else other
-        self._own = names_msgs_Point() if own is None else own
-        self._any = [] if any is None else any
+        self.other = other
+        if own is None:
+            own = names_msgs_Point()
+        self.own = own
+        if any is None:
+            any = []
+        self.any = any
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Text):
             return _idlc.equal(self, other)
-        return (
-            self._other == other._other
-            and self._own == other._own
-            and self._any == other._any
-        )
+        if not self.other == other.other:
+            return False
+        if not self.own == other.own:
+            return False
+        if not self.any == other.any:
+            return False
+        return True

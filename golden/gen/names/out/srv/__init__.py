@@ -6,9 +6,13 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # to import it would take longer than this module does
 if TYPE_CHECKING:
-    from ._none import None_, None_Request, None_Response
+    from ._none import (
+        None_,
+        None_Request,
+        None_Response,
+    )
     from ._none__protocol import None_Event
 
 __all__ = [

@@ -6,50 +6,48 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class None_Request(_idlc.Message):  # noqa
     """The request of the service names_msgs/srv/None."""
 
     __match_args__ = ()
-    _fields_and_field_types = _idlc.table({})
+    _fields_and_field_types = {}
 
     def __init__(
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, None_Request):
             return _idlc.equal(self, other)
         return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class None_Response(_idlc.Message):  # noqa
     """The response of the service names_msgs/srv/None."""
 
     __match_args__ = ()
-    _fields_and_field_types = _idlc.table({})
+    _fields_and_field_types = {}
 
     def __init__(
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, None_Response):
             return _idlc.equal(self, other)
         return True
@@ -61,4 +59,6 @@ class None_(_idlc.Service):  # noqa
     Request: _idlc.TypeAlias = None_Request
     Response: _idlc.TypeAlias = None_Response
     if TYPE_CHECKING:
-        from ._none__protocol import None_Event as Event
+        from ._none__protocol import (
+            None_Event as Event,
+        )

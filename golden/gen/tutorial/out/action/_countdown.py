@@ -6,27 +6,20 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
-
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
+TYPE_CHECKING = False  # to import it would take longer than this module does
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Countdown_Goal(_idlc.Message):  # noqa
     """Where to start counting down.
 
     Defined in action/Countdown.action:2
-
-    Attributes:
-        target_count: int32
     """
 
     __match_args__ = ("target_count",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "target_count": "int32",
-        },
-    )
+    _fields_and_field_types = {
+        "target_count": "int32",
+    }
 
     target_count: int
     """int32 target_count (action/Countdown.action)"""
@@ -36,41 +29,39 @@ class Countdown_Goal(_idlc.Message):  # noqa
         target_count: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or target_count.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._target_count = target_count
+        self.target_count = target_count
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Countdown_Goal):
             return _idlc.equal(self, other)
-        return bool(self._target_count == other._target_count)
+        if self.target_count != other.target_count:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Countdown_Result(_idlc.Message):  # noqa
     """The result of the action tutorial_msgs/action/Countdown.
 
     Defined in action/Countdown.action
-
-    Attributes:
-        final_count: int32. The last number reached; 0 unless cancelled
-        success: bool
     """
 
-    __match_args__ = ("final_count", "success")
-    _fields_and_field_types = _idlc.table(
-        {
-            "final_count": "int32",
-            "success": "boolean",
-        },
+    __match_args__ = (
+        "final_count",
+        "success",
     )
+    _fields_and_field_types = {
+        "final_count": "int32",
+        "success": "boolean",
+    }
 
     final_count: int
-    """int32 final_count. The last number reached; 0 unless cancelled
-    (action/Countdown.action)
-    """
+    """int32 final_count. The last number reached; 0 unless cancelled (action/Countdown.action)"""
     success: bool
     """bool success (action/Countdown.action)"""
 
@@ -80,37 +71,35 @@ class Countdown_Result(_idlc.Message):  # noqa
         success: bool = False,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or final_count.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._final_count = final_count
-        self._success = success
+        self.final_count = final_count
+        self.success = success
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Countdown_Result):
             return _idlc.equal(self, other)
-        return not (
-            self._final_count != other._final_count or self._success != other._success
-        )
+        if self.final_count != other.final_count:
+            return False
+        if self.success != other.success:
+            return False
+        return True
 
 
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class Countdown_Feedback(_idlc.Message):  # noqa
     """The feedback of the action tutorial_msgs/action/Countdown.
 
     Defined in action/Countdown.action
-
-    Attributes:
-        current_count: int32
     """
 
     __match_args__ = ("current_count",)
-    _fields_and_field_types = _idlc.table(
-        {
-            "current_count": "int32",
-        },
-    )
+    _fields_and_field_types = {
+        "current_count": "int32",
+    }
 
     current_count: int
     """int32 current_count (action/Countdown.action)"""
@@ -120,16 +109,19 @@ class Countdown_Feedback(_idlc.Message):  # noqa
         current_count: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or current_count.__class__ is not int:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._current_count = current_count
+        self.current_count = current_count
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, Countdown_Feedback):
             return _idlc.equal(self, other)
-        return bool(self._current_count == other._current_count)
+        if self.current_count != other.current_count:
+            return False
+        return True
 
 
 class Countdown(_idlc.Action):  # noqa
@@ -139,4 +131,6 @@ class Countdown(_idlc.Action):  # noqa
     Result: _idlc.TypeAlias = Countdown_Result
     Feedback: _idlc.TypeAlias = Countdown_Feedback
     if TYPE_CHECKING:
-        from ._countdown__protocol import Countdown_Impl as Impl
+        from ._countdown__protocol import (
+            Countdown_Impl as Impl,
+        )

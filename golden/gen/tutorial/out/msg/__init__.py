@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from .. import _idlc
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # to import it would take longer than this module does
 if TYPE_CHECKING:
     from ._robot_command import RobotCommand
 

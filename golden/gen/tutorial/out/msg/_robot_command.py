@@ -6,23 +6,14 @@ from __future__ import annotations
 
 from .. import _idlc
 
-# `dataclass` is for type checkers: at run time it leaves the class as it is.
 
-
-@_idlc.dataclass(init=False, kw_only=True)
+@_idlc.define
 class RobotCommand(_idlc.Message):  # noqa
     """A simple robot command: how fast to drive and turn until the next one arrives.
 
     Sent by the operator, obeyed by the controller node.
 
     Defined in msg/RobotCommand.msg:5
-
-    Attributes:
-        command_type: string. What to do: STOP, MOVE or TURN
-        linear_velocity_x: float32 [m/s]. Forward speed, negative to reverse
-        angular_velocity_z: float32 [rad/s]. Turn rate, counter-clockwise seen from
-            above
-        frame_id: string. The frame that the velocities are given in
     """
 
     __match_args__ = (
@@ -31,14 +22,12 @@ class RobotCommand(_idlc.Message):  # noqa
         "angular_velocity_z",
         "frame_id",
     )
-    _fields_and_field_types = _idlc.table(
-        {
-            "command_type": "string",
-            "linear_velocity_x": "float",
-            "angular_velocity_z": "float",
-            "frame_id": "string",
-        },
-    )
+    _fields_and_field_types = {
+        "command_type": "string",
+        "linear_velocity_x": "float",
+        "angular_velocity_z": "float",
+        "frame_id": "string",
+    }
 
     STOP = "stop"
     """string STOP (msg/RobotCommand.msg)"""
@@ -50,17 +39,11 @@ class RobotCommand(_idlc.Message):  # noqa
     command_type: str
     """string command_type. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg)"""
     linear_velocity_x: float
-    """float32 linear_velocity_x [m/s]. Forward speed, negative to reverse
-    (msg/RobotCommand.msg)
-    """
+    """float32 linear_velocity_x [m/s]. Forward speed, negative to reverse (msg/RobotCommand.msg)"""
     angular_velocity_z: float
-    """float32 angular_velocity_z [rad/s]. Turn rate, counter-clockwise seen from
-    above (msg/RobotCommand.msg)
-    """
+    """float32 angular_velocity_z [rad/s]. Turn rate, counter-clockwise seen from above (msg/RobotCommand.msg)"""
     frame_id: str
-    """string frame_id. The frame that the velocities are given in
-    (msg/RobotCommand.msg)
-    """
+    """string frame_id. The frame that the velocities are given in (msg/RobotCommand.msg)"""
 
     def __init__(
         self,
@@ -70,21 +53,25 @@ class RobotCommand(_idlc.Message):  # noqa
         frame_id: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or command_type.__class__ is not str:
-            _given = locals()
-            if _idlc.construct(self, options, _given):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
-        self._command_type = command_type
-        self._linear_velocity_x = linear_velocity_x
-        self._angular_velocity_z = angular_velocity_z
-        self._frame_id = frame_id
+        self.command_type = command_type
+        self.linear_velocity_x = linear_velocity_x
+        self.angular_velocity_z = angular_velocity_z
+        self.frame_id = frame_id
 
-    def __eq__(self, other: _idlc.Any) -> bool:
+    def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotCommand):
             return _idlc.equal(self, other)
-        return not (
-            self._command_type != other._command_type
-            or self._linear_velocity_x != other._linear_velocity_x
-            or self._angular_velocity_z != other._angular_velocity_z
-            or self._frame_id != other._frame_id
-        )
+        if self.command_type != other.command_type:
+            return False
+        if self.linear_velocity_x != other.linear_velocity_x:
+            return False
+        if self.angular_velocity_z != other.angular_velocity_z:
+            return False
+        if self.frame_id != other.frame_id:
+            return False
+        return True
