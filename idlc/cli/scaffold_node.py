@@ -15,8 +15,7 @@ from idlc.cli import completion
 from idlc.cli.scaffold import common, finish
 from idlc.model import ir
 from idlc.scaffold import spec
-from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import DEFAULT_QOS, QOS_NAMES, Endpoint, Role
+from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, Endpoint, Role
 
 DONE = "done"
 PARAMETER = "parameter"

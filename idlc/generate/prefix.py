@@ -229,9 +229,13 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[
 
     They are in the order in which to write them: files come after those that they refer to.
     """
+    from idlc.project.templates import Code
+
     assert isinstance(overlay, Overlay)
     manifest = overlay.manifest or _rendered(
-        "overlay/package.xml.jinja", name=model.package, depends=dependencies(model)
+        "overlay/package.xml.jinja",
+        name=Code(model.package),
+        depends=[Code(name) for name in dependencies(model)],
     )
     libraries = libraries_of(model, overlay.distribution)
     placed = {f"{overlay.modules}{path}": modules[path] for path in modules}
@@ -240,9 +244,13 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[
 
 def write_setup_scripts(overlay: Target) -> bool:
     """Write the setup files for shells; return whether that succeeded."""
+    from idlc.project.templates import Text
+
     assert isinstance(overlay, Overlay)
     files = {
-        f"{name}.{shell}": _rendered(f"overlay/setup.{shell}.jinja", prefix=quote(overlay.place))
+        f"{name}.{shell}": _rendered(
+            f"overlay/setup.{shell}.jinja", prefix=Text(quote(overlay.place))
+        )
         for shell in _SHELLS
         for name in ("local_setup", "setup")
     }
@@ -250,6 +258,6 @@ def write_setup_scripts(overlay: Target) -> bool:
 
 
 def _rendered(template: str, **variables: object) -> str:
-    from idlc.project.templates import environment
+    from idlc.project.templates import code
 
-    return environment().get_template(template).render(**variables)
+    return code().get_template(template).render(**variables)

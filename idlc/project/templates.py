@@ -83,7 +83,7 @@ def _joined(values: Iterable[object], separator: str = "") -> Code:
     return Code(separator.join([str(_placed(value)) for value in values]))
 
 
-def _indented(value: object, width: int) -> Code:
+def _indented(value: object, width: int = 4) -> Code:
     first, *rest = str(_placed(value)).split("\n")
     margin = " " * width
     return Code("\n".join([first, *(margin + line if line else line for line in rest)]))

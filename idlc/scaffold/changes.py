@@ -23,19 +23,10 @@ from idlc.project.lock import Obstacle, Tree, is_same
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
-from idlc.project.templates import keep_compiled
+from idlc.project.templates import keep_compiled, verbatim
 from idlc.project.write import Change, Plan, apply_changes, difference
-from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import Endpoint, Role
-from idlc.scaffold.templates import (
-    ENDING,
-    BrokenTemplateError,
-    Templates,
-    copy,
-    folders,
-    names,
-    read,
-)
+from idlc.scaffold.roles import ROLES, Endpoint, Role
+from idlc.scaffold.templates import BrokenTemplateError, Templates, read
 
 
 class FileOutcome(NamedTuple):
@@ -178,7 +169,7 @@ def templates(settings: Settings, report: Report) -> Templates:
     folder = settings.templates or load_settings(settings.root, report).templates
     if folder is None:
         return Templates()
-    user_templates = Templates(read(folder, folders(), ENDING, settings.root, report))
+    user_templates = Templates(read(folder, settings.root, report))
     user_templates.check(report)
     return user_templates
 
@@ -279,20 +270,6 @@ def write(
 FOLDER = "templates"
 
 
-class Listed(NamedTuple):
-    """A template that can be replaced, and the user's file that does so, if any."""
-
-    name: str
-    replaced_by: str
-
-
-def listed(settings: Settings, report: Report) -> list[Listed]:
-    """Return the templates that a user can replace."""
-    folder = settings.templates or load_settings(settings.root, report).templates
-    sources = read(folder, folders(), ENDING, settings.root, report) if folder else {}
-    return [Listed(name, sources[name].path if name in sources else "") for name in names()]
-
-
 def copied(chosen: Sequence[str], settings: Settings, report: Report) -> Result | None:
     """Copy templates into the user's folder, to be changed there."""
     set_already = settings.templates or load_settings(settings.root, report).templates
@@ -300,7 +277,7 @@ def copied(chosen: Sequence[str], settings: Settings, report: Report) -> Result 
         return None
     folder = set_already or FOLDER
     project = Project(folder, settings.root, report, force=settings.force)
-    result = write(project, {name: copy(name) for name in chosen}, {}, settings, report)
+    result = write(project, {name: verbatim(name) for name in chosen}, {}, settings, report)
     if result is None or set_already:
         return result
     note = f'set `templates = "{folder}"` in [tool.idlc] of pyproject.toml, or use --templates'

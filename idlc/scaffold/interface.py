@@ -229,4 +229,4 @@ def _test_of_interfaces(project: Project, own: str, used: Templates) -> dict[str
     if "[tool.idlc]" not in (project.text("pyproject.toml") or "") or project.has(path):
         return {}
     template = "package/test_interfaces.py.jinja"
-    return {path: package.rendered(template, package.package_view(own), used)}
+    return {path: package.rendered_for(own, template, used)}

@@ -33,8 +33,8 @@ from idlc.scaffold.changes import (
     write,
 )
 from idlc.scaffold.edits import launch_py, setup_py
-from idlc.scaffold.node import MAIN_MODULE, render, render_test, test_packages
-from idlc.scaffold.package import package_view, rendered
+from idlc.scaffold.node import render, render_test, test_packages
+from idlc.scaffold.package import rendered_for
 from idlc.scaffold.spec import Plan, plan
 from idlc.scaffold.templates import Templates
 
@@ -59,20 +59,19 @@ def paths(package: str, launch_files: Iterable[str]) -> list[str]:
     """Return the files of a package whose texts decide; `launch_files` are names in `launch/`."""
     return [
         *("pyproject.toml", "setup.cfg", SETUP, MANIFEST, CONFTEST),
-        *(f"{package}/__init__.py", _main_module(package), _launch_file(package, launch_files)),
+        *(f"{package}/__init__.py", _launch_file(package, launch_files)),
     ]
 
 
 def node_entry(
     planned: Plan,
     texts: Mapping[str, str],
-    files: Mapping[str, str],
     templates: Templates,
     *,
     keys: Iterable[str] = (),
     folders: Mapping[str, bool] = MappingProxyType({}),
 ) -> Entry:
-    """Return the changes that add a node, whose own files are `files`, but for the launch file.
+    """Return the changes that add a node to a package, but for its own files and the launch file.
 
     `texts` are those of the package's files that exist. A package with interfaces,
     whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name.
@@ -89,7 +88,7 @@ def node_entry(
     manifest = package_xml.add_dependencies(
         texts.get(MANIFEST, ""), depends=planned.packages, tests=tests
     )
-    support = _support(node.package, texts, files, templates)
+    support = _support(node.package, texts, templates)
     return Entry(support, {path: outcome, MANIFEST: manifest})
 
 
@@ -113,8 +112,7 @@ def with_launch_entry(
         outcome = launch_py.add_node(texts[path], started)
         return _launched(entry, path, outcome)
     path = _launch_file(node.package, ())
-    plain = package_view(node.package)
-    text = rendered("package/launch.py.jinja", plain, templates)
+    text = rendered_for(node.package, "package/launch.py.jinja", templates)
     outcome = launch_py.add_node(text, started)
     if not isinstance(outcome, Edited):
         return _launched(entry, path, outcome)._replace(added={**entry.added, path: text})
@@ -133,25 +131,14 @@ def _launched(entry: Entry, path: str, outcome: Outcome) -> Entry:
     return entry._replace(notes=(*entry.notes, (path, text)))
 
 
-def _support(
-    package: str, texts: Mapping[str, str], files: Mapping[str, str], templates: Templates
-) -> dict[str, str]:
+def _support(package: str, texts: Mapping[str, str], templates: Templates) -> dict[str, str]:
     """Return the files that nodes need beside them and that their package lacks."""
-    plain = package_view(package)
     support = {}
     if CONFTEST not in texts:
-        support[CONFTEST] = rendered("package/conftest.py.jinja", plain, templates)
+        support[CONFTEST] = rendered_for(package, "package/conftest.py.jinja", templates)
     if f"{package}/__init__.py" not in texts:
         support[f"{package}/__init__.py"] = ""
-    module = _main_module(package)
-    imported = any(f"{package}.{MAIN_MODULE} " in text for text in files.values())
-    if imported and "def until_shutdown" not in texts.get(module, ""):
-        support[module] = rendered("package/node_main.py.jinja", plain, templates)
     return support
-
-
-def _main_module(package: str) -> str:
-    return f"{package}/{MAIN_MODULE}.py"
 
 
 def _launch_file(package: str, names: Iterable[str]) -> str:
@@ -224,7 +211,7 @@ def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) ->
     read = {path: project.text(path) for path in paths(own, project.names("launch"))}
     texts = {path: text for path, text in read.items() if text is not None}
     keys, present = keys_of(project), folders(project.path)
-    entry = node_entry(planned, texts, files, used, keys=keys, folders=present)
+    entry = node_entry(planned, texts, used, keys=keys, folders=present)
     if launch:
         entry = with_launch_entry(planned, texts, entry, used)
     return entry._replace(added={**files, **entry.added})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
@@ -15,6 +15,7 @@ from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
+from idlc.project.templates import Code, Text
 from idlc.scaffold.changes import Project, Result, Settings, rendering, templates, write
 from idlc.scaffold.templates import Templates
 
@@ -29,10 +30,7 @@ IMPLIED = ("action_msgs", "service_msgs", "unique_identifier_msgs")
 
 
 class Package(NamedTuple):
-    """The content of the templates of a new package.
-
-    `depends` are the packages that one of interfaces only depends on.
-    """
+    """A new package. `depends` are the packages that one of interfaces only depends on."""
 
     name: str
     description: str
@@ -40,73 +38,46 @@ class Package(NamedTuple):
     email: str
     license: str
     build_type: str = PYTHON
-    version: str = VERSION
     depends: tuple[str, ...] = IMPLIED
+
+
+class PackageView(NamedTuple):
+    """The content of the templates of a package, with words of others as each place needs them."""
+
+    name: Code
+    version: Code
+    license: Code
+    build_type: Code
+    description: Text
+    xml_description: Text
+    xml_maintainer: Text
+    xml_email: Text
+    py_description: Code
+    py_maintainer: Code
+    py_email: Code
+    depends: tuple[Code, ...]
 
     @property
     def is_python(self) -> bool:
         """True if the package has nodes."""
         return self.build_type == PYTHON
 
-    @property
-    def xml_description(self) -> str:
-        """The description in XML."""
-        return escape(self.description)
 
-    @property
-    def xml_maintainer(self) -> str:
-        """The maintainer in XML."""
-        return escape(self.maintainer)
-
-    @property
-    def xml_email(self) -> str:
-        """The maintainer's address within an attribute's quotes."""
-        return quoteattr(self.email)[1:-1].replace('"', "&quot;")
-
-    @property
-    def py_maintainer(self) -> str:
-        """The maintainer as a Python literal."""
-        return repr(self.maintainer)
-
-    @property
-    def py_email(self) -> str:
-        """The maintainer's address as a Python literal."""
-        return repr(self.email)
-
-    @property
-    def py_description(self) -> str:
-        """The description as a Python literal."""
-        return repr(self.description)
-
-    @property
-    def xml_depends(self) -> tuple[str, ...]:
-        """The dependencies, as lines of package.xml."""
-        lines = _PYTHON_DEPENDS if self.is_python else _cmake_depends(self.depends)
-        return tuple(f"  <{tag}>{name}</{tag}>" if tag else "" for tag, name in lines)
-
-
-def _cmake_depends(packages: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    return (
-        ("buildtool_depend", "ament_cmake"),
-        ("buildtool_depend", "rosidl_default_generators"),
-        ("", ""),
-        *(("depend", name) for name in packages),
-        ("exec_depend", "rosidl_default_runtime"),
-        ("", ""),
-        ("member_of_group", "rosidl_interface_packages"),
+def _view(package: Package) -> PackageView:
+    return PackageView(
+        name=Code(package.name),
+        version=Code(VERSION),
+        license=Code(package.license),
+        build_type=Code(package.build_type),
+        description=Text(package.description),
+        xml_description=Text(escape(package.description)),
+        xml_maintainer=Text(escape(package.maintainer)),
+        xml_email=Text(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
+        py_description=Code(repr(package.description)),
+        py_maintainer=Code(repr(package.maintainer)),
+        py_email=Code(repr(package.email)),
+        depends=tuple(map(Code, package.depends)),
     )
-
-
-_PYTHON_DEPENDS = (
-    ("depend", "rclpy"),
-    ("exec_depend", "launch"),
-    ("exec_depend", "launch_ros"),
-    ("exec_depend", "python3-numpy"),
-    ("", ""),
-    ("test_depend", "ament_flake8"),
-    ("test_depend", "ament_pep257"),
-    ("test_depend", "python3-pytest"),
-)
 
 
 #: Files of a package of nodes, each with its template; NAME stands for the package.
@@ -150,11 +121,6 @@ def check_package_name(name: str) -> str:
     return name
 
 
-def package_view(name: str) -> Package:
-    """Return a package of which only the name matters."""
-    return Package(name, "", "", "", LICENSES[0])
-
-
 def package_files(package: Package, templates: Templates) -> dict[str, str]:
     """Return the texts of a new package's files by their paths in its folder."""
     listed = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
@@ -171,7 +137,12 @@ def package_files(package: Package, templates: Templates) -> dict[str, str]:
 
 def rendered(template: str, package: Package, templates: Templates) -> str:
     """Return the text of one of a package's files."""
-    return templates.render(template, package=package)
+    return templates.render(template, package=_view(package))
+
+
+def rendered_for(name: str, template: str, templates: Templates) -> str:
+    """Return the text of a file of which only the package's name matters."""
+    return rendered(template, Package(name, "", "", "", LICENSES[0]), templates)
 
 
 def license_text(package: Package) -> str:

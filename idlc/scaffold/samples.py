@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.model import ir, python_names
-from idlc.scaffold.layout import call
+from idlc.project.templates import Code, Text
 
-WIDTH = 99
-INDENTATION = "    "
+#: The width of comments, which may be indented far.
+COMMENT = 64
+#: Longer defaults are left to the class of the message.
+LONG_TEXT = 40
 #: Nested messages are spelled out as long as a message has at most so many values.
 LEAVES = 16
 _TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
@@ -76,89 +79,65 @@ def _spoken(name: ir.TypeName) -> tuple[str, str]:
     return python_names.class_(name), ""
 
 
-class Line(NamedTuple):
-    """A line of source: how deep, and its text."""
+class FieldSample(NamedTuple):
+    """A field with a sensible value: source, or a message that is spelled out."""
 
-    depth: int
-    text: str
+    name: Code
+    comment: tuple[Text, ...]
+    value: Code
+    message: Sample | None = None
 
-    def __str__(self) -> str:
-        return INDENTATION * self.depth + self.text
+
+class Sample(NamedTuple):
+    """A message whose fields have sensible values; `type` is its class in the module."""
+
+    type: Code
+    fields: tuple[FieldSample, ...]
 
 
-def constructed(
-    message: ir.Message,
-    page: Page,
-    *,
-    head: str,
-    depth: int,
-    values: Mapping[str, str] | None = None,
-) -> str:
-    """Return the lines that make a message, after `head`, at a depth of indentation.
+def sample(
+    message: ir.Message, page: Page, values: Mapping[str, str] = MappingProxyType({})
+) -> Sample:
+    """Return a message with a value for each field.
 
-    `values` holds the values of fields that come from elsewhere.
+    `values` are those of fields that come from elsewhere. A field with a long default keeps it.
     """
-    lines = list(_construct(message, page, head, depth, "", values or {}))
-    return "\n".join(map(str, lines)).lstrip()
-
-
-def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list[str]:
-    """Return the lines that give each field of a variable a value, with its documentation."""
-    statements: list[str] = []
+    fields = []
     for field in message.fields:
-        head = f"{variable}.{python_names.field(field.name)} = "
+        name = Code(python_names.field(field.name))
         nested = _nested(field, page)
-        if nested:
-            lines = [*map(str, _construct(nested, page, head, 0, "", {}))]
-        else:
-            lines = [head + sample(message, field, page)]
-        if all(len(line) + depth * len(INDENTATION) <= WIDTH for line in lines):
-            statements += [*_documented(message, field, page, depth), *lines]
-    return statements
+        if field.name in values:
+            fields.append(FieldSample(name, (), Code(values[field.name])))
+        elif nested:
+            spelled_out = sample(nested, page)
+            fields.append(FieldSample(name, _comment(message, field, page), Code(), spelled_out))
+        elif not _has_long_default(field):
+            value = Code(field_value(message, field, page))
+            fields.append(FieldSample(name, _comment(message, field, page), value))
+    return Sample(Code(page.use(message.name)), tuple(fields))
 
 
-def _construct(
-    message: ir.Message, page: Page, head: str, depth: int, tail: str, values: Mapping[str, str]
-) -> Iterator[Line]:
-    name = page.use(message.name)
-    inner = [
-        line for field in message.fields for line in _field(message, field, page, depth + 1, values)
-    ]
-    if not inner:
-        yield Line(depth, f"{head}{name}(){tail}")
-        return
-    yield Line(depth, f"{head}{name}(")
-    yield from inner
-    yield Line(depth, f"){tail}")
+def _has_long_default(field: ir.Field) -> bool:
+    value = field.default.value if field.default else ()
+    items = value if isinstance(value, tuple) else (value,)
+    return len(items) > LEAVES or any(len(str(item)) > LONG_TEXT for item in items)
 
 
-def _field(
-    message: ir.Message, field: ir.Field, page: Page, depth: int, values: Mapping[str, str]
-) -> Iterator[Line]:
-    name = python_names.field(field.name)
-    nested = _nested(field, page)
-    if field.name in values:
-        value = [Line(depth, f"{name}={values[field.name]},")]
-    elif nested:
-        value = list(_construct(nested, page, f"{name}=", depth, ",", {}))
-    else:
-        value = [Line(depth, f"{name}={sample(message, field, page)},")]
-    if any(len(str(line)) > WIDTH for line in value):
-        return
-    if field.name not in values:
-        yield from (Line(depth, text) for text in _documented(message, field, page, depth))
-    yield from value
+def logged(message: ir.Message, variable: str) -> Code:
+    """Return the replacement field of an f-string that shows a message, or a short field of it."""
+    short = [f for f in message.fields if isinstance(f.type, (ir.Primitive, ir.String))]
+    if short and (len(short) == 1 or len(short) < len(message.fields)):
+        return Code(f"{{{variable}.{python_names.field(short[0].name)}=}}")
+    return Code(f"{{{variable}=}}")
 
 
-def _documented(message: ir.Message, field: ir.Field, page: Page, depth: int) -> list[str]:
-    """Return the interface's comments on a field, in lines that fit."""
+def _comment(message: ir.Message, field: ir.Field, page: Page) -> tuple[Text, ...]:
+    """Return the lines of the interface's comment on a field, if the package is the node's."""
     if message.name.package != page.own:
-        return []
+        return ()
     text = " ".join(filter(None, (clean(line) for line in field.comment)))
     unit = f"[{clean(field.unit)}]" if field.unit else ""
-    words = " ".join(filter(None, (text, unit)))
-    width = WIDTH - len(INDENTATION) * depth
-    return textwrap.wrap(words, width, initial_indent="# ", subsequent_indent="# ")
+    return tuple(map(Text, textwrap.wrap(" ".join(filter(None, (text, unit))), COMMENT)))
 
 
 def clean(text: str) -> str:
@@ -181,7 +160,7 @@ def _leaves(message: ir.Message, messages: Messages) -> int:
     )
 
 
-def sample(message: ir.Message, field: ir.Field, page: Page) -> str:
+def field_value(message: ir.Message, field: ir.Field, page: Page) -> str:
     """Return the source of a sensible value for a field."""
     if field.default is not None:
         return literal(field.type, field.default.value)
@@ -248,57 +227,51 @@ _TAKEN = {"help", "server_timeout"}
 HELP_WIDTH = 60
 
 
-class RequestView(NamedTuple):
-    """The function that makes a request or goal from the arguments of the command line."""
+class Argument(NamedTuple):
+    """An argument of the command line: its name, and how argparse reads it."""
 
-    function: str
-    type: str
-    what: str
-    value: str
+    name: Code
+    words: tuple[Code, ...]
 
 
-def request(message: ir.Message, page: Page, word: str, what: str, prefix: str) -> RequestView:
-    """Return the function for one request."""
-    values = {
-        field.name: f"given.{_dest(field, prefix)}"
-        for field in message.fields
-        if _type(field) is not None
-    }
-    value = constructed(message, page, head="return ", depth=1, values=values)
-    return RequestView(f"{word}_request", page.use(message.name), what, value)
+def from_arguments(message: ir.Message, page: Page, prefix: str) -> Sample:
+    """Return a request whose fields come from the command line."""
+    fields = (field for field in message.fields if _type(field) is not None)
+    values = {field.name: f"options.{_destination(field, prefix)}" for field in fields}
+    return sample(message, page, values)
 
 
-def lines(message: ir.Message, page: Page, prefix: str, *, positional: bool) -> list[str]:
-    """Return the lines that declare the arguments for a request's fields."""
-    return [
-        line
-        for field in message.fields
-        if (type_ := _type(field)) is not None
-        for line in _argument(message, field, type_, page, prefix, positional)
-    ]
+def arguments(
+    message: ir.Message, page: Page, prefix: str, *, positional: bool
+) -> Iterator[Argument]:
+    """Yield the arguments for a request's fields."""
+    for field in message.fields:
+        type_ = _type(field)
+        if type_ is not None:
+            yield _argument(message, field, type_, page, prefix, positional)
 
 
 def _argument(
     message: ir.Message, field: ir.Field, type_: str, page: Page, prefix: str, positional: bool
-) -> list[str]:
-    dest = _dest(field, prefix)
+) -> Argument:
+    destination = _destination(field, prefix)
     simple = isinstance(field.type, (ir.Primitive, ir.String))
-    option = "--" + dest.replace("_", "-")
-    words = [repr(option)]
+    name = "--" + destination.replace("_", "-")
+    words = []
     if type_ == "bool":
         words.append("action=argparse.BooleanOptionalAction")
-    elif positional and simple:
-        words = [repr(dest), f"type={type_}", "nargs='?'"]
     else:
         words.append(f"type={type_}")
         if isinstance(field.type, ir.Array):
             words.append(f"nargs={field.type.size}")
         elif not simple:
             words.append("nargs='*'")
-    words.append(f"default={sample(message, field, page)}")
-    text = textwrap.shorten(_help(field), HELP_WIDTH, placeholder=" ...")
-    words.append(f"help={text.replace('%', '%%')!r}")
-    return call("parser.add_argument", words, depth=1)
+        elif positional:
+            name = destination
+            words.append("nargs='?'")
+    text = textwrap.shorten(_help(field), HELP_WIDTH, placeholder=" ...").replace("%", "%%")
+    words += [f"default={field_value(message, field, page)}", f"help={text!r}"]
+    return Argument(Code(repr(name)), tuple(map(Code, words)))
 
 
 def _help(field: ir.Field) -> str:
@@ -306,13 +279,15 @@ def _help(field: ir.Field) -> str:
     return f"{text} [{clean(field.unit)}]" if field.unit else text
 
 
-def _dest(field: ir.Field, prefix: str) -> str:
+def _destination(field: ir.Field, prefix: str) -> str:
     name = python_names.field(f"{prefix}{field.name}")
     return f"{name}_" if name in _TAKEN else name
 
 
 def _type(field: ir.Field) -> str | None:
     """Return the type of a field's values on the command line; `None` if it has none."""
+    if _has_long_default(field):
+        return None
     match ir.element_of(field.type):
         case ir.String():
             return "str"

@@ -12,11 +12,10 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
-from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import DEFAULT_QOS, Endpoint, Request, Role, qos_preset
+from idlc.scaffold.roles import DEFAULT_QOS, ROLES, Endpoint, Request, Role, qos_preset
 
 #: Names that a module of a node cannot have in its package.
-TAKEN = frozenset({"msg", "srv", "action", "node_main"})
+TAKEN = frozenset({"msg", "srv", "action"})
 _NODE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*")
 

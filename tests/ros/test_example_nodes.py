@@ -56,8 +56,9 @@ def test_the_countdown_counts_down(start):
     server = start("countdown_action_server")
     client = start("countdown_action_client", "--server-timeout", "30")
     assert client.ends() == 0
-    counts = [f"countdown: current_count={count}" for count in (5, 4, 3, 2, 1)]
-    assert client.said() == [*counts, "countdown: final_count=0 success=True"]
+    counts = [f"countdown: feedback.current_count={count}" for count in (5, 4, 3, 2, 1)]
+    assert client.said()[:-1] == counts
+    assert client.said()[-1].endswith("(final_count=0, success=True)")
     assert server.end() == 0
 
 
@@ -92,8 +93,13 @@ def test_a_task_is_executed(start):
     server = start("execute_task_server")
     client = start("execute_task_client", "--server-timeout", "30", "paint")
     assert client.ends() == 0
-    steps = [f"current_status='{step}: paint'" for step in ("starting", "working", "finishing")]
-    assert client.said() == [*(f"execute_task: {s}" for s in steps), "execute_task: success=True"]
+    steps = [
+        f"feedback.current_status='{step}: paint'" for step in ("starting", "working", "finishing")
+    ]
+    assert client.said() == [
+        *(f"execute_task: {s}" for s in steps),
+        "execute_task: result.success=True",
+    ]
     assert server.end() == 0
 
 

@@ -142,7 +142,6 @@ def test_they_pass_every_check(package, words):
 
 def test_they_start_and_end(package, tmp_path, ros_environment):
     names = sorted(path.stem for path in (package / "demo").glob("[!_]*.py"))
-    names.remove("node_main")  # what they share
     assert len(names) == COUNT
     names = names[::EVERY]
     for first in range(0, len(names), AT_ONCE):

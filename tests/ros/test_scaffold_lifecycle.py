@@ -181,7 +181,7 @@ def test_nothing_goes_on_after_the_active_state(start, peer, way):
     goal = peer.result(peer.client.send_goal_async(Fibonacci.Goal()))
     assert goal.accepted
     ending = goal.get_result_async()
-    peer.until(lambda: "work: order=0" in worker.output)
+    peer.until(lambda: "work: goal.order=0" in worker.output)
     assert peer.step(*transitions)
     assert peer.state_of_worker() == state
     assert peer.result(ending).status == GoalStatus.STATUS_ABORTED
@@ -230,7 +230,7 @@ def test_a_node_works_again_after_it_was_cleaned_up(start, peer):
         return response
 
     peer.node.create_service(SetBool, "called", answer)
-    peer.until(lambda: "called: success=False" in worker.output)
+    peer.until(lambda: "called: response=" in worker.output)
     peer.spin(0.5)
     assert len(requests) == 1  # what was started before the clean-up has ended
     assert worker.end() == 0

@@ -54,17 +54,12 @@ def package(idlc, tmp_path_factory) -> Path:
     return folder / "demo"
 
 
-def test_it_takes_one_module_and_two_templates():
-    assert set(blocks()) == {
-        "idlc/scaffold/roles/echo.py",
-        "diff",
-        "templates/node/echo.py.jinja",
-        "templates/node_test/echo.py.jinja",
-    }
+def test_it_takes_a_row_and_a_template():
+    assert set(blocks()) == {"diff", "templates/node/echo.py.jinja"}
 
 
-def test_its_module_is_clean(idlc):
-    path = idlc / "idlc/scaffold/roles/echo.py"
+def test_its_row_is_clean(idlc):
+    path = idlc / "idlc/scaffold/roles.py"
     for words in (["check"], ["format", "--check"]):
         command = [sys.executable, "-m", "ruff", *words, "--no-cache", "--isolated"]
         programs.run(*command, "--line-length=100", path, cwd=idlc, environment={**os.environ})
@@ -74,7 +69,7 @@ def test_the_command_line_knows_it(idlc, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(idlc)}
     command = [sys.executable, "-m", "idlc", "scaffold", "node"]
     said = programs.run(*command, "--help", cwd=tmp_path, environment=environment)
-    assert re.search(r"--echo TYPE:TOPIC +Publish each message again, on\s+TOPIC_echo\.", said)
+    assert re.search(r"--echo TYPE:TOPIC +Publish each message again, on\s+echo/TOPIC\.", said)
 
 
 @pytest.mark.parametrize(

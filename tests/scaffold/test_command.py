@@ -162,7 +162,6 @@ def test_files_keep_their_mode(package):
         (["node", "Talker"], "cannot be a node"),
         (["node", "class"], "cannot be a node"),
         (["node", "msg"], "taken"),
-        (["node", "node_main"], "taken"),
         (["node", "signal"], "taken"),
         (["node", "a", "--publisher", "String"], "TYPE:TOPIC"),
         (["node", "a", "--publisher", "std_msgs/String:a@0"], "above 0"),

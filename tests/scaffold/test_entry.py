@@ -4,7 +4,7 @@ import pytest
 
 from idlc.project.edits import Edited, Refused
 from idlc.scaffold import new_node, spec
-from idlc.scaffold.roles.topics import TIMER
+from idlc.scaffold.roles import ROLES
 from idlc.scaffold.spec import Plan, plan
 from idlc.scaffold.templates import Templates
 
@@ -18,7 +18,7 @@ setup(
 )
 """
 TEXTS = {"package.xml": '<package format="3"><name>demo</name></package>', "setup.py": SETUP}
-FILES = {"demo/heart.py": "from demo.node_main import until_shutdown\n"}
+(TIMER,) = (role for role in ROLES if role.name == "timer")
 
 
 def heart(*, lifecycle: bool = False) -> Plan:
@@ -26,8 +26,8 @@ def heart(*, lifecycle: bool = False) -> Plan:
     return plan(spec.Node("heart", "demo", endpoints, lifecycle=lifecycle), [None], {})
 
 
-def entered(texts, files=FILES, **options) -> new_node.Entry:
-    entry = new_node.node_entry(heart(**options), texts, files, Templates())
+def entered(texts, **options) -> new_node.Entry:
+    entry = new_node.node_entry(heart(**options), texts, Templates())
     return new_node.with_launch_entry(heart(**options), texts, entry, Templates())
 
 
@@ -35,23 +35,12 @@ def test_a_package_gets_what_its_nodes_share_once():
     entry = entered(TEXTS)
     assert set(entry.added) == {
         "demo/__init__.py",
-        "demo/node_main.py",
         "launch/demo_launch.py",
         "test/conftest.py",
     }
     again = entered({**TEXTS, **entry.added})
     assert again.added == {}
     assert set(again.edits) == {"setup.py", "package.xml", "launch/demo_launch.py"}
-
-
-def test_what_nodes_do_not_import_is_not_added():
-    assert "demo/node_main.py" not in entered(TEXTS, {"demo/heart.py": "import rclpy\n"}).added
-
-
-def test_another_module_of_the_name_is_in_the_way():
-    """It is added, so that the folder refuses to replace what differs."""
-    entry = entered({**TEXTS, "demo/node_main.py": "def other(): ...\n"})
-    assert "def until_shutdown" in entry.added["demo/node_main.py"]
 
 
 def test_a_new_launch_file_is_installed_and_lists_the_node():

@@ -2,27 +2,17 @@
 
 import os
 import random
-import re
 import shutil
-import typing
 from pathlib import Path
 
 import pytest
 
 from idlc.cli.main import main
+from idlc.project.templates import verbatim
 from idlc.scaffold import templates
-from idlc.scaffold.node import NodeView
-from idlc.scaffold.node import TestView as ViewOfTest
-from idlc.scaffold.package import Package
 from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import Part
-from idlc.scaffold.roles.role import TestPart as PartOfTest
 from tests.scaffold.test_command import FOLDER, carry_out, nothing_installed, tree
-from tests.support import refresh
-from tests.support.paths import DOCS, GOLDEN
 
-DOCUMENT = (DOCS / "templates.md").read_text(encoding="utf-8")
-RECORD = GOLDEN / "templates" / f"version-{templates.VERSION}.txt"
 SEED = int(os.environ.get("SEED", "7"))
 nothing_installed = nothing_installed  # a fixture of every test here, too
 TALKER = ["scaffold", "node", "talker", "--publisher", "std_msgs/String:chatter"]
@@ -43,12 +33,7 @@ def write(package: Path, name: str, text: str | bytes) -> None:
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
 
 
-PUBLISHER = '''
-    {{ part.head }}
-        """Ours."""
-        {{ part.message }}
-        self.{{ part.word }}_publisher.publish(message)
-'''
+PUBLISHER = verbatim("node/publisher.py.jinja").replace("Publish a message", "Say something")
 
 
 def test_one_that_is_replaced_is_used_and_the_others_are_idlcs(package):
@@ -57,7 +42,8 @@ def test_one_that_is_replaced_is_used_and_the_others_are_idlcs(package):
     write(package, "node/publisher.py.jinja", PUBLISHER)
     assert main([*TALKER, "--templates", "../mine", "--force"]) == 0
     after = (package / "demo/talker.py").read_text()
-    assert after == before.replace("Publish a message on chatter.", "Ours.")
+    assert after == before.replace("Publish a message on", "Say something on")
+    assert after != before
 
 
 def test_the_setting_says_where_they_are_from_any_folder(package, monkeypatch):
@@ -67,7 +53,7 @@ def test_the_setting_says_where_they_are_from_any_folder(package, monkeypatch):
     write(package, "node/publisher.py.jinja", PUBLISHER)
     monkeypatch.chdir("demo")
     assert main(TALKER) == 0
-    assert '"""Ours."""' in (package / "demo/talker.py").read_text()
+    assert "Say something on" in (package / "demo/talker.py").read_text()
 
 
 def test_the_files_of_packages_can_be_replaced(package, monkeypatch):
@@ -88,17 +74,12 @@ def test_a_launch_file_that_cannot_list_nodes_is_for_the_user(package, capsys):
     assert (package / "launch/demo_launch.py").read_text() == "# no launch description\n"
 
 
-def test_idlcs_own_can_be_included_and_shared_parts_too(package):
+def test_parts_can_be_shared(package):
     write(package, "_ours.jinja", "    # {{ part.word }}: ours\n")
-    write(
-        package,
-        "node/publisher.py.jinja",
-        '\n{% include "_ours.jinja" %}\n{% include "idlc/node/publisher.py.jinja" %}\n',
-    )
-    assert main([*TALKER, "--templates", "../mine"]) == 0
-    text = (package / "demo/talker.py").read_text()
-    assert "    # chatter: ours\n" in text
-    assert '"""Publish a message on chatter."""' in text
+    shared = '{% if section == "methods" %}\n\n{% include "_ours.jinja" %}\n{% endif %}\n'
+    write(package, "node/timer.py.jinja", verbatim("node/timer.py.jinja") + shared)
+    assert main([*TALKER, "--timer", "1", "--templates", "../mine"]) == 0
+    assert "    # tick: ours\n" in (package / "demo/talker.py").read_text()
 
 
 def test_copies_write_what_idlcs_own_write(package, tmp_path, monkeypatch):
@@ -115,7 +96,7 @@ def test_copies_write_what_idlcs_own_write(package, tmp_path, monkeypatch):
         assert tree(folder) == tree(FOLDER / case / "out")
 
 
-def test_they_are_listed_with_those_that_replace_them(package, capsys):
+def test_they_are_listed_and_copied(package, capsys):
     capsys.readouterr()
     assert main(["scaffold", "templates"]) == 0
     assert capsys.readouterr().out.split() == list(templates.names())
@@ -125,11 +106,6 @@ def test_they_are_listed_with_those_that_replace_them(package, capsys):
     said = capsys.readouterr().out
     assert "created templates/node/service.py.jinja" in said
     assert 'note: set `templates = "templates"` in [tool.idlc]' in said
-    assert main(["scaffold", "templates", "--list", "--templates", "templates"]) == 0
-    assert re.search(
-        r"node/service.py.jinja +replaced by templates/node/service.py.jinja\n",
-        capsys.readouterr().out,
-    )
 
 
 def test_a_copy_that_was_edited_is_not_replaced(package, capsys):
@@ -146,11 +122,8 @@ def test_a_copy_that_was_edited_is_not_replaced(package, capsys):
     ("words", "said"),
     [
         (["--copy", "node/publsher.py.jinja"], "did you mean `node/publisher.py.jinja`"),
-        (["--copy", "client"], "`node/client.py.jinja` or `node_test/client.py.jinja`"),
         (["--copy", "message/module.py.jinja"], "there is no template"),
         (["--copy", "../x"], "there is no template"),
-        (["--list", "--copy", "node/client.py.jinja"], "do not go together"),
-        (["--templates", "nowhere"], "IDL602"),
     ],
 )
 def test_wrong_words_are_explained(package, capsys, words, said):
@@ -161,9 +134,9 @@ def test_wrong_words_are_explained(package, capsys, words, said):
 #: Texts of node/publisher.py.jinja, and what is said of each.
 BROKEN = {
     "no end of a block": ("\n{% for line in part.create %}\n", ":2:"),
-    "an unknown tag": ("\n\n    {% whatever %}\n", ":3:8"),
+    "an unknown tag": ("\n\n    {% whatever %}\n", ":3:5"),
     "an unknown name": ("{{ prat.word }}", "'prat' is undefined"),
-    "an unknown attribute": ("\n{{ part.wrod }}", ":2:9"),
+    "an unknown attribute": ("\n  {{ part.wrod }}", ":2:3"),
     "a part of nothing": ("{{ part.word.x.y }}", "has no attribute 'x'"),
     "an unknown filter": ("{{ part.word | shout }}", "no filter named 'shout'"),
     "an unknown test": ("{{ part.word is odd_one }}", "'odd_one'"),
@@ -177,11 +150,12 @@ BROKEN = {
     "its own parent": ('{% extends "node/publisher.py.jinja" %}', "never ends"),
     "many brackets": ("{{ " + "(" * 5000 + ")" * 5000 + " }}", "IDL623"),
     "many blocks": ("{% if 1 %}" * 500 + "{% endif %}" * 500, "IDL623"),
-    "a lone surrogate": ('    # {{ "\\ud800" }}', "U+D800"),
-    "a NUL": ('    # {{ "\\0" }}', "not valid Python"),
+    "a lone surrogate": ('    # {{ "\\ud800" }}', "may place Code and Text"),
+    "a NUL": ("    # \0", "null bytes"),
     "no Python": ("    def {{", "IDL623"),
     "open brackets": ("    x = ((((\n", "not valid Python"),
-    "another version": ("{# idlc templates 99 #}", "version 99"),
+    "a text of its own": ("    # {{ part.word | upper }}", "may place Code and Text"),
+    "a literal": ("    # {{ 'literal' }}", "may place Code and Text"),
     "UTF-16": ("{# ä #}".encode("utf-16"), "IDL603"),
     "Latin-1": ("\n{# ä #}".encode("latin-1"), "mine/node/publisher.py.jinja:2:4"),
 }
@@ -212,10 +186,10 @@ ESCAPES = [
     "{{ lipsum.__globals__['os'].mkdir('ran') }}",
     "{{ part | attr('__class__') | attr('__init__') }}",
     "{{ '{0.__class__.__init__.__globals__}'.format(part) }}",
-    "{{ '%s' | format(part.__struct_fields__) }}",
+    "{{ '%s' | format(part.__class__) }}",
     "{{ part.__reduce__() }}",
     "{{ node._replace(name='x') }}",
-    "{{ (part.log if false else '').join.__self__ }}",
+    "{{ (part.word if false else '').join.__self__ }}",
     '{% include "../../secret.jinja" %}',
     '{% include "/etc/passwd" %}',
     '{% import "../secret.jinja" as secret %}{{ secret }}',
@@ -245,7 +219,7 @@ def test_mutated_templates_end_in_files_or_in_problems(package, capsys):
     for n in range(60):
         shutil.rmtree(package.parent / "mine", ignore_errors=True)
         name = chance.choice([one for one in templates.names() if one.startswith("node")])
-        text = templates.copy(name)
+        text = verbatim(name)
         for _ in range(chance.randint(1, 3)):
             start = chance.randrange(len(text))
             end = min(len(text), start + chance.choice([0, 0, 1, 3, 20]))
@@ -278,65 +252,8 @@ def test_a_folder_that_is_none_is_reported(package, capsys, what):
     assert not (package / "demo/talker.py").exists()
 
 
-def views() -> dict[str, list[str]]:
-    """Return the attributes that templates may use, by the headings of the document."""
-    found: dict[str, list[str]] = {}
-
-    def add(path: str, view: type, without: tuple[str, ...] = ()) -> None:
-        hints = typing.get_type_hints(view)
-        names = getattr(view, "__struct_fields__", None) or getattr(view, "_fields", ())
-        properties = [name for name, value in vars(view).items() if isinstance(value, property)]
-        found[path] = sorted({*names, *properties} - set(without))
-        for name in names:
-            for inner in (hints[name], *typing.get_args(hints[name])):
-                if hasattr(inner, "_fields"):
-                    add(f"{path}.{name}", inner)
-
-    add("node", NodeView)
-    add("test", ViewOfTest)
-    add("package", Package)
-    for folder, base, function in (("node", Part, "node"), ("node_test", PartOfTest, "test")):
-        add(f"part in {folder}/", base)
-        for role in ROLES:
-            view = typing.get_type_hints(getattr(role, function))["return"]
-            if view is not base:
-                add(f"part in {folder}/{role.name}.py.jinja", view, base.__struct_fields__)
-    return found
-
-
-def documented() -> dict[str, list[str]]:
-    """Return the attributes that the document lists, by its headings."""
-    found = {}
-    for heading, text in re.findall(r"(?ms)^### `([^\n]+)`\n(.*?)(?=^##|\Z)", DOCUMENT):
-        found[heading] = sorted(re.findall(r"(?m)^\| `(\w+)` \|", text))
-    return found
-
-
-def test_the_document_lists_every_attribute():
-    assert documented() == views()
-
-
-def test_the_document_lists_every_template():
-    listed = DOCUMENT.partition("## The templates\n")[2].partition("\n## ")[0]
-    named = [name for row in re.findall(r"(?m)^\| (.+?) \|", listed) for name in row.split(", ")]
-    assert sorted(name.strip("`") for name in named if "/" in name) == list(templates.names())
-
-
-def test_an_attribute_that_changes_makes_a_new_version():
-    """Raise idlc.scaffold.templates.VERSION if one of the recorded is gone, then refresh."""
-    now = {f"{view}: {name}" for view, names in views().items() for name in names}
-    known = set(RECORD.read_text(encoding="utf-8").splitlines()) if RECORD.exists() else set()
-    if refresh.wanted("templates"):
-        RECORD.parent.mkdir(exist_ok=True)
-        RECORD.write_text("".join(f"{line}\n" for line in sorted(now | known)), encoding="utf-8")
-        refresh.refreshed()
-    assert known - now == set(), "templates that use these would break"
-    assert now - known == set(), "IDLC_REFRESH=templates records new ones"
-
-
-def test_each_role_has_its_templates_and_a_golden_tree():
+def test_each_role_has_its_template_and_a_golden_tree():
     commands = "".join(path.read_text() for path in FOLDER.glob("*/commands"))
     for role in ROLES:
         assert f"node/{role.name}.py.jinja" in templates.names()
-        assert f"node_test/{role.name}.py.jinja" in templates.names()
         assert f"{role.option} " in commands

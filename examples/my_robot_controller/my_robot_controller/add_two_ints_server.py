@@ -1,18 +1,23 @@
-"""The node add_two_ints_server serves add_two_ints."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node add_two_ints_server."""
 
 from __future__ import annotations
 
-from my_robot_controller.node_main import until_shutdown, WakingExecutor
 from my_robot_controller.srv import AddTwoInts
 import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
+from rclpy.utilities import ok
 
 
 class AddTwoIntsServer(Node):
-    """The node add_two_ints_server serves add_two_ints."""
+    """
+    The node add_two_ints_server.
+
+    It serves add_two_ints.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
@@ -24,22 +29,32 @@ class AddTwoIntsServer(Node):
         )
 
     def handle_add_two_ints(
-        self, request: AddTwoInts.Request, response: AddTwoInts.Response
+        self,
+        request: AddTwoInts.Request,
+        response: AddTwoInts.Response,
     ) -> AddTwoInts.Response:
         """Answer a request to add_two_ints."""
-        self.get_logger().info(f'add_two_ints: a={request.a!r} b={request.b!r}')
+        self.get_logger().info(f'add_two_ints: {request=}')
         # a + b
         response.sum = request.a + request.b
         return response
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = AddTwoIntsServer()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = AddTwoIntsServer()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

@@ -1,25 +1,37 @@
-"""The node command_publisher publishes robot_command."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node command_publisher."""
 
 from __future__ import annotations
 
 from my_robot_controller.msg import RobotCommand
-from my_robot_controller.node_main import until_shutdown, WakingExecutor
 import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
+from rclpy.utilities import ok
 
 
 class CommandPublisher(Node):
-    """The node command_publisher publishes robot_command."""
+    """
+    The node command_publisher.
+
+    It publishes robot_command.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
         super().__init__('command_publisher')
         self.speed = 0.0
-        self.robot_command_publisher = self.create_publisher(RobotCommand, 'robot_command', 10)
-        self.robot_command_timer = self.create_timer(1.0, self.publish_robot_command)
+        self.robot_command_publisher = self.create_publisher(
+            RobotCommand,
+            'robot_command',
+            10,
+        )
+        self.robot_command_timer = self.create_timer(
+            1.0,
+            self.publish_robot_command,
+        )
 
     def publish_robot_command(self) -> None:
         """Publish a message on robot_command."""
@@ -38,13 +50,21 @@ class CommandPublisher(Node):
         self.speed = 0.5 - self.speed
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = CommandPublisher()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = CommandPublisher()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

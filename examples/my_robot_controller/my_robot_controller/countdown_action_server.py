@@ -1,20 +1,30 @@
-"""The node countdown_action_server works on goals for countdown."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node countdown_action_server."""
 
 from __future__ import annotations
 
 from my_robot_controller.action import Countdown
-from my_robot_controller.node_main import until_shutdown, WakingExecutor
 import rclpy
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.action.server import (
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    ServerGoalHandle,
+)
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class CountdownActionServer(Node):
-    """The node countdown_action_server works on goals for countdown."""
+    """
+    The node countdown_action_server.
+
+    It works on goals for countdown.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
@@ -24,17 +34,17 @@ class CountdownActionServer(Node):
             self,
             Countdown,
             'countdown',
-            execute_callback=self.execute_countdown,
-            goal_callback=self.accept_countdown,
-            handle_accepted_callback=self.begin_countdown,
-            cancel_callback=self.cancel_countdown,
+            execute_callback=self.run_countdown_goal,
+            goal_callback=self.accept_countdown_goal,
+            handle_accepted_callback=self.begin_countdown_goal,
+            cancel_callback=self.cancel_countdown_goal,
         )
 
-    def accept_countdown(self, goal: Countdown.Goal) -> GoalResponse:
+    def accept_countdown_goal(self, goal: Countdown.Goal) -> GoalResponse:
         """Accept a goal for countdown, or reject one that cannot be reached."""
         return GoalResponse.ACCEPT if goal.target_count > 0 else GoalResponse.REJECT
 
-    def begin_countdown(self, goal_handle: ServerGoalHandle) -> None:
+    def begin_countdown_goal(self, goal_handle: ServerGoalHandle) -> None:
         """Start an accepted goal, which replaces the one before it."""
         before = self.countdown_goal
         if before is not None and before.is_active:
@@ -43,20 +53,23 @@ class CountdownActionServer(Node):
         self.countdown_goal = goal_handle
         goal_handle.execute()
 
-    def cancel_countdown(self, goal_handle: ServerGoalHandle) -> CancelResponse:
+    def cancel_countdown_goal(self, goal_handle: ServerGoalHandle) -> CancelResponse:
         """Allow every goal to be cancelled."""
         self.get_logger().info('countdown: cancel requested')
         return CancelResponse.ACCEPT
 
-    async def execute_countdown(self, goal_handle: ServerGoalHandle) -> Countdown.Result:
+    async def run_countdown_goal(
+        self,
+        goal_handle: ServerGoalHandle,
+    ) -> Countdown.Result:
         """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
+        goal: Countdown.Goal = goal_handle.request
         result = Countdown.Result(
             # The last number reached; 0 unless cancelled
             final_count=0,
             success=False,
         )
-        goal: Countdown.Goal = goal_handle.request
-        self.get_logger().info(f'countdown: target_count={goal.target_count!r}')
+        self.get_logger().info(f'countdown: {goal.target_count=}')
         for count in range(goal.target_count, 0, -1):
             feedback = Countdown.Feedback(
                 current_count=count,
@@ -84,13 +97,21 @@ class CountdownActionServer(Node):
         self.destroy_timer(timer)
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = CountdownActionServer()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = CountdownActionServer()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

@@ -1,20 +1,30 @@
-"""The node execute_task_server works on goals for execute_task."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node execute_task_server."""
 
 from __future__ import annotations
 
 from my_robot_controller.action import ExecuteTask
-from my_robot_controller.node_main import until_shutdown, WakingExecutor
 import rclpy
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.action.server import (
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    ServerGoalHandle,
+)
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class ExecuteTaskServer(Node):
-    """The node execute_task_server works on goals for execute_task."""
+    """
+    The node execute_task_server.
+
+    It works on goals for execute_task.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
@@ -24,17 +34,17 @@ class ExecuteTaskServer(Node):
             self,
             ExecuteTask,
             'execute_task',
-            execute_callback=self.execute_execute_task,
-            goal_callback=self.accept_execute_task,
-            handle_accepted_callback=self.begin_execute_task,
-            cancel_callback=self.cancel_execute_task,
+            execute_callback=self.run_execute_task_goal,
+            goal_callback=self.accept_execute_task_goal,
+            handle_accepted_callback=self.begin_execute_task_goal,
+            cancel_callback=self.cancel_execute_task_goal,
         )
 
-    def accept_execute_task(self, goal: ExecuteTask.Goal) -> GoalResponse:
+    def accept_execute_task_goal(self, goal: ExecuteTask.Goal) -> GoalResponse:
         """Accept a goal for execute_task, or reject one that cannot be reached."""
         return GoalResponse.ACCEPT if goal.task_name else GoalResponse.REJECT
 
-    def begin_execute_task(self, goal_handle: ServerGoalHandle) -> None:
+    def begin_execute_task_goal(self, goal_handle: ServerGoalHandle) -> None:
         """Start an accepted goal, which replaces the one before it."""
         before = self.execute_task_goal
         if before is not None and before.is_active:
@@ -43,18 +53,21 @@ class ExecuteTaskServer(Node):
         self.execute_task_goal = goal_handle
         goal_handle.execute()
 
-    def cancel_execute_task(self, goal_handle: ServerGoalHandle) -> CancelResponse:
+    def cancel_execute_task_goal(self, goal_handle: ServerGoalHandle) -> CancelResponse:
         """Allow every goal to be cancelled."""
         self.get_logger().info('execute_task: cancel requested')
         return CancelResponse.ACCEPT
 
-    async def execute_execute_task(self, goal_handle: ServerGoalHandle) -> ExecuteTask.Result:
+    async def run_execute_task_goal(
+        self,
+        goal_handle: ServerGoalHandle,
+    ) -> ExecuteTask.Result:
         """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
+        goal: ExecuteTask.Goal = goal_handle.request
         result = ExecuteTask.Result(
             success=False,
         )
-        goal: ExecuteTask.Goal = goal_handle.request
-        self.get_logger().info(f'execute_task: task_name={goal.task_name!r}')
+        self.get_logger().info(f'execute_task: {goal.task_name=}')
         for status in ('starting', 'working', 'finishing'):
             feedback = ExecuteTask.Feedback(
                 # What the robot is doing now, for people to read
@@ -82,13 +95,21 @@ class ExecuteTaskServer(Node):
         self.destroy_timer(timer)
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = ExecuteTaskServer()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = ExecuteTaskServer()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

@@ -1,18 +1,23 @@
-"""The node sensor_subscriber listens to sensor_data."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node sensor_subscriber."""
 
 from __future__ import annotations
 
-from my_robot_controller.node_main import until_shutdown, WakingExecutor
 import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 
 class SensorSubscriber(Node):
-    """The node sensor_subscriber listens to sensor_data."""
+    """
+    The node sensor_subscriber.
+
+    It listens to sensor_data.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
@@ -26,16 +31,24 @@ class SensorSubscriber(Node):
 
     def receive_sensor_data(self, message: String) -> None:
         """Handle a message from sensor_data."""
-        self.get_logger().info(f'sensor_data: data={message.data!r}')
+        self.get_logger().info(f'sensor_data: {message.data=}')
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = SensorSubscriber()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = SensorSubscriber()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

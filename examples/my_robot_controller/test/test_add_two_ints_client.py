@@ -1,8 +1,5 @@
 """Tests of the node add_two_ints_client, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -25,7 +22,11 @@ def test_it_calls_add_two_ints(start: Start, observer: Node) -> None:
         requests.append(request)
         return response
 
-    observer.create_service(AddTwoInts, 'add_two_ints', answer)
+    observer.create_service(
+        AddTwoInts,
+        'add_two_ints',
+        answer,
+    )
     node = start(MODULE)
     node.until(lambda: bool(requests))
     node.until(lambda: node.said('Result: '))

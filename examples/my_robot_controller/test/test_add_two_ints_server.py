@@ -1,8 +1,5 @@
 """Tests of the node add_two_ints_server, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -19,13 +16,16 @@ Start = Callable[..., Any]
 
 def test_it_answers_add_two_ints(start: Start, observer: Node) -> None:
     """Requests to add_two_ints are answered, one after the other."""
-    client = observer.create_client(AddTwoInts, 'add_two_ints')
+    client = observer.create_client(
+        AddTwoInts,
+        'add_two_ints',
+    )
     node = start(MODULE)
     node.until(client.service_is_ready)
     for _ in range(2):
         answer = client.call_async(AddTwoInts.Request())
         node.until(answer.done)
-    node.until(lambda: node.said('add_two_ints: a=', 2))
+    node.until(lambda: node.said('add_two_ints: request', 2))
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])

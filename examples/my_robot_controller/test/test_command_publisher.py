@@ -1,8 +1,5 @@
 """Tests of the node command_publisher, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -20,7 +17,12 @@ Start = Callable[..., Any]
 def test_it_publishes_robot_command(start: Start, observer: Node) -> None:
     """Messages arrive on robot_command, one after the other."""
     received: list[RobotCommand] = []
-    observer.create_subscription(RobotCommand, 'robot_command', received.append, 10)
+    observer.create_subscription(
+        RobotCommand,
+        'robot_command',
+        received.append,
+        10,
+    )
     node = start(MODULE)
     node.until(lambda: len(received) > 1, 23.0)
 

@@ -1,8 +1,5 @@
 """Tests of the node countdown_action_server, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -17,20 +14,28 @@ from rclpy.node import Node
 
 MODULE = 'my_robot_controller.countdown_action_server'
 Start = Callable[..., Any]
-COUNTDOWN_GOAL = Countdown.Goal(target_count=3)
+
+
+def countdown_goal() -> Countdown.Goal:
+    """Return a goal that can be reached."""
+    return Countdown.Goal(target_count=3)
 
 
 def test_it_reaches_countdown(start: Start, observer: Node) -> None:
     """A goal for countdown is reached, with feedback on the way."""
     feedback: list[object] = []
-    client = ActionClient(observer, Countdown, 'countdown')
+    client = ActionClient(
+        observer,
+        Countdown,
+        'countdown',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    goal = COUNTDOWN_GOAL
+    goal = countdown_goal()
     sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(sent.done)
     assert sent.result().accepted, node.output
-    node.until(lambda: node.said('countdown: target_count='))
+    node.until(lambda: node.said('countdown: goal'))
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_SUCCEEDED, node.output
@@ -42,10 +47,14 @@ def test_it_reaches_countdown(start: Start, observer: Node) -> None:
 def test_it_cancels_countdown(start: Start, observer: Node) -> None:
     """A goal for countdown can be cancelled on the way."""
     feedback: list[object] = []
-    client = ActionClient(observer, Countdown, 'countdown')
+    client = ActionClient(
+        observer,
+        Countdown,
+        'countdown',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    goal = COUNTDOWN_GOAL
+    goal = countdown_goal()
     sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
@@ -57,12 +66,16 @@ def test_it_cancels_countdown(start: Start, observer: Node) -> None:
 
 def test_it_replaces_countdown(start: Start, observer: Node) -> None:
     """A goal for countdown ends when another one comes."""
-    client = ActionClient(observer, Countdown, 'countdown')
+    client = ActionClient(
+        observer,
+        Countdown,
+        'countdown',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(COUNTDOWN_GOAL)
+    sent = client.send_goal_async(countdown_goal())
     node.until(sent.done)
-    client.send_goal_async(COUNTDOWN_GOAL)
+    client.send_goal_async(countdown_goal())
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_ABORTED, node.output

@@ -1,8 +1,5 @@
 """Tests of the node execute_task_server, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -17,20 +14,28 @@ from rclpy.node import Node
 
 MODULE = 'my_robot_controller.execute_task_server'
 Start = Callable[..., Any]
-EXECUTE_TASK_GOAL = ExecuteTask.Goal(task_name='dock')
+
+
+def execute_task_goal() -> ExecuteTask.Goal:
+    """Return a goal that can be reached."""
+    return ExecuteTask.Goal(task_name='dock')
 
 
 def test_it_reaches_execute_task(start: Start, observer: Node) -> None:
     """A goal for execute_task is reached, with feedback on the way."""
     feedback: list[object] = []
-    client = ActionClient(observer, ExecuteTask, 'execute_task')
+    client = ActionClient(
+        observer,
+        ExecuteTask,
+        'execute_task',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    goal = EXECUTE_TASK_GOAL
+    goal = execute_task_goal()
     sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(sent.done)
     assert sent.result().accepted, node.output
-    node.until(lambda: node.said('execute_task: task_name='))
+    node.until(lambda: node.said('execute_task: goal'))
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_SUCCEEDED, node.output
@@ -41,10 +46,14 @@ def test_it_reaches_execute_task(start: Start, observer: Node) -> None:
 def test_it_cancels_execute_task(start: Start, observer: Node) -> None:
     """A goal for execute_task can be cancelled on the way."""
     feedback: list[object] = []
-    client = ActionClient(observer, ExecuteTask, 'execute_task')
+    client = ActionClient(
+        observer,
+        ExecuteTask,
+        'execute_task',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    goal = EXECUTE_TASK_GOAL
+    goal = execute_task_goal()
     sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
@@ -56,12 +65,16 @@ def test_it_cancels_execute_task(start: Start, observer: Node) -> None:
 
 def test_it_replaces_execute_task(start: Start, observer: Node) -> None:
     """A goal for execute_task ends when another one comes."""
-    client = ActionClient(observer, ExecuteTask, 'execute_task')
+    client = ActionClient(
+        observer,
+        ExecuteTask,
+        'execute_task',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(EXECUTE_TASK_GOAL)
+    sent = client.send_goal_async(execute_task_goal())
     node.until(sent.done)
-    client.send_goal_async(EXECUTE_TASK_GOAL)
+    client.send_goal_async(execute_task_goal())
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_ABORTED, node.output

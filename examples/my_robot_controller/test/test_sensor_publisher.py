@@ -1,8 +1,5 @@
 """Tests of the node sensor_publisher, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -20,7 +17,12 @@ Start = Callable[..., Any]
 def test_it_publishes_sensor_data(start: Start, observer: Node) -> None:
     """Messages arrive on sensor_data, one after the other."""
     received: list[String] = []
-    observer.create_subscription(String, 'sensor_data', received.append, 10)
+    observer.create_subscription(
+        String,
+        'sensor_data',
+        received.append,
+        10,
+    )
     node = start(MODULE)
     node.until(lambda: len(received) > 1, 21.5)
 

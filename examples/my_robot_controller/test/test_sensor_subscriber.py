@@ -1,8 +1,5 @@
 """Tests of the node sensor_subscriber, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -19,12 +16,16 @@ Start = Callable[..., Any]
 
 def test_it_receives_sensor_data(start: Start, observer: Node) -> None:
     """The node logs each message on sensor_data."""
-    publisher = observer.create_publisher(String, 'sensor_data', 10)
+    publisher = observer.create_publisher(
+        String,
+        'sensor_data',
+        10,
+    )
     node = start(MODULE)
 
     def heard() -> bool:
         publisher.publish(String())
-        return bool(node.said('sensor_data: data=', 2))
+        return bool(node.said('sensor_data: message', 2))
 
     node.until(heard)
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import libcst as cst
 
+from idlc.check.package.setup_edits import WIDTH
 from idlc.project.edits import Edited, Outcome, Refused
 from idlc.scaffold.edits.python_text import (
     appended,
@@ -15,7 +16,6 @@ from idlc.scaffold.edits.python_text import (
     quoted,
     string,
 )
-from idlc.scaffold.layout import WIDTH
 
 WHERE = "to the launch description"
 MODULE = "launch_ros.actions"

@@ -1,18 +1,23 @@
-"""The node listener listens to chatter."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node listener."""
 
 from __future__ import annotations
 
-from demo.node_main import until_shutdown, WakingExecutor
 import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 
 class Listener(Node):
-    """The node listener listens to chatter."""
+    """
+    The node listener.
+
+    It listens to chatter.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
@@ -26,16 +31,24 @@ class Listener(Node):
 
     def receive_chatter(self, message: String) -> None:
         """Handle a message from chatter."""
-        self.get_logger().info(f'chatter: data={message.data!r}')
+        self.get_logger().info(f'chatter: {message.data=}')
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = Listener()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = Listener()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

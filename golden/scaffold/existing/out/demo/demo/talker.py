@@ -1,24 +1,36 @@
-"""The node talker publishes chatter."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node talker."""
 
 from __future__ import annotations
 
-from demo.node_main import until_shutdown, WakingExecutor
 import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 
 class Talker(Node):
-    """The node talker publishes chatter."""
+    """
+    The node talker.
+
+    It publishes chatter.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
         super().__init__('talker')
-        self.chatter_publisher = self.create_publisher(String, 'chatter', 10)
-        self.chatter_timer = self.create_timer(1.0, self.publish_chatter)
+        self.chatter_publisher = self.create_publisher(
+            String,
+            'chatter',
+            10,
+        )
+        self.chatter_timer = self.create_timer(
+            1.0,
+            self.publish_chatter,
+        )
 
     def publish_chatter(self) -> None:
         """Publish a message on chatter."""
@@ -28,13 +40,21 @@ class Talker(Node):
         self.chatter_publisher.publish(message)
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = Talker()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = Talker()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

@@ -1,8 +1,5 @@
 """Tests of the node listener, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -19,12 +16,16 @@ Start = Callable[..., Any]
 
 def test_it_receives_chatter(start: Start, observer: Node) -> None:
     """The node logs each message on chatter."""
-    publisher = observer.create_publisher(String, 'chatter', 10)
+    publisher = observer.create_publisher(
+        String,
+        'chatter',
+        10,
+    )
     node = start(MODULE)
 
     def heard() -> bool:
         publisher.publish(String())
-        return bool(node.said('chatter: data=', 2))
+        return bool(node.said('chatter: message', 2))
 
     node.until(heard)
 

@@ -1,35 +1,52 @@
 """The lifecycle node keeper."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Coroutine
+from collections.abc import (
+    Callable,
+    Coroutine,
+)
 from contextlib import ExitStack
 import sys
 import time
 from typing import Any
 
-from demo.node_main import until_shutdown, WakingExecutor
 import rclpy
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
+from rclpy.lifecycle import (
+    LifecycleNode,
+    LifecycleState,
+    TransitionCallbackReturn,
+)
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import (
+    ok,
+    remove_ros_args,
+)
 from std_msgs.msg import Empty
 from std_srvs.srv import Empty as std_srvs_srv_Empty
 from std_srvs.srv import SetBool
 
 
 class Keeper(LifecycleNode):
-    """The lifecycle node keeper."""
+    """
+    The lifecycle node keeper.
 
-    def __init__(self, given: argparse.Namespace) -> None:
+    It publishes beat.
+    It listens to beat.
+    It serves reset.
+    It calls switch.
+    """
+
+    def __init__(self, options: argparse.Namespace) -> None:
         """Create the node; `on_configure` creates its endpoints."""
         super().__init__('keeper')
-        self.given = given
-        self.timeout: float = given.server_timeout
+        self.options = options
+        self.timeout: float = options.server_timeout
         self.undo_configure = ExitStack()
         self.undo_activate = ExitStack()
         self.activation: object = None
@@ -37,25 +54,68 @@ class Keeper(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Create publishers, clients and action servers."""
-        self.beat_publisher = self.create_lifecycle_publisher(Empty, 'beat', 10)
-        self.undo_configure.callback(self.destroy_lifecycle_publisher, self.beat_publisher)
-        self.switch_client = self.create_client(SetBool, 'switch')
-        self.undo_configure.callback(self.destroy_client, self.switch_client)
+        self.beat_publisher = self.create_lifecycle_publisher(
+            Empty,
+            'beat',
+            10,
+        )
+        self.undo_configure.callback(
+            self.destroy_lifecycle_publisher,
+            self.beat_publisher,
+        )
+        self.switch_client = self.create_client(
+            SetBool,
+            'switch',
+        )
+        self.undo_configure.callback(
+            self.destroy_client,
+            self.switch_client,
+        )
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start to work: timers, subscriptions and services."""
         self.activation = object()
         self.undo_activate.callback(self.wake)
-        self.beat_timer = self.create_timer(1.0, self.publish_beat)
-        self.undo_activate.callback(self.destroy_timer, self.beat_timer)
-        self.beat_subscription = self.create_subscription(Empty, 'beat', self.receive_beat, 10)
-        self.undo_activate.callback(self.destroy_subscription, self.beat_subscription)
-        self.reset_service = self.create_service(std_srvs_srv_Empty, 'reset', self.handle_reset)
-        self.undo_activate.callback(self.destroy_service, self.reset_service)
-        self.tick_timer = self.create_timer(3.0, self.tick)
-        self.undo_activate.callback(self.destroy_timer, self.tick_timer)
-        self.spawn(self.call_switch, switch_request(self.given))
+        self.beat_timer = self.create_timer(
+            1.0,
+            self.publish_beat,
+        )
+        self.undo_activate.callback(
+            self.destroy_timer,
+            self.beat_timer,
+        )
+        self.beat_subscription = self.create_subscription(
+            Empty,
+            'beat',
+            self.receive_beat,
+            10,
+        )
+        self.undo_activate.callback(
+            self.destroy_subscription,
+            self.beat_subscription,
+        )
+        self.reset_service = self.create_service(
+            std_srvs_srv_Empty,
+            'reset',
+            self.handle_reset,
+        )
+        self.undo_activate.callback(
+            self.destroy_service,
+            self.reset_service,
+        )
+        self.tick_timer = self.create_timer(
+            3.0,
+            self.tick,
+        )
+        self.undo_activate.callback(
+            self.destroy_timer,
+            self.tick_timer,
+        )
+        self.spawn(
+            self.call_switch,
+            switch_request(self.options),
+        )
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -88,13 +148,15 @@ class Keeper(LifecycleNode):
 
     def receive_beat(self, message: Empty) -> None:
         """Handle a message from beat."""
-        self.get_logger().info('beat: message received')
+        self.get_logger().info(f'beat: {message=}')
 
     def handle_reset(
-        self, request: std_srvs_srv_Empty.Request, response: std_srvs_srv_Empty.Response
+        self,
+        request: std_srvs_srv_Empty.Request,
+        response: std_srvs_srv_Empty.Response,
     ) -> std_srvs_srv_Empty.Response:
         """Answer a request to reset."""
-        self.get_logger().info('reset: request received')
+        self.get_logger().info(f'reset: {request=}')
         return response
 
     async def call_switch(self, request: SetBool.Request) -> bool:
@@ -109,9 +171,7 @@ class Keeper(LifecycleNode):
         response: SetBool.Response | None = answer.result()
         if response is None:
             return False
-        self.get_logger().info(
-            f'switch: success={response.success!r} message={response.message!r}'
-        )
+        self.get_logger().info(f'switch: {response=}')
         return True
 
     def tick(self) -> None:
@@ -154,7 +214,7 @@ class Keeper(LifecycleNode):
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:
     """Parse the command line, without ROS 2's own arguments."""
     parser = argparse.ArgumentParser(
-        description='The lifecycle node keeper.',
+        description=Keeper.__doc__,
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument(
@@ -174,21 +234,29 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(words[1:])
 
 
-def switch_request(given: argparse.Namespace) -> SetBool.Request:
+def switch_request(options: argparse.Namespace) -> SetBool.Request:
     """Return the request that the command line describes."""
     return SetBool.Request(
-        data=given.data,
+        data=options.data,
     )
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
-    given = parse_arguments(args)
+    options = parse_arguments(args)
     rclpy.init(args=args)
-    node = Keeper(given)
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = Keeper(options)
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

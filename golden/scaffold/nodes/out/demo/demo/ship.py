@@ -1,41 +1,60 @@
-"""The node ship sends goals to dock."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node ship."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import signal
 import sys
+from threading import Event
 import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
 from demo.action import Dock
-from demo.node_main import interruptible
-from rclpy.action.client import ActionClient, ClientGoalHandle
+import rclpy
+from rclpy.action.client import (
+    ActionClient,
+    ClientGoalHandle,
+)
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import (
+    ok,
+    remove_ros_args,
+    try_shutdown,
+)
 
 
 class Ship(Node):
-    """The node ship sends goals to dock."""
+    """
+    The node ship.
+
+    It sends goals to dock.
+    """
 
     def __init__(self, timeout: float) -> None:
         """Create the node and its endpoints."""
         super().__init__('ship')
         self.timeout = timeout
         self.dock_sent: Future | None = None
-        self.dock_client = ActionClient(self, Dock, 'dock')
+        self.dock_client = ActionClient(
+            self,
+            Dock,
+            'dock',
+        )
 
-    async def send_dock(self, goal: Dock.Goal) -> bool:
+    async def send_dock_goal(self, goal: Dock.Goal) -> bool:
         """Send a goal to dock; return whether it was reached."""
         if not await self.until(self.dock_client.server_is_ready):
             self.get_logger().error('dock: gave up waiting for a server')
             return False
-        sent = self.dock_client.send_goal_async(goal, feedback_callback=self.follow_dock)
+        sent = self.dock_client.send_goal_async(
+            goal,
+            feedback_callback=self.follow_dock_goal,
+        )
         self.dock_sent = sent
         if not await self.until(sent.done):
             self.get_logger().error('dock: gave up waiting for an answer')
@@ -52,15 +71,15 @@ class Ship(Node):
             await self.pause(0.05)
         self.dock_sent = None
         result: Dock.Result = ending.result().result
-        self.get_logger().info(f'dock: docked={result.docked!r}')
+        self.get_logger().info(f'dock: {result.docked=}')
         return bool(ending.result().status == GoalStatus.STATUS_SUCCEEDED)
 
-    def follow_dock(self, message: Any) -> None:
+    def follow_dock_goal(self, message: Any) -> None:
         """Log the feedback that the server sends about the goal."""
         feedback: Dock.Feedback = message.feedback
-        self.get_logger().info(f'dock: distance={feedback.distance!r}')
+        self.get_logger().info(f'dock: {feedback.distance=}')
 
-    async def cancel_dock(self) -> None:
+    async def cancel_dock_goal(self) -> None:
         """Ask the server to cancel the goal."""
         sent = self.dock_sent
         if sent is not None and await self.until(sent.done):
@@ -88,7 +107,7 @@ class Ship(Node):
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:
     """Parse the command line, without ROS 2's own arguments."""
     parser = argparse.ArgumentParser(
-        description='The node ship sends goals to dock.',
+        description=Ship.__doc__,
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument(
@@ -98,25 +117,49 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
         metavar='SECONDS',
         help='How long to wait for a server and for its answer.',
     )
-    parser.add_argument('station', type=int, nargs='?', default=1, help='station')
+    parser.add_argument(
+        'station',
+        type=int,
+        nargs='?',
+        default=1,
+        help='station',
+    )
     words = remove_ros_args(sys.argv if args is None else args)
     return parser.parse_args(words[1:])
 
 
-def dock_request(given: argparse.Namespace) -> Dock.Goal:
+def dock_request(options: argparse.Namespace) -> Dock.Goal:
     """Return the goal that the command line describes."""
     return Dock.Goal(
-        station=given.station,
+        station=options.station,
     )
 
 
 def main(args: list[str] | None = None) -> int:
     """Do what the command line asks for; return 0 if it succeeded."""
-    given = parse_arguments(args)
-    with interruptible(args) as once:
-        node = Ship(given.server_timeout)
-        once.run(node, node.send_dock, dock_request(given), node.cancel_dock)
-    return once.status
+    options = parse_arguments(args)
+    interrupted = Event()
+    # not by rclpy, which would shut down before goals are cancelled
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: interrupted.set())
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    node = Ship(options.server_timeout)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    tasks = [
+        executor.create_task(
+            node.send_dock_goal,
+            dock_request(options),
+        ),
+    ]
+    while ok() and not interrupted.is_set() and not all(task.done() for task in tasks):
+        executor.spin_once(timeout_sec=0.1)
+    if interrupted.is_set():
+        executor.spin_until_future_complete(executor.create_task(node.cancel_dock_goal))
+    try_shutdown()
+    if interrupted.is_set():
+        return 130
+    return 0 if all(task.result() for task in tasks) else 1
 
 
 if __name__ == '__main__':

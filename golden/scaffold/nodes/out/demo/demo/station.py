@@ -1,20 +1,30 @@
-"""The node station works on goals for dock."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node station."""
 
 from __future__ import annotations
 
 from demo.action import Dock
-from demo.node_main import until_shutdown, WakingExecutor
 import rclpy
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.action.server import (
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    ServerGoalHandle,
+)
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class Station(Node):
-    """The node station works on goals for dock."""
+    """
+    The node station.
+
+    It works on goals for dock.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
@@ -24,17 +34,17 @@ class Station(Node):
             self,
             Dock,
             'dock',
-            execute_callback=self.execute_dock,
-            goal_callback=self.accept_dock,
-            handle_accepted_callback=self.begin_dock,
-            cancel_callback=self.cancel_dock,
+            execute_callback=self.run_dock_goal,
+            goal_callback=self.accept_dock_goal,
+            handle_accepted_callback=self.begin_dock_goal,
+            cancel_callback=self.cancel_dock_goal,
         )
 
-    def accept_dock(self, goal: Dock.Goal) -> GoalResponse:
+    def accept_dock_goal(self, goal: Dock.Goal) -> GoalResponse:
         """Accept a goal for dock, or reject one that cannot be reached."""
         return GoalResponse.ACCEPT
 
-    def begin_dock(self, goal_handle: ServerGoalHandle) -> None:
+    def begin_dock_goal(self, goal_handle: ServerGoalHandle) -> None:
         """Start an accepted goal, which replaces the one before it."""
         before = self.dock_goal
         if before is not None and before.is_active:
@@ -43,18 +53,21 @@ class Station(Node):
         self.dock_goal = goal_handle
         goal_handle.execute()
 
-    def cancel_dock(self, goal_handle: ServerGoalHandle) -> CancelResponse:
+    def cancel_dock_goal(self, goal_handle: ServerGoalHandle) -> CancelResponse:
         """Allow every goal to be cancelled."""
         self.get_logger().info('dock: cancel requested')
         return CancelResponse.ACCEPT
 
-    async def execute_dock(self, goal_handle: ServerGoalHandle) -> Dock.Result:
+    async def run_dock_goal(
+        self,
+        goal_handle: ServerGoalHandle,
+    ) -> Dock.Result:
         """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
+        goal: Dock.Goal = goal_handle.request
         result = Dock.Result(
             docked=False,
         )
-        goal: Dock.Goal = goal_handle.request
-        self.get_logger().info(f'dock: station={goal.station!r}')
+        self.get_logger().info(f'dock: {goal.station=}')
         for _ in range(5):
             feedback = Dock.Feedback(
                 # to go [m]
@@ -81,13 +94,21 @@ class Station(Node):
         self.destroy_timer(timer)
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = Station()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = Station()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

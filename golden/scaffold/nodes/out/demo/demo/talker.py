@@ -1,48 +1,71 @@
-"""The node talker publishes command and listens to ~/words."""
-
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
+"""The node talker."""
 
 from __future__ import annotations
 
 from demo.msg import Command
-from demo.node_main import until_shutdown, WakingExecutor
-from geometry_msgs.msg import Twist, Vector3
+from geometry_msgs.msg import (
+    Twist,
+    Vector3,
+)
 import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.qos import (
+    DurabilityPolicy,
+    qos_profile_sensor_data,
+    QoSProfile,
+)
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Talker(Node):
-    """The node talker publishes command and listens to ~/words."""
+    """
+    The node talker.
+
+    It publishes command.
+    It listens to ~/words.
+    """
 
     def __init__(self) -> None:
         """Create the node and its endpoints."""
         super().__init__('talker')
         self.declare_parameter('speed', 0.5)
         self.declare_parameter('names', ['a', 'b'])
-        self.command_publisher = self.create_publisher(Command, 'command', LATCHED)
-        self.command_timer = self.create_timer(0.1, self.publish_command)
+        self.command_publisher = self.create_publisher(
+            Command,
+            'command',
+            LATCHED,
+        )
+        self.command_timer = self.create_timer(
+            0.1,
+            self.publish_command,
+        )
         self.words_subscription = self.create_subscription(
             String,
             '~/words',
             self.receive_words,
             qos_profile_sensor_data,
         )
-        self.tick_timer = self.create_timer(0.25, self.tick)
+        self.tick_timer = self.create_timer(
+            0.25,
+            self.tick,
+        )
 
     @property
     def param_speed(self) -> float:
-        """Return the current value of the parameter `speed`."""
+        """Return the current value of the parameter 'speed'."""
         value: float = self.get_parameter('speed').value
         return value
 
     @property
     def param_names(self) -> list[str]:
-        """Return the current value of the parameter `names`."""
+        """Return the current value of the parameter 'names'."""
         value: list[str] = list(self.get_parameter('names').value)
         return value
 
@@ -69,20 +92,28 @@ class Talker(Node):
 
     def receive_words(self, message: String) -> None:
         """Handle a message from ~/words."""
-        self.get_logger().info(f'~/words: data={message.data!r}')
+        self.get_logger().info(f'~/words: {message.data=}')
 
     def tick(self) -> None:
         """Run once per timer period."""
         self.get_logger().info('tick')
 
 
-@until_shutdown
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    node = Talker()
-    executor = WakingExecutor()
-    rclpy.spin(node, executor)
+    try:
+        executor = SingleThreadedExecutor()
+        node = Talker()
+        executor.add_node(node)
+        while ok():
+            # not without end: rclpy can miss a signal that comes while it starts
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
+            raise
 
 
 if __name__ == '__main__':

@@ -1,8 +1,5 @@
 """Fixtures for tests of nodes: the node in its own process, and an observer."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator

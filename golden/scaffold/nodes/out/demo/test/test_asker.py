@@ -1,8 +1,5 @@
 """Tests of the node asker, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -25,10 +22,14 @@ def test_it_calls_ask(start: Start, observer: Node) -> None:
         requests.append(request)
         return response
 
-    observer.create_service(Ask, 'ask', answer)
+    observer.create_service(
+        Ask,
+        'ask',
+        answer,
+    )
     node = start(MODULE)
     node.until(lambda: bool(requests))
-    node.until(lambda: node.said('ask: answer='))
+    node.until(lambda: node.said('ask: response'))
     node.until(node.ended)
     assert node.process.returncode == 0, node.output
 

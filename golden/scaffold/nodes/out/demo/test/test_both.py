@@ -1,8 +1,5 @@
 """Tests of the node both, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -12,7 +9,11 @@ from typing import Any
 from demo.action import Dock
 from demo.srv import Ask
 import pytest
-from rclpy.action.server import ActionServer, ServerGoalHandle
+from rclpy.action.server import (
+    ActionServer,
+    CancelResponse,
+    ServerGoalHandle,
+)
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -28,10 +29,14 @@ def test_it_calls_ask(start: Start, observer: Node) -> None:
         requests.append(request)
         return response
 
-    observer.create_service(Ask, 'ask', answer)
+    observer.create_service(
+        Ask,
+        'ask',
+        answer,
+    )
     node = start(MODULE)
     node.until(lambda: bool(requests))
-    node.until(lambda: node.said('ask: answer='))
+    node.until(lambda: node.said('ask: response'))
 
 
 def test_it_sends_dock(start: Start, observer: Node) -> None:
@@ -45,17 +50,23 @@ def test_it_sends_dock(start: Start, observer: Node) -> None:
         goal_handle.succeed()
         return Dock.Result()
 
-    server = ActionServer(observer, Dock, 'dock', execute)
+    server = ActionServer(
+        observer,
+        Dock,
+        'dock',
+        execute,
+        cancel_callback=lambda _: CancelResponse.ACCEPT,
+    )
     node = start(MODULE)
     node.until(lambda: bool(goals))
 
     def reported() -> bool:
         goals[0].publish_feedback(Dock.Feedback())
-        return bool(node.said('dock: distance='))
+        return bool(node.said('dock: feedback'))
 
     node.until(reported)
     reached.set_result(None)
-    node.until(lambda: node.said('dock: docked='))
+    node.until(lambda: node.said('dock: result'))
     server.destroy()
 
 

@@ -1,8 +1,5 @@
 """Tests of the node oracle, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -19,13 +16,16 @@ Start = Callable[..., Any]
 
 def test_it_answers_ask(start: Start, observer: Node) -> None:
     """Requests to ask are answered, one after the other."""
-    client = observer.create_client(Ask, 'ask')
+    client = observer.create_client(
+        Ask,
+        'ask',
+    )
     node = start(MODULE)
     node.until(client.service_is_ready)
     for _ in range(2):
         answer = client.call_async(Ask.Request())
         node.until(answer.done)
-    node.until(lambda: node.said('ask: question=', 2))
+    node.until(lambda: node.said('ask: request', 2))
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])

@@ -1,8 +1,5 @@
 """Tests of the node station, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -17,20 +14,28 @@ from rclpy.node import Node
 
 MODULE = 'demo.station'
 Start = Callable[..., Any]
-DOCK_GOAL = Dock.Goal()
+
+
+def dock_goal() -> Dock.Goal:
+    """Return a goal that can be reached."""
+    return Dock.Goal()
 
 
 def test_it_reaches_dock(start: Start, observer: Node) -> None:
     """A goal for dock is reached, with feedback on the way."""
     feedback: list[object] = []
-    client = ActionClient(observer, Dock, 'dock')
+    client = ActionClient(
+        observer,
+        Dock,
+        'dock',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    goal = DOCK_GOAL
+    goal = dock_goal()
     sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(sent.done)
     assert sent.result().accepted, node.output
-    node.until(lambda: node.said('dock: station='))
+    node.until(lambda: node.said('dock: goal'))
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_SUCCEEDED, node.output
@@ -41,10 +46,14 @@ def test_it_reaches_dock(start: Start, observer: Node) -> None:
 def test_it_cancels_dock(start: Start, observer: Node) -> None:
     """A goal for dock can be cancelled on the way."""
     feedback: list[object] = []
-    client = ActionClient(observer, Dock, 'dock')
+    client = ActionClient(
+        observer,
+        Dock,
+        'dock',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    goal = DOCK_GOAL
+    goal = dock_goal()
     sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
@@ -56,12 +65,16 @@ def test_it_cancels_dock(start: Start, observer: Node) -> None:
 
 def test_it_replaces_dock(start: Start, observer: Node) -> None:
     """A goal for dock ends when another one comes."""
-    client = ActionClient(observer, Dock, 'dock')
+    client = ActionClient(
+        observer,
+        Dock,
+        'dock',
+    )
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(DOCK_GOAL)
+    sent = client.send_goal_async(dock_goal())
     node.until(sent.done)
-    client.send_goal_async(DOCK_GOAL)
+    client.send_goal_async(dock_goal())
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_ABORTED, node.output

@@ -1,8 +1,5 @@
 """Tests of the node talker, on the real rclpy."""
 
-# Only some of the functions of rclpy have types.
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -14,31 +11,47 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.qos import (
+    DurabilityPolicy,
+    qos_profile_sensor_data,
+    QoSProfile,
+)
 from std_msgs.msg import String
 
 MODULE = 'demo.talker'
 Start = Callable[..., Any]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PARAMETERS = {'speed': 0.5, 'names': ['a', 'b']}
+PARAMETERS = {
+    'speed': 0.5,
+    'names': ['a', 'b'],
+}
 
 
 def test_it_publishes_command(start: Start, observer: Node) -> None:
     """Messages arrive on command, one after the other."""
     received: list[Command] = []
-    observer.create_subscription(Command, 'command', received.append, LATCHED)
+    observer.create_subscription(
+        Command,
+        'command',
+        received.append,
+        LATCHED,
+    )
     node = start(MODULE)
     node.until(lambda: len(received) > 1, 20.3)
 
 
 def test_it_receives_words(start: Start, observer: Node) -> None:
-    """The node logs each message on words."""
-    publisher = observer.create_publisher(String, 'talker/words', qos_profile_sensor_data)
+    """The node logs each message on ~/words."""
+    publisher = observer.create_publisher(
+        String,
+        'talker/words',
+        qos_profile_sensor_data,
+    )
     node = start(MODULE)
 
     def heard() -> bool:
         publisher.publish(String())
-        return bool(node.said('~/words: data=', 2))
+        return bool(node.said('~/words: message', 2))
 
     node.until(heard)
 

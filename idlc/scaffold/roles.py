@@ -1,0 +1,265 @@
+"""The roles that a node can have: options, help and generated code keep their order.
+
+`node/ROLE.py.jinja` is what a role adds to a node and to its test.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from idlc.model import ir
+
+
+class Qos(NamedTuple):
+    """A preset: its name on the command line, and its expression in a module.
+
+    `imports` come from rclpy.qos; `constant` is the line that defines `source`, if none does.
+    """
+
+    name: str
+    source: str
+    imports: tuple[str, ...] = ()
+    constant: str = ""
+
+
+DEFAULT_QOS = Qos("default", "10")
+SENSOR_DATA = Qos("sensor_data", "qos_profile_sensor_data", ("qos_profile_sensor_data",))
+LATCHED = Qos(
+    "latched",
+    "LATCHED",
+    ("DurabilityPolicy", "QoSProfile"),
+    "LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)",
+)
+QOS_PRESETS = (DEFAULT_QOS, SENSOR_DATA, LATCHED)
+QOS_NAMES = tuple(preset.name for preset in QOS_PRESETS)
+
+
+def qos_preset(name: str) -> Qos:
+    """Return the preset of a name; raise ValueError if there is none."""
+    for preset in QOS_PRESETS:
+        if preset.name == name:
+            return preset
+    raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
+
+
+#: The imports of a module: the names from each other module.
+Imports = Mapping[str, tuple[str, ...]]
+NO_IMPORTS: Imports = MappingProxyType({})
+
+
+class Question(NamedTuple):
+    """A question of the wizard besides type and name; the answer is appended to the value."""
+
+    text: str
+    default: str
+    separator: str = ""
+
+
+class Request(NamedTuple):
+    """A request that a node sends, with values from its command line.
+
+    `method` is the name of the coroutine that sends it, `cancel` of one that cancels it, both with
+    `{}` for the word of the endpoint.
+    """
+
+    title: str
+    method: str
+    cancel: str = ""
+
+
+class Value(NamedTuple):
+    """The value of an option, taken apart; `period` is in seconds."""
+
+    type: str
+    topic: str
+    period: float | None = None
+
+
+class Role(NamedTuple):
+    """A role: its option, its question in the wizard, and what its template needs around it.
+
+    `name` is that of the template and, with dashes, of the option. `kind` is the kind of interface
+    that it speaks, if any. Endpoints of roles of one `family` have different words, because their
+    names in Python are made in the same way. `helpers` are the methods of the node that its own
+    methods call: `pause`, `until`, `retire`.
+    """
+
+    name: str
+    kind: ir.Kind | None
+    metavar: str
+    help: str
+    read: Callable[[str], Value]
+    answer: str
+    summary: str
+    family: str
+    question: Question | None = None
+    imports: Imports = NO_IMPORTS
+    test_imports: Imports = NO_IMPORTS
+    helpers: frozenset[str] = frozenset()
+    request: Request | None = None
+
+    @property
+    def option(self) -> str:
+        """The option of the command line."""
+        return f"--{self.name.replace('_', '-')}"
+
+
+class Endpoint(NamedTuple):
+    """One thing that a node does, in a role. `type` is empty in roles without an interface."""
+
+    role: Role
+    type: str
+    topic: str
+    period: float | None = None
+    qos: Qos = DEFAULT_QOS
+
+    @property
+    def word(self) -> str:
+        """The topic as part of a Python name."""
+        return re.sub(r"[^a-z0-9]+", "_", self.topic.lower()).strip("_")[:30].rstrip("_")
+
+
+_TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+
+def _typed(text: str, shape: str = "TYPE:NAME") -> Value:
+    """Return the interface and the name that `TYPE:NAME` means."""
+    type_, colon, topic = text.partition(":")
+    if not colon or not type_ or not topic:
+        raise ValueError(f"`{text}` is not {shape}, such as `std_msgs/String:chatter`")
+    if not _TOPIC.fullmatch(topic) or "__" in topic:
+        raise ValueError(
+            f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
+            "and single underscores, parts separated by `/`"
+        )
+    return Value(type_, topic)
+
+
+def _published(text: str) -> Value:
+    """Return what `TYPE:TOPIC[@HZ]` means."""
+    type_, colon, rest = text.partition(":")
+    topic, at, hertz = rest.partition("@")
+    value = _typed(f"{type_}{colon}{topic}", "TYPE:TOPIC[@HZ]")
+    rate = _positive(hertz, f"the rate of `{topic}`", "Hz") if at else 1.0
+    return value._replace(period=1.0 / rate)
+
+
+def _timed(text: str) -> Value:
+    return Value("", "tick", _positive(text, "the period of a timer", "seconds"))
+
+
+def _positive(text: str, subject: str, unit: str) -> float:
+    """Return the number in a text, within reasonable limits."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value <= 1e6:
+        raise ValueError(f"{subject} must be a number of {unit} above 0, not `{text}`")
+    return value
+
+
+ROLES: tuple[Role, ...] = (
+    Role(
+        name="publisher",
+        kind="msg",
+        metavar="TYPE:TOPIC[@HZ]",
+        help="Publish, by default once a second.",
+        read=_published,
+        answer="publish",
+        question=Question("Rate in Hz", "1", separator="@"),
+        summary="publishes",
+        family="timer",
+    ),
+    Role(
+        name="subscriber",
+        kind="msg",
+        metavar="TYPE:TOPIC",
+        help="Receive messages.",
+        read=_typed,
+        answer="subscribe",
+        summary="listens to",
+        family="subscriber",
+    ),
+    Role(
+        name="service",
+        kind="srv",
+        metavar="TYPE:NAME",
+        help="Answer requests.",
+        read=_typed,
+        answer="serve",
+        summary="serves",
+        family="service",
+    ),
+    Role(
+        name="client",
+        kind="srv",
+        metavar="TYPE:NAME",
+        help="Call a service; the request's fields come from the command line.",
+        read=_typed,
+        answer="call",
+        summary="calls",
+        family="action",
+        helpers=frozenset({"pause", "until"}),
+        request=Request("the request", "call_{}"),
+    ),
+    Role(
+        name="action_server",
+        kind="action",
+        metavar="TYPE:NAME",
+        help="Work on goals, which can be cancelled and replaced.",
+        read=_typed,
+        answer="act",
+        summary="works on goals for",
+        family="action",
+        imports={
+            "rclpy.action.server": (
+                "ActionServer",
+                "CancelResponse",
+                "GoalResponse",
+                "ServerGoalHandle",
+            )
+        },
+        test_imports={
+            "action_msgs.msg": ("GoalStatus",),
+            "rclpy.action.client": ("ActionClient",),
+        },
+        helpers=frozenset({"pause", "retire"}),
+    ),
+    Role(
+        name="action_client",
+        kind="action",
+        metavar="TYPE:NAME",
+        help="Send a goal; its fields come from the command line.",
+        read=_typed,
+        answer="send goals",
+        summary="sends goals to",
+        family="action",
+        imports={
+            "action_msgs.msg": ("GoalStatus",),
+            "rclpy.action.client": ("ActionClient", "ClientGoalHandle"),
+            "rclpy.task": ("Future",),
+            "typing": ("Any",),
+        },
+        test_imports={
+            "rclpy.action.server": ("ActionServer", "CancelResponse", "ServerGoalHandle"),
+            "rclpy.task": ("Future",),
+        },
+        helpers=frozenset({"pause", "retire", "until"}),
+        request=Request("the goal", "send_{}_goal", cancel="cancel_{}_goal"),
+    ),
+    Role(
+        name="timer",
+        kind=None,
+        metavar="SECONDS",
+        help="Call a method regularly.",
+        read=_timed,
+        answer="timer",
+        question=Question("Period in seconds", "1.0"),
+        summary="",
+        family="timer",
+    ),
+)
