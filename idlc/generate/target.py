@@ -215,6 +215,8 @@ def folder_targets(
 
 
 _PACKAGE = Path(__file__).parents[1]
+#: The folder of a generated package that holds its copy of the runtime.
+_COPY = "_idlc/"
 #: The sources of idlc that affect the output: a change counts although the version stays.
 _ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
 _MAKERS = (
@@ -246,6 +248,7 @@ def unchanged(
         and bool(lock.converts_values) == library.distro.converts_values
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
+        and _carries_this_runtime(lock)
         and not _idlc_is_newer(out / FILE)
         and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
     )
@@ -280,9 +283,31 @@ def _has(content: bytes, expected: str, path: str) -> bool:
         return True
     if digest(content) != expected:
         return False
-    if "_idlc/" in path and len(_support) < _MOST:
+    if _COPY in path and len(_support) < _MOST:
         _support[expected] = content
     return True
+
+
+def _carries_this_runtime(lock: Lock) -> bool:
+    """Return whether the copy of the runtime is this idlc's, or there is none.
+
+    Its version does not say so: those of two builds between two releases are equal.
+    """
+    copy = {
+        path.rpartition(_COPY)[2]: content
+        for path, content in lock.outputs.items()
+        if f"/{_COPY}" in f"/{path}"
+    }
+    return not copy or copy == _runtime()
+
+
+@lru_cache(maxsize=1)
+def _runtime() -> dict[str, str]:
+    runtime = _PACKAGE / "runtime"
+    return {
+        path.relative_to(runtime).as_posix(): digest(path.read_bytes())
+        for path in runtime.rglob("*.py")
+    }
 
 
 def _idlc_is_newer(path: Path) -> bool:

@@ -18,23 +18,24 @@ SlotName = NewType("SlotName", str)
 LocalName = NewType("LocalName", str)
 Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 
-#: Names that the emitted codecs use themselves, or may come to use.
+#: Names that the emitted codecs use themselves.
 CODEC_NAMES = frozenset(
-    {"at", "chars", "count", "data", "decode", "encode", "end", "join", "kind", "limit"}
+    {"array", "at", "chars", "count", "data", "decode", "each", "encapsulation", "encode", "end"}
     | {
+        "ended",
+        "join",
+        "kind",
+        "limit",
+        "listed",
         "low",
         "message",
         "order",
-        "parts",
-        "put",
-        "raw",
-        "reading",
-        "size",
-        "struct",
-        "to_str",
-        "view",
+        "pad2",
+        "pad4",
+        "pad8",
     }
-    | {"words"}
+    | {"parts", "put", "raw", "reading", "size", "sized", "small", "strings", "struct", "text"}
+    | {"to_str", "truths", "unsized", "view", "wide_text", "words"}
 )
 
 #: The methods that a message class inherits; a field of such a name hides the method.
@@ -43,7 +44,7 @@ METHODS = frozenset(
     | {"serialize_many", "to_arrow", "to_columns", "to_dict", "validate"}
 )
 
-#: Names that no local variable should have.
+#: Names that no value of a field should have.
 RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
 
 
@@ -100,10 +101,10 @@ class Locals:
     """The local variables of one function: each name is used once."""
 
     def __init__(self) -> None:
-        self._taken: set[str] = set(RESERVED)
+        self._taken: set[str] = set()
 
     def new(self, base: str) -> LocalName:
-        """Return `base`, or a name like it that is free and shadows nothing."""
+        """Return `base`, or a name like it that is free."""
         name = base
         count = 1
         while name in self._taken:
@@ -112,13 +113,9 @@ class Locals:
         self._taken.add(name)
         return LocalName(name)
 
-    def shortest(self, path: tuple[str, ...]) -> LocalName:
-        """Return the last part of a path, with as many parts before it as make it new."""
-        for start in reversed(range(len(path))):
-            name = "_".join(path[start:])
-            if name not in self._taken:
-                break
-        return self.new(name)
+    def field(self, path: str) -> LocalName:
+        """Return the variable of a field's value; no field's name can end in an underscore."""
+        return self.new(f"{path}_" if path in RESERVED else path)
 
     def mark(self) -> frozenset[str]:
         """Return a mark with which `reset` forgets all names used from now on."""

@@ -142,7 +142,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     vendored: tuple[str, ...] = ()
     imports: tuple[str, ...] = ()
     inputs: dict[str, str]
-    dependencies: dict[str, str]
+    dependencies: dict[str, str] = {}
     types: dict[str, str]
     outputs: dict[str, str]
 

@@ -28,7 +28,7 @@ from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, read_topics, recorded_types, versions
-from idlc.runtime.objects import owner_of
+from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import structure_of
 from idlc.version import __version__
 
@@ -171,14 +171,10 @@ SUPPORT = '''\
 """The runtime of this package, which is that of idlc."""
 
 from idlc.runtime import *
-from idlc.runtime import objects
+from idlc.runtime import __getattr__, message
 
 _home = __name__.rpartition(".")[0]
-objects.SHOWN[_home] = _home.rpartition(".")[2]
-
-
-def __getattr__(name):
-    return getattr(__import__("idlc.runtime", fromlist=[name]), name)
+message.SHOWN[_home] = _home.rpartition(".")[2]
 '''
 
 

@@ -1,8 +1,8 @@
-"""Messages that check the values that are assigned to them, as rosidl's classes do.
+"""Checks of values: of whole messages, of what codecs refuse, and at each assignment.
 
-They are asked for by `check_fields=True` or by the environment. Each is an instance of a
-subclass whose fields are properties, so that all others pay nothing. It refuses what rosidl
-refuses, and its AssertionError names the field.
+Messages check what is assigned to them, as rosidl's classes do, where `check_fields=True` or the
+environment asks for it. Each is an instance of a subclass whose fields are properties, so that
+all others pay nothing. It refuses what rosidl refuses, and its AssertionError names the field.
 """
 
 from __future__ import annotations
@@ -15,15 +15,197 @@ from collections.abc import Set as AbstractSet
 from functools import cache
 from typing import Any
 
-from .errors import FieldCheckError, FieldNameError, FieldTypeError, ValidationError
-from .objects import is_copy, owner_of
+from .names import (
+    FieldCheckError,
+    FieldNameError,
+    FieldRangeError,
+    FieldTypeError,
+    ValidationError,
+    owner_of,
+)
 from .typeinfo import (
+    ARRAY,
+    PRIMITIVES,
+    SEQUENCE,
     FieldInfo,
     Primitive,
+    Structure,
+    counted,
+    inner_path,
+    is_copy,
     spelling_hint,
     structure_of,
-    validate_field,
 )
+
+# checking values
+
+
+def validate(message: Any, *, wire_only: bool = False) -> None:
+    """Raise ValidationError for the first value that its field cannot hold.
+
+    `wire_only` leaves out what the wire does not enforce: the bounds of strings.
+    """
+    _message(message, structure_of(type(message)), "", wire_only)
+
+
+def validate_field(value: Any, field: FieldInfo) -> None:
+    """Raise ValidationError if a field, which is named by its path, cannot hold a value."""
+    check = _list if field.is_list else validate_element
+    check(value, field, field.public, wire_only=True)
+
+
+def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> None:
+    for field in structure.fields:
+        place = inner_path(path, field.public)
+        if not hasattr(message, field.slot):
+            raise ValidationError(path or "message", f"a {structure.name}", message)
+        value = getattr(message, field.slot)
+        if field.is_list:
+            _list(value, field, place, wire_only)
+        else:
+            validate_element(value, field, place, wire_only)
+
+
+def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
+    if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
+        raise ValidationError(path, "a sequence", values)
+    validate_count(values, field, path)
+    if field.primitive is not None and _holds(values, field.primitive):
+        return
+    for index, value in enumerate(values):
+        validate_element(value, field, f"{path}[{index}]", wire_only)
+
+
+def validate_count(values: Any, field: FieldInfo, path: str = "") -> None:
+    """Raise ValidationError if a field, by default named as it is, cannot hold so many values."""
+    path = path or field.public
+    if field.size is not None and len(values) != field.size:
+        problem = f"has {counted(len(values), 'element')}, needs {field.size}"
+        raise ValidationError(path, f"{field.size} elements", values, problem)
+    if field.bound is not None and len(values) > field.bound:
+        _too_many(path, "element", len(values), field.bound, values)
+
+
+def _holds(values: Any, primitive: Primitive) -> bool:
+    """Return whether an array's own type already says that all elements fit."""
+    if primitive.code in "?c":
+        return isinstance(values, (bytes, bytearray))
+    if isinstance(values, array):
+        return values.typecode == primitive.code
+    dtype = getattr(values, "dtype", None)
+    return dtype is not None and dtype.name == primitive.name and values.ndim == 1
+
+
+def validate_element(
+    value: Any, field: FieldInfo, path: str = "", wire_only: bool = False
+) -> None:
+    """Raise ValidationError if a field, or a list in it, cannot hold a value."""
+    path = path or field.public
+    if field.nested:
+        _message(value, field.nested, path, wire_only)
+    elif field.text:
+        _text(value, field, path, wire_only)
+    else:
+        assert field.primitive is not None
+        _primitive(value, field.primitive, path)
+
+
+def _text(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
+    if not isinstance(value, str):
+        raise ValidationError(path, "a str", value)
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValidationError(path, "a str without lone surrogates", value) from None
+    if not wire_only and field.text_bound is not None and len(value) > field.text_bound:
+        _too_many(path, "character", len(value), field.text_bound, value)
+
+
+def _too_many(path: str, what: str, count: int, bound: int, value: object) -> None:
+    problem = f"has {counted(count, what)}, at most {bound} are allowed"
+    raise ValidationError(path, f"at most {counted(bound, what)}", value, problem)
+
+
+def _primitive(value: Any, primitive: Primitive, path: str) -> None:
+    if primitive.code == "?":
+        number = isinstance(value, (int, float)) and value in (0, 1)
+        if not number and type(value).__name__ not in {"bool_", "bool"}:
+            raise ValidationError(path, primitive.allowed, value)
+    elif primitive.code == "c":
+        if not isinstance(value, bytes) or len(value) != 1:
+            raise ValidationError(path, primitive.allowed, value)
+    elif primitive.code in "fd":
+        _float(value, primitive, path)
+    else:
+        _integer(value, primitive, path)
+
+
+def _integer(value: Any, primitive: Primitive, path: str) -> None:
+    try:
+        number = value.__index__()
+    except (AttributeError, TypeError):
+        raise ValidationError(path, primitive.allowed, value) from None
+    assert primitive.low is not None
+    assert primitive.high is not None
+    if not primitive.low <= number <= primitive.high:
+        raise ValidationError(path, primitive.allowed, value)
+
+
+def _float(value: Any, primitive: Primitive, path: str) -> None:
+    try:
+        number = float(value) if not isinstance(value, (str, bytes)) else None
+    except (TypeError, ValueError, OverflowError):
+        number = None
+    if number is None:
+        raise ValidationError(path, f"a number ({primitive.name})", value)
+    if primitive.high is None or not math.isfinite(number):
+        return
+    if abs(number) > primitive.high:
+        raise ValidationError(path, primitive.allowed, value)
+
+
+def refused(
+    name: str, kind: str, size: int | None, values: Any, error: Exception
+) -> ValidationError:
+    """Return the error for values that a field of numbers does not take.
+
+    `kind` is the name of their type, or its code in `struct`. `error` is what Python or
+    numpy said, and one of its kind is returned: rosidl's classes raise that.
+    """
+    base, primitive = next(
+        (base, candidate)
+        for base, candidate in PRIMITIVES.items()
+        if kind in (candidate.code, candidate.name)
+    )
+    shape = 48 * (SEQUENCE if size is None else ARRAY)
+    type_ = {"type_id": base + shape, "capacity": size, "string_capacity": 0}
+    field = FieldInfo({"name": name, "default_value": "", "type": type_}, None)
+    failure = ValidationError(
+        name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
+    )
+    if isinstance(values, (bytes, bytearray)) and size is None:
+        problem = (
+            f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
+        )
+        failure = ValidationError(name, "whole numbers of bytes", values, problem)
+    elif (
+        isinstance(values, (list, tuple))
+        or getattr(values, "ndim", 0) == 1
+        or not hasattr(values, "__len__")
+    ):
+        try:
+            _list(values, field, name, wire_only=True)
+        except ValidationError as exact:
+            failure = exact
+    raised = ValidationError
+    if isinstance(error, OverflowError):
+        raised = FieldRangeError
+    elif isinstance(error, TypeError) or isinstance(values, (str, dict)):
+        raised = FieldTypeError
+    return failure.at(failure.path, raised)  # type: ignore[no-any-return]
+
+
+# messages that check what is assigned
 
 #: rosidl's limits of a float32, which are not quite those of IEEE 754.
 _FLOAT32 = 3.402823466e38
@@ -136,7 +318,9 @@ def _property(slot: Any, field: FieldInfo) -> property:
     store = slot.__set__
 
     def setter(message: Any, value: Any) -> None:
-        _check(value, field)
+        allowed = _refusal(value, field)
+        if allowed:
+            raise FieldCheckError(field.public, allowed, value)
         if field.is_list and field.is_numeric:
             value = _numbers(value, field)
         store(message, value)
@@ -154,12 +338,6 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
     if isinstance(value, np.ndarray):
         return value
     return np.array(value, field.primitive.name)
-
-
-def _check(value: Any, field: FieldInfo) -> None:
-    allowed = _refusal(value, field)
-    if allowed:
-        raise FieldCheckError(field.public, allowed, value)
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:

@@ -10,8 +10,7 @@ import struct
 from os import environ
 
 from .cdr import NATIVE, order_of
-from .errors import DecodeError, ValidationError
-from .objects import owner_of
+from .names import DecodeError, ValidationError, owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from functools import partial
     from typing import Any, Protocol, TypeAlias
 
-    from .hints import Join
+    from .conversions import Join
 
     #: A function that decodes bytes.
     Text: TypeAlias = Callable[[Any], str]
@@ -124,14 +123,11 @@ def functions(kind: type) -> Functions:
     if pair is None:
         pair = owner._functions_ = _functions(owner)
         serialize, deserialize = pair
-        _provide(owner, "serialize", serialize)
-        _provide(owner, "deserialize", staticmethod(deserialize))
+        methods = {"serialize": serialize, "deserialize": staticmethod(deserialize)}
+        for name, function in methods.items():
+            if name not in owner.__dict__:
+                setattr(owner, name, function)
     return pair
-
-
-def _provide(owner: Any, name: str, function: object) -> None:
-    if name not in owner.__dict__:
-        setattr(owner, name, function)
 
 
 def _functions(owner: Any) -> Functions:
@@ -210,7 +206,7 @@ def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    from .typeinfo import validate
+    from .checked import validate
 
     try:
         validate(message, wire_only=True)
@@ -301,7 +297,11 @@ def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
 def maker(kind: Any) -> Callable[[], Any]:
     """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
     if hasattr(type(kind), "_message"):
-        return partial(object.__new__, _checking(kind) if CHECK_FIELDS else kind)
+        if CHECK_FIELDS:
+            from .checked import checked_class
+
+            kind = checked_class(kind)
+        return partial(object.__new__, kind)
     if "_check_fields" not in getattr(kind, "__slots__", ()):
         return partial(object.__new__, kind)
 
@@ -311,13 +311,6 @@ def maker(kind: Any) -> Callable[[], Any]:
         return message
 
     return make
-
-
-def _checking(kind: Any) -> Any:
-    """Return the subclass of a message class whose instances check their fields."""
-    from .checked import checked_class
-
-    return checked_class(kind)
 
 
 def is_checked(kind: type) -> bool:

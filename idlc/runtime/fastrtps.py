@@ -1,20 +1,17 @@
 """The opaque kind: rmw_fastrtps_cpp and others that use its type support.
 
-The middleware never looks into message memory here, so it is a `Memory` that holds the
-encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
-calls the two functions that copy the bytes while it holds the mutex of a writer or a
-reader, and another thread may wait for that mutex while it holds the interpreter's lock.
-Whoever gave that lock away in there would never get it back. So these functions are
-machine code that allocates nothing but `bytes`, which starts no garbage collection.
+Message memory is a `Memory` here, which holds the encoded bytes: encoding comes before the
+middleware is called, decoding after it. Fast DDS copies the bytes while it holds the mutex of
+a writer or a reader, and another thread may wait for that mutex while it holds the
+interpreter's lock. Whoever gave that lock away in there would never get it back. So what copies
+is machine code that allocates nothing but `bytes`, which starts no garbage collection. Where
+there can be none, it is Python in which the interpreter lets no other thread run: that may
+happen after a call and where it jumps. Only Python 3.11 and older may collect garbage.
 
-Where there can be no machine code, they are Python that lets no other thread run: the
-interpreter may do so after a call and where it jumps, so there is neither. Only Python
-3.11 and older may collect garbage in between.
-
-They read and write through three pointers inside Fast CDR's `Cdr`: where the next byte is,
+Both read and write through three pointers inside Fast CDR's `Cdr`: where the next byte is,
 where the message began, and where the buffer ends. Each is the second word of a pair whose
-first word is the start of the buffer. `fast_cdr` makes a `Cdr` of its own and looks for these
-pairs; where it does not find them, it raises ImportError instead of touching anybody's memory.
+first word is the start of the buffer. `fast_cdr` looks for these pairs in a `Cdr` of its own;
+where they are not found, it raises ImportError instead of touching anybody's memory.
 """
 
 from __future__ import annotations
@@ -23,16 +20,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Callable
-from ctypes import (
-    PYFUNCTYPE,
-    c_bool,
-    c_char,
-    c_char_p,
-    c_int,
-    c_size_t,
-    c_void_p,
-    py_object,
-)
+from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from struct import pack
 from typing import Any, NamedTuple
@@ -117,10 +105,6 @@ def _load() -> tuple[ctypes.CDLL, _Names]:
     raise ImportError(f"the middleware has not loaded {tried}. {_ADVICE}")
 
 
-def _words_of(cdr: int) -> list[int]:
-    return c.WORDS[cdr >> 3 : (cdr >> 3) + _WORDS].tolist()
-
-
 def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int | None:
     """Return the only index of the three pairs, else None."""
     pattern = [word for position in positions for word in (begin, position)]
@@ -138,7 +122,9 @@ def fast_cdr() -> FastCdr:
 
     try:
         new_buffer = method(_NEW_BUFFER, None, c_void_p, c_void_p, c_size_t)
-        new_cdr = method(names.new, None, c_void_p, c_void_p, c_int, c_int)
+        new_cdr = method(
+            names.new, None, c_void_p, c_void_p, ctypes.c_int, ctypes.c_int
+        )
         append = method(names.append, c_void_p, c_void_p, c_void_p, c_size_t)
         position_of = method(names.position, c_void_p, c_void_p)
         begin_of = method(names.begin, c_void_p, c_void_p)
@@ -155,7 +141,8 @@ def fast_cdr() -> FastCdr:
     for text in (b"\1\2\3", b"\4\5"):
         append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))
         position = position_of(here)
-        indices.add(_find(_words_of(here), begin, (position, begin, begin + size)))
+        words = c.WORDS[here >> 3 : (here >> 3) + _WORDS].tolist()
+        indices.add(_find(words, begin, (position, begin, begin + size)))
     index = indices.pop()
     if (
         indices
@@ -307,15 +294,56 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
     return c.taking(name, taken)
 
 
-def _python_functions(answers: dict[bytes, int]) -> dict[str, int]:
-    """Return the addresses of the functions by name; `answers` is what one of them gives."""
-    return {
-        "serialize": _serializer(),
-        "deserialize": _deserializer(),
-        "serialized_size": _size(),
-        "maximum_size": _unbounded(),
-        "resolve": c.resolver(answers),
+@cache
+def _python_functions() -> dict[str, int]:
+    """Return the addresses of functions in Python that Fast DDS calls."""
+    position, end = fast_cdr()
+    everything, characters, words = c.MEMORY, c.CHARACTERS, c.WORDS
+
+    def serialize(memory: Any, cdr: int) -> bool:
+        try:
+            here = cdr >> 3
+            start = words[here + position]
+            stop = start + memory.size
+            if stop <= words[here + end]:
+                everything[start:stop] = memory.body
+                words[here + position] = stop
+                return True
+        except BaseException:  # noqa: S110
+            pass
+        return False
+
+    def deserialize(cdr: int, memory: Any) -> bool:
+        try:
+            here = cdr >> 3
+            memory.received = characters[
+                words[here + position] - _HEADER : words[here + end]
+            ]
+            return True
+        except BaseException:
+            return False
+
+    def size(memory: Any) -> int:
+        try:
+            return memory.size  # type: ignore[no-any-return]
+        except BaseException:
+            return 0
+
+    def maximum(bounds_info: Any) -> int:
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
+            bounds_info[0] = b"\0"
+        except BaseException:  # noqa: S110
+            pass
+        return 0
+
+    bounds = ctypes.POINTER(ctypes.c_char)
+    functions: dict[str, tuple[Any, Callable[..., object]]] = {
+        "serialize": (PYFUNCTYPE(c_bool, py_object, c_void_p), serialize),
+        "deserialize": (PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize),
+        "serialized_size": (PYFUNCTYPE(c_size_t, py_object), size),
+        "maximum_size": (PYFUNCTYPE(c_size_t, bounds), maximum),
     }
+    return {name: c.callback(*function) for name, function in functions.items()}
 
 
 def _plain_memory_type(base: type) -> type:
@@ -331,93 +359,27 @@ def _plain_memory_type(base: type) -> type:
     return type("Memory", (base,), {"__slots__": ("size",), "__rmatmul__": store_plain})
 
 
-@cache
-def _serializer() -> int:
-    position, end = fast_cdr()
-    everything, words = c.MEMORY, c.WORDS
-
-    def serialize(memory: Any, cdr: int) -> bool:
-        try:
-            here = cdr >> 3
-            start = words[here + position]
-            stop = start + memory.size
-            if stop <= words[here + end]:
-                everything[start:stop] = memory.body
-                words[here + position] = stop
-                return True
-        except BaseException:  # noqa: S110
-            pass
-        return False
-
-    return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
-
-
-@cache
-def _deserializer() -> int:
-    position, end = fast_cdr()
-    characters, words = c.CHARACTERS, c.WORDS
-
-    def deserialize(cdr: int, memory: Any) -> bool:
-        try:
-            here = cdr >> 3
-            memory.received = characters[
-                words[here + position] - _HEADER : words[here + end]
-            ]
-            return True
-        except BaseException:
-            return False
-
-    return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
-
-
-@cache
-def _size() -> int:
-    def size(memory: Any) -> int:
-        try:
-            return memory.size  # type: ignore[no-any-return]
-        except BaseException:
-            return 0
-
-    return c.callback(PYFUNCTYPE(c_size_t, py_object), size)
-
-
-@cache
-def _unbounded() -> int:
-    def maximum(bounds_info: Any) -> int:
-        try:  # noqa: SIM105 (a context manager would be called outside of it)
-            bounds_info[0] = b"\0"
-        except BaseException:  # noqa: S110
-            pass
-        return 0
-
-    return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
-
-
-class _Callbacks(ctypes.Structure):
-    """`message_type_support_callbacks_t`."""
-
-    _fields_ = (
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("cdr_serialize", c_void_p),
-        ("cdr_deserialize", c_void_p),
-        ("get_serialized_size", c_void_p),
-        ("max_serialized_size", c_void_p),
-        ("key_callbacks", c_void_p),
-        # what later versions read: three words so far, zero for "none of it"
-        ("later", c_void_p * 9),
-    )
-
-
-class _ServiceCallbacks(ctypes.Structure):
-    """`service_type_support_callbacks_t`."""
-
-    _fields_ = (
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("request", c_void_p),
-        ("response", c_void_p),
-    )
+#: `message_type_support_callbacks_t`.
+_Callbacks = c.structure(
+    "Callbacks",
+    namespace=c_char_p,
+    name=c_char_p,
+    cdr_serialize=c_void_p,
+    cdr_deserialize=c_void_p,
+    get_serialized_size=c_void_p,
+    max_serialized_size=c_void_p,
+    key_callbacks=c_void_p,
+    # what later versions read: three words so far, zero for "none of it"
+    later=c_void_p * 9,
+)
+#: `service_type_support_callbacks_t`.
+_ServiceCallbacks = c.structure(
+    "ServiceCallbacks",
+    namespace=c_char_p,
+    name=c_char_p,
+    request=c_void_p,
+    response=c_void_p,
+)
 
 
 @cache
@@ -440,8 +402,9 @@ def message(cls: Any, structure: Structure) -> c.MessageSupport:
         functions = _native(answers, memory)
     except RefusedError:
         memory = _plain_memory_type(_memory_type(name, cls, apart=False))
-        functions = _python_functions(answers)
-        functions["create"] = c.address(PYFUNCTYPE(py_object)(memory))
+        create = c.address(PYFUNCTYPE(py_object)(memory))
+        resolve = c.resolver(answers)
+        functions = {**_python_functions(), "create": create, "resolve": resolve}
     support.data = c.pointer(
         _Callbacks(
             f"{package}::{kind}".encode(),

@@ -1,18 +1,5 @@
 """Types as ROS 2 asks about them: hash, description, source text, members, C structures.
 
-The facts are JSON in a package's `_type_data.py`, read only when rclpy asks for type support:
-
-    {"package": "pkg",
-     "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
-     "hashes": {"pkg/msg/Name": "RIHS01_…"},
-     "sources": {"pkg/msg/Name": "text of the interface file"}}
-
-`descriptions` and `hashes` hold every structure of the package, derived ones and the
-pseudo-structures of services and actions included, and all that these refer to;
-`sources` holds the files among them. A type id is a base plus 48 for a fixed array, 96
-for a bounded, 144 for an unbounded sequence (rosidl's
-`type_description_interfaces/msg/FieldType`).
-
 Introspection members are field names, types and C offsets, as a middleware walks them. Both
 kinds of type support need them. Fast DDS describes types to its peers from them and never
 looks at the memory; introspection-based middlewares read and write the memory that they
@@ -32,71 +19,29 @@ from struct import unpack_from
 from typing import Any, NamedTuple
 
 from . import c
-from .typeinfo import Structure
+from .typeinfo import ARRAY, BOUNDED_SEQUENCE, SCALAR, FieldInfo, Structure
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 
 NESTED = 1
-SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
-
-
-class Field(NamedTuple):
-    """A field as described; `capacity` is an array's size or a sequence's bound."""
-
-    name: str
-    type_id: int
-    capacity: int
-    string_capacity: int
-    nested_type_name: str
-    default_value: str
-    nested: Structure | None
-
-    @property
-    def base(self) -> int:
-        """The type id of one element."""
-        return self.type_id % 48
-
-    @property
-    def shape(self) -> int:
-        """SCALAR, ARRAY, BOUNDED_SEQUENCE or SEQUENCE."""
-        return self.type_id // 48
-
-
-@cache
-def fields_of(structure: Structure) -> tuple[Field, ...]:
-    """Return a type's members, the dummy one included."""
-    fields = []
-    for member in structure.members:
-        name = member["type"]["nested_type_name"]
-        nested = structure.types[name] if name else None
-        default = member["default_value"]
-        field = Field(
-            member["name"], **member["type"], default_value=default, nested=nested
-        )
-        fields.append(field)
-    return tuple(fields)
 
 
 @cache
 def references(structure: Structure) -> frozenset[Structure]:
     """Return all types that a type refers to, directly or not, itself excluded."""
-    direct = {field.nested for field in fields_of(structure) if field.nested}
+    direct = {field.nested for field in structure.members if field.nested}
     return frozenset(direct.union(*map(references, direct)))
 
 
-def _field(field: Field) -> c.Field:
-    kind = c.FieldType(
-        field.type_id,
-        field.capacity,
-        field.string_capacity,
-        c.string(field.nested_type_name),
-    )
-    return c.Field(c.string(field.name), kind, c.string(field.default_value))
+def _field(field: FieldInfo) -> Any:
+    nested = c.string(field.nested.name if field.nested else "")
+    kind = c.FieldType(field.type_id, field.capacity, field.text_bound or 0, nested)
+    return c.Field(c.string(field.name), kind, c.string(field.default))
 
 
 @cache
-def _individual(structure: Structure) -> c.IndividualDescription:
-    fields = [_field(field) for field in fields_of(structure)]
+def _individual(structure: Structure) -> Any:
+    fields = [_field(field) for field in structure.members]
     name = c.string(structure.name)
     return c.IndividualDescription(name, c.sequence(fields, c.Field))
 
@@ -112,7 +57,7 @@ def _installed_text(name: str) -> str | None:
     return None
 
 
-def _source(structure: Structure) -> c.Source:
+def _source(structure: Structure) -> Any:
     """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
     name, sources = structure.name, structure.types.sources
     text = sources.get(name) if structure.is_own else _installed_text(name)
@@ -120,13 +65,13 @@ def _source(structure: Structure) -> c.Source:
     return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
 
 
-def _type_hash(structure: Structure) -> c.TypeHash:
+def _type_hash(structure: Structure) -> Any:
     digest = bytes.fromhex(structure.hash.removeprefix("RIHS01_"))
     return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
 
 
 @cache
-def about(structure: Structure) -> c.About:
+def about(structure: Structure) -> Any:
     """Return functions that never fail and never return NULL, as rcl demands."""
     others = sorted(references(structure), key=lambda other: other.name)
     individuals = c.sequence(list(map(_individual, others)), c.IndividualDescription)
@@ -137,7 +82,7 @@ def about(structure: Structure) -> c.About:
 
 
 # the C structures of this ROS 2: their layout is measured, never assumed
-
+#
 # Versions differ in what a middleware reads from introspection tables and in the size of
 # sequences, and nothing in them tells which version they are of. So before the first type
 # support of a process, the tables of two messages that are wherever rclpy is are compared
@@ -386,22 +331,22 @@ _MESSAGE = 18
 @cache
 def c_structure(structure: Structure) -> type[ctypes.Structure]:
     """Return the C structure that rosidl's C generator would make for a message."""
-    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(fields_of(structure))]
+    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(structure.members)]
     name = structure.name.replace("/", "__")
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def introspection_id(field: Field) -> int:
+def introspection_id(field: FieldInfo) -> int:
     """Return how introspection calls the type of a field's elements."""
     return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
 
 
-def element_type(field: Field) -> Any:
+def element_type(field: FieldInfo) -> Any:
     """Return the C type of one element of a field."""
     return c_structure(field.nested) if field.nested else _ELEMENTS[field.base][1]
 
 
-def _c_type(field: Field) -> Any:
+def _c_type(field: FieldInfo) -> Any:
     if field.shape == SCALAR:
         return element_type(field)
     if field.shape == ARRAY:
@@ -409,18 +354,18 @@ def _c_type(field: Field) -> Any:
     return _sequence_type(field)
 
 
-def _sequence_type(field: Field) -> Any:
+def _sequence_type(field: FieldInfo) -> Any:
     if field.base == NESTED:
         return c.Sequence
     size = abi().strings if element_type(field) is c.String else abi().sequence
     return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
 
 
-def placed_fields(structure: Structure) -> list[tuple[Field, int]]:
+def placed_fields(structure: Structure) -> list[tuple[FieldInfo, int]]:
     """Return a message's fields and where each begins in the C structure."""
     kind = c_structure(structure)
     offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
-    return list(zip(fields_of(structure), offsets, strict=True))
+    return list(zip(structure.members, offsets, strict=True))
 
 
 # members
@@ -429,76 +374,66 @@ def placed_fields(structure: Structure) -> list[tuple[Field, int]]:
 @cache
 def _member_type() -> Any:
     """Return `rosidl_typesupport_introspection_c__MessageMember` of this ROS 2."""
-    layout = abi()
-    fields = (
-        ("name", c_char_p),
-        ("type_id", c_uint8),
-        ("string_upper_bound", c_size_t),
-        ("members", c_void_p),
-        ("flags", c_uint8 * (layout.is_array - 32)),  # whether it is a key
-        ("is_array", c_bool),
-        ("array_size", c_size_t),
-        ("is_upper_bound", c_bool),
-        ("offset", c_uint32),
-        ("default_value", c_void_p),
-        ("size_function", c_void_p),
-        ("get_const_function", c_void_p),
-        ("get_function", c_void_p),
-        ("fetch_function", c_void_p),
-        ("assign_function", c_void_p),
-        ("resize_function", c_void_p),
-        ("later", c_uint8 * (layout.member - 112)),  # whether it is a buffer
+    return c.structure(
+        "MessageMember",
+        name=c_char_p,
+        type_id=c_uint8,
+        string_upper_bound=c_size_t,
+        members=c_void_p,
+        flags=c_uint8 * (abi().is_array - 32),  # whether it is a key
+        is_array=c_bool,
+        array_size=c_size_t,
+        is_upper_bound=c_bool,
+        offset=c_uint32,
+        default_value=c_void_p,
+        size_function=c_void_p,
+        get_const_function=c_void_p,
+        get_function=c_void_p,
+        fetch_function=c_void_p,
+        assign_function=c_void_p,
+        resize_function=c_void_p,
+        later=c_uint8 * (abi().member - 112),  # whether it is a buffer
     )
-    return type("MessageMember", (ctypes.Structure,), {"_fields_": fields})
 
 
 @cache
 def _members_type() -> Any:
     """Return `rosidl_typesupport_introspection_c__MessageMembers` of this ROS 2."""
-    fields = (
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("count", c_uint32),
-        ("size_of", c_size_t),
-        ("flags", c_uint8 * (abi().members - 32)),  # whether there is a key
-        ("members", c_void_p),
-        ("init_function", c_void_p),
-        ("fini_function", c_void_p),
+    return c.structure(
+        "MessageMembers",
+        namespace=c_char_p,
+        name=c_char_p,
+        count=c_uint32,
+        size_of=c_size_t,
+        flags=c_uint8 * (abi().members - 32),  # whether there is a key
+        members=c_void_p,
+        init_function=c_void_p,
+        fini_function=c_void_p,
     )
-    return type("MessageMembers", (ctypes.Structure,), {"_fields_": fields})
-
-
-class Library(NamedTuple):
-    """Addresses in ROS 2's own libraries."""
-
-    identifier: int
-    same_handle: int
-    same_service: int
 
 
 @cache
-def library() -> Library:
+def library() -> tuple[int, int, int]:
     """Return addresses in the libraries that define what introspection is.
 
-    The identifier is rosidl's own string, because middlewares compare the pointers.
-    `same_handle` and `same_service` answer with the handle itself if the identifier
-    fits.
+    The identifier is rosidl's own string, because middlewares compare the pointers. The functions
+    for messages and for services answer with the handle itself if the identifier fits.
     """
     introspection = c.load_library(f"lib{IDENTIFIER}.so")
     runtime = c.load_library("librosidl_runtime_c.so")
-    return Library(
+    return (
         c_void_p.in_dll(introspection, f"{IDENTIFIER}__identifier").value or 0,
         c.address(runtime.get_message_typesupport_handle_function),
         c.address(runtime.get_service_typesupport_handle_function),
     )
 
 
-def _member(field: Field, offset: int, functional: bool) -> Any:
+def _member(field: FieldInfo, offset: int, functional: bool) -> Any:
     """Return the member that describes a field to the middleware."""
     member = _member_type()(
         name=field.name.encode(),
         type_id=introspection_id(field),
-        string_upper_bound=field.string_capacity,
+        string_upper_bound=field.text_bound or 0,
         is_array=field.shape != SCALAR,
         array_size=field.capacity,
         is_upper_bound=field.shape == BOUNDED_SEQUENCE,
@@ -510,11 +445,11 @@ def _member(field: Field, offset: int, functional: bool) -> Any:
         size = ctypes.sizeof(element_type(field))
         functions = elements(size, element_content(field))
         if field.shape == ARRAY:
-            member.get_function = functions.in_array
+            member.get_function = functions["in_array"]
         else:
-            member.size_function = functions.length
-            member.get_function = functions.in_sequence
-            member.resize_function = functions.resize
+            member.size_function = functions["length"]
+            member.get_function = functions["in_sequence"]
+            member.resize_function = functions["resize"]
         member.get_const_function = member.get_function
     return member
 
@@ -524,7 +459,7 @@ def members(structure: Structure, functional: bool) -> Any:
     placed = placed_fields(structure)
     table = [_member(field, offset, functional) for field, offset in placed]
     size = ctypes.sizeof(c_structure(structure))
-    finish = elements(size, content(structure)).finish if functional else None
+    finish = elements(size, content(structure))["finish"] if functional else None
     package, kind, short = structure.name.split("/")
     return c.keep(
         _members_type()(
@@ -544,84 +479,49 @@ def handle(structure: Structure, functional: bool) -> int:
 
     `functional`: with the functions by which message memory is written and read.
     """
-    support = c.MessageTypeSupport(
-        library().identifier,
-        ctypes.addressof(members(structure, functional)),
-        library().same_handle,
-        about(structure),
-    )
+    identifier, same_handle, _ = library()
+    data = ctypes.addressof(members(structure, functional))
+    support = c.MessageTypeSupport(identifier, data, same_handle, about(structure))
     return c.pointer(support)
 
 
 # message memory
 
 
-class MemoryFunctions(NamedTuple):
-    """Addresses of functions that know one type of message, and its sequences and arrays.
-
-    `convert_from_py` and `convert_to_py` are the only ones that need Python: they call
-    `converter[address] = message` and `converter[address]`.
-    """
-
-    create: int
-    destroy: int
-    convert_from_py: int
-    convert_to_py: int
-    finish: int
-    resize: int
-    length: int
-    in_sequence: int
-    in_array: int
-
-
 @cache
-def elements(size: int, content: int) -> MemoryFunctions:
+def elements(size: int, content: int) -> dict[str, int]:
     """Return functions for all elements of a size and with a content to free."""
     return memory_functions(size, content, None)
 
 
-def memory_functions(size: int, content: int, converter: object) -> MemoryFunctions:
-    """Return new functions; they live as long as the process."""
-    allocate, deallocate = allocator()
-    addresses = c.machine_code(
-        "structs",
-        {
-            "allocate": allocate,
-            "deallocate": deallocate,
-            "set_item": c.c_function("PySequence_SetItem"),
-            "get_item": c.c_function("PySequence_GetItem"),
-            "converter": id(c.keep(converter)),
-            "plan": content or _table(),
-            "sequence": _table((0, 0, size, content)),
-            "size": size,
-        },
-    )
-    return MemoryFunctions(*(addresses[name] for name in MemoryFunctions._fields))
+def memory_functions(size: int, content: int, converter: object) -> dict[str, int]:
+    """Return addresses of new functions, which live as long as the process, by their names.
 
-
-class _Allocator(ctypes.Structure):
-    """`rcutils_allocator_t`."""
-
-    _fields_ = tuple(
-        (name, c_void_p)
-        for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")
-    )
-
-
-class Allocator(NamedTuple):
-    """Addresses of the functions that give zeroed memory, and take memory back."""
-
-    zeroed: int
-    free: int
+    They know one type of message, and its sequences and arrays. `convert_from_py` and
+    `convert_to_py` are the only ones that need Python: they call `converter[address] = message`
+    and `converter[address]`.
+    """
+    words = {
+        "allocate": allocator().zero_allocate,
+        "deallocate": allocator().deallocate,
+        "set_item": c.c_function("PySequence_SetItem"),
+        "get_item": c.c_function("PySequence_GetItem"),
+        "converter": id(c.keep(converter)),
+        "plan": content or _table(),
+        "sequence": _table((0, 0, size, content)),
+        "size": size,
+    }
+    return c.machine_code("structs", words)
 
 
 @cache
-def allocator() -> Allocator:
-    """Return the allocator that all of rosidl uses."""
+def allocator() -> Any:
+    """Return the allocator (`rcutils_allocator_t`) that all of rosidl uses."""
     default = c.load_library("librcutils.so").rcutils_get_default_allocator
-    default.restype = _Allocator
-    functions = default()
-    return Allocator(functions.zero_allocate, functions.deallocate)
+    default.restype = c.structure(
+        "Allocator", "allocate deallocate reallocate zero_allocate state"
+    )
+    return default()
 
 
 # A table of words says what must be freed in a structure: how many entries, and for
@@ -648,7 +548,7 @@ def content(structure: Structure) -> int:
     return _table(*entries) if entries else 0
 
 
-def element_content(field: Field) -> int:
+def element_content(field: FieldInfo) -> int:
     """Return the table of one element of a field, 0 if there is nothing to free in it."""
     if field.nested:
         return content(field.nested)

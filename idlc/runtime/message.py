@@ -9,23 +9,21 @@ Services and actions are names for their messages, never instances.
 from __future__ import annotations
 
 import sys
+from array import array
 
 from . import codec
-from .errors import MissingPackageError, importing
-from .names import public_name, slot_name, wire_name
-from .objects import (
-    copied,
-    deeply_copied,
-    named_values,
+from .names import (
+    MissingPackageError,
+    importing,
     owner_of,
-    pretty,
-    represented,
-    same,
+    public_name,
+    slot_name,
+    wire_name,
 )
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
     from dataclasses import Field
     from typing import Any, ClassVar, Literal, TypeVar
 
@@ -55,36 +53,17 @@ class OnDemand:
     An error in that is an AttributeError, as code that looks at all attributes of a class expects.
     """
 
-    def __init__(self, make: Callable[[type], Any]) -> None:
-        self._make = make
+    def __init__(self, module: str, function: str) -> None:
+        self._module = f"{__package__}.{module}"
+        self._function = function
 
     def __get__(self, instance: object, owner: type) -> Any:
-        """Return the value."""
+        """Return what a function of the runtime makes for a class."""
         try:
-            return self._make(owner)
+            module = __import__(self._module, fromlist=[self._function])
+            return getattr(module, self._function)(owner)
         except Exception as error:
             raise AttributeError(str(error)) from error
-
-
-def slot_types(kind: type) -> tuple[Any, ...]:
-    """Return SLOT_TYPES of a message class."""
-    from . import typeinfo
-
-    return typeinfo.slot_types(kind)
-
-
-def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
-    """Return `__dataclass_fields__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_fields(kind)
-
-
-def dataclass_params(_kind: type) -> Any:
-    """Return `__dataclass_params__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_params()
 
 
 def _columns() -> Any:
@@ -97,6 +76,139 @@ def _columns() -> Any:
             f"pip install --upgrade 'idlc[recordings]'",
             name=error.name,
         ) from error
+
+
+# comparing, copying and showing messages
+
+#: Values that a copy may share.
+ATOMIC = frozenset({bool, bytes, float, int, str})
+#: Elements up to which Python compares two arrays of numbers before numpy has begun.
+SMALL = 64
+#: Packages that are shown under other names than they are imported by.
+SHOWN: dict[str, str] = {}
+#: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
+_of_numpy: set[type] = set()
+
+
+def equal(message: Any, other: Any) -> bool:
+    """Compare a message with what is not of its class: a copy of it has the same fields."""
+    if hasattr(type(type(other)), "_message"):
+        from .typeinfo import is_copy
+
+        if is_copy(type(message), type(other)):
+            slots: list[str] = owner_of(type(message)).__slots__
+            return all(
+                same(getattr(message, slot), getattr(other, slot)) for slot in slots
+            )
+    return NotImplemented  # type: ignore[no-any-return]
+
+
+def same(mine: Any, other: Any) -> bool:
+    """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
+    kind = type(mine)
+    if kind is array and type(other) is array:
+        if mine.typecode == other.typecode:
+            if mine.typecode in "fd":  # no nan is equal to another
+                return memoryview(mine) == memoryview(other)
+            if len(mine) > SMALL:
+                # only `bytes` and `bytearray` compare memory at once
+                return len(mine) == len(other) and bytearray(mine) == memoryview(other)
+    elif kind in _of_numpy and type(other) is kind and len(mine) <= SMALL:
+        return bool(mine.data == other)
+    elif kind.__module__ == "numpy" or type(other).__module__ == "numpy":
+        import numpy as np
+
+        _of_numpy.add(np.ndarray)
+        return np.array_equal(mine, other)
+    return bool(mine == other)
+
+
+def copied(message: Any) -> Any:
+    """Return a shallow copy."""
+    kind = type(message)
+    if owner_of(kind) is not kind:
+        return _reconstructed(message, lambda value: value)
+    duplicate = object.__new__(kind)
+    for slot in kind.__slots__:
+        setattr(duplicate, slot, getattr(message, slot))
+    return duplicate
+
+
+def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
+    """Return a copy that shares nothing that can change."""
+    from copy import deepcopy
+
+    kind = type(message)
+    if owner_of(kind) is not kind:
+        return _reconstructed(message, lambda value: deepcopy(value, memo), memo)
+    duplicate = memo[id(message)] = object.__new__(kind)
+    for slot in kind.__slots__:
+        value = getattr(message, slot)
+        if type(value) not in ATOMIC:
+            value = deepcopy(value, memo)
+        setattr(duplicate, slot, value)
+    return duplicate
+
+
+def _reconstructed(
+    message: Any, copy_of: Callable[[Any], Any], memo: dict[int, Any] | None = None
+) -> Any:
+    """Return a copy of an instance of a user's subclass, which may have more than slots."""
+    reduced: Any = object.__reduce_ex__(message, 4)
+    state = reduced[2]
+    duplicate = object.__new__(type(message))
+    if memo is not None:
+        memo[id(message)] = duplicate
+    for part in state if isinstance(state, tuple) else (state,):
+        for name, value in (part or {}).items():
+            object.__setattr__(duplicate, name, copy_of(value))
+    return duplicate
+
+
+def represented(message: Any) -> str:
+    """Return a message as rosidl shows it."""
+    parts = []
+    for field in message._fields_and_field_types:
+        value = getattr(message, slot_name(field))
+        shown = value.tolist() if type(value) is array else value
+        parts.append(f"{field}={shown!r}")
+    return f"{_shown_name(type(message))}({', '.join(parts)})"
+
+
+# pprint knows what can be shown field by field from where dataclasses make `__repr__`
+represented.__qualname__ = "__create_fn__.<locals>.__repr__"
+
+
+def _shown_name(kind: type) -> str:
+    """Return a class's name after that of its package, its module left out."""
+    package = kind.__module__.rpartition(".")[0]
+    home, _, last = package.rpartition(".")
+    if home in SHOWN:
+        package = f"{SHOWN[home]}.{last}"
+    return f"{package}.{kind.__name__}" if package else kind.__name__
+
+
+def named_values(message: Any) -> Iterator[tuple[str, Any]]:
+    """Yield each field's Python name and value, those that a user's subclass adds included."""
+    import dataclasses
+
+    for field in dataclasses.fields(message):
+        yield field.name, getattr(message, field.name)
+
+
+def pretty(message: Any, printer: Any, cycle: bool) -> None:
+    """Show a message on as many lines as it takes, with IPython's pretty printer."""
+    name = _shown_name(type(message))
+    if cycle:
+        printer.text(f"{name}(...)")
+        return
+    with printer.group(len(name) + 1, f"{name}(", ")"):
+        for index, (field, value) in enumerate(named_values(message)):
+            if index:
+                printer.text(",")
+                printer.breakable()
+            printer.text(f"{field}=")
+            printer.pretty(value.tolist() if type(value) is array else value)
 
 
 # messages
@@ -189,10 +301,10 @@ class Message(metaclass=MessageMeta):
         SLOT_TYPES: ClassVar[tuple[Any, ...]]
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
-        _codec_ = OnDemand(codec.codecs_of)
-        SLOT_TYPES = OnDemand(slot_types)
-        __dataclass_fields__ = OnDemand(dataclass_fields)
-        __dataclass_params__ = OnDemand(dataclass_params)
+        _codec_ = OnDemand("codec", "codecs_of")
+        SLOT_TYPES = OnDemand("typeinfo", "slot_types")
+        __dataclass_fields__ = OnDemand("conversions", "dataclass_fields")
+        __dataclass_params__ = OnDemand("conversions", "dataclass_params")
 
     @property
     def _check_fields(self) -> bool:
@@ -286,7 +398,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .typeinfo import validate
+        from .checked import validate
 
         validate(self)
 
@@ -544,24 +656,11 @@ class Service(metaclass=ServiceMeta):
     """The base of services: `Request`, `Response` and `Event` are their messages."""
 
     if not TYPE_CHECKING:
-        Event = OnDemand(_event)
+        Event = OnDemand("message", "_event")
 
 
 class Action(metaclass=ActionMeta):
     """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
 
     if not TYPE_CHECKING:
-        Impl = OnDemand(_impl)
-
-
-__all__ = [
-    "Action",
-    "Imported",
-    "InterfaceMeta",
-    "Message",
-    "MessageMeta",
-    "Package",
-    "Service",
-    "complete",
-    "define",
-]
+        Impl = OnDemand("message", "_impl")

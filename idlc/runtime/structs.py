@@ -18,22 +18,14 @@ from array import array
 from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_void_p
 from functools import cache
 from struct import Struct
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 from . import c, introspection
 from .c import RefusedError
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, functions
-from .introspection import (
-    ARRAY,
-    SCALAR,
-    Field,
-    allocator,
-    c_structure,
-    element_type,
-    placed_fields,
-)
-from .typeinfo import Structure
+from .introspection import allocator, c_structure, element_type, placed_fields
+from .typeinfo import ARRAY, SCALAR, FieldInfo, Structure
 
 _HEADER = 4
 _COUNT = Struct("=I")
@@ -67,36 +59,17 @@ def _put(out: bytearray, data: bytes | memoryview, align: int) -> None:
     out += data
 
 
-class _Runtime(NamedTuple):
-    """Functions of rosidl_runtime_c, and the one that gives zeroed memory."""
-
-    assign: Any
-    assign_wide: Any
-    zeroed: Any
-
-
 @cache
-def _runtime() -> _Runtime:
+def _runtime() -> tuple[Any, Any, Any]:
+    """Return the functions that assign a string, and a wide one, and that give zeroed memory."""
     library = c.load_library("librosidl_runtime_c.so")
-
-    def function(name: str, result: Any, *arguments: Any) -> Any:
-        return PYFUNCTYPE(result, *arguments)((f"rosidl_runtime_c__{name}", library))
-
-    return _Runtime(
-        function("String__assignn", c_bool, c_void_p, c_char_p, c_size_t),
-        function("U16String__assignn", c_bool, c_void_p, c_void_p, c_size_t),
-        PYFUNCTYPE(c_void_p, c_size_t, c_size_t, c_void_p)(allocator().zeroed),
+    assign = PYFUNCTYPE(c_bool, c_void_p, c_char_p, c_size_t)
+    assign_wide = PYFUNCTYPE(c_bool, c_void_p, c_void_p, c_size_t)
+    return (
+        assign(("rosidl_runtime_c__String__assignn", library)),
+        assign_wide(("rosidl_runtime_c__U16String__assignn", library)),
+        PYFUNCTYPE(c_void_p, c_size_t, c_size_t, c_void_p)(allocator().zero_allocate),
     )
-
-
-class Step(Protocol):
-    """Moves one piece of a structure; `base` is the address of the structure."""
-
-    def fill(self, cursor: Cursor, base: int) -> None:
-        """Move from CDR to C memory that is zero."""
-
-    def drain(self, base: int, out: bytearray) -> None:
-        """Append to CDR what C memory holds."""
 
 
 class Run:
@@ -122,7 +95,7 @@ class Text:
 
     def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         text = bytes(cursor.take(cursor.count(), 1))[:-1]
-        _demand(_runtime().assign(base + self.offset, text, len(text)))
+        _demand(_runtime()[0](base + self.offset, text, len(text)))
 
     def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
         data, size = _data_and_size(base + self.offset)
@@ -138,9 +111,7 @@ class WideText(Text):
         count = cursor.count()
         units = array("H", cursor.take(4 * count, 1).cast("I"))
         units.append(0)  # an empty array has no address
-        _demand(
-            _runtime().assign_wide(base + self.offset, units.buffer_info()[0], count)
-        )
+        _demand(_runtime()[1](base + self.offset, units.buffer_info()[0], count))
 
     def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
         data, size = _data_and_size(base + self.offset)
@@ -197,6 +168,11 @@ class Many:
             self.content(count).drain(data, out)
 
 
+#: Moves one piece of a structure from CDR to C memory that is zero (`fill`), or back (`drain`);
+#: `base` is the address of the structure.
+Step = Run | Text | Repeat | Many
+
+
 def _demand(done: bool) -> None:
     if not done:
         raise MemoryError
@@ -213,7 +189,7 @@ def allocate(sequence: int, count: int, stride: int) -> int:
     No function of rosidl_runtime_c does it: each knows one kind of sequence, and there are
     kinds of different sizes.
     """
-    data = _runtime().zeroed(count, stride, None)
+    data = _runtime()[2](count, stride, None)
     _demand(bool(data))
     word = sequence >> 3
     c.WORDS[word] = data
@@ -221,7 +197,7 @@ def allocate(sequence: int, count: int, stride: int) -> int:
     return int(data)
 
 
-def _element_steps(field: Field) -> list[Step]:
+def _element_steps(field: FieldInfo) -> list[Step]:
     """Return the steps of one element that begins at 0."""
     if field.nested:
         return list(steps(field.nested))
@@ -238,7 +214,7 @@ def _moved(step: Step, offset: int) -> Step:
     return Repeat([step], offset, 1, 1)
 
 
-def _field_steps(field: Field, offset: int) -> list[Step]:
+def _field_steps(field: FieldInfo, offset: int) -> list[Step]:
     elements = _element_steps(field)
     stride = ctypes.sizeof(element_type(field))
     if field.shape == SCALAR:
@@ -271,16 +247,11 @@ def _follows(step: Run, last: Run) -> bool:
     )
 
 
-def whole(structure: Structure) -> Step:
-    """Return the step that moves a whole message."""
-    return Repeat(list(steps(structure)), 0, 1, 1)
-
-
 def _converter(cls: Any, structure: Structure) -> object:
     """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
     _, decode = functions(cls)
-    message_step = whole(structure)
+    message_step = Repeat(list(steps(structure)), 0, 1, 1)
 
     def store(address: int, message: Any) -> None:
         try:
@@ -315,19 +286,19 @@ def message(cls: Any, structure: Structure) -> c.MessageSupport:
             "set RMW_IMPLEMENTATION to rmw_fastrtps_cpp, or build the interface package "
             "with colcon"
         ) from error
-    return c.MessageSupport(handle, *addresses[:4])
+    names = ("create", "destroy", "convert_from_py", "convert_to_py")
+    return c.MessageSupport(handle, *map(addresses.__getitem__, names))
 
 
-class _ServiceMembers(ctypes.Structure):
-    """`rosidl_typesupport_introspection_c__ServiceMembers`."""
-
-    _fields_ = (
-        ("namespace", ctypes.c_char_p),
-        ("name", ctypes.c_char_p),
-        ("request", ctypes.c_void_p),
-        ("response", ctypes.c_void_p),
-        ("event", ctypes.c_void_p),
-    )
+#: `rosidl_typesupport_introspection_c__ServiceMembers`.
+_ServiceMembers = c.structure(
+    "ServiceMembers",
+    namespace=c_char_p,
+    name=c_char_p,
+    request=c_void_p,
+    response=c_void_p,
+    event=c_void_p,
+)
 
 
 def service(name: str, *handles: int) -> tuple[int, int]:
@@ -338,4 +309,4 @@ def service(name: str, *handles: int) -> tuple[int, int]:
         for handle in handles
     ]
     data = _ServiceMembers(f"{package}__{kind}".encode(), short.encode(), *members)
-    return introspection.library().identifier, c.pointer(data)
+    return introspection.library()[0], c.pointer(data)

@@ -7,25 +7,16 @@ It serves all but the fast path: `validate`, `to_dict` and `from_dict`, the word
 from __future__ import annotations
 
 import json
-import math
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from .cdr import NATIVE, order_of
-from .errors import (
-    DecodeError,
-    FieldRangeError,
-    FieldTypeError,
-    ValidationError,
-    importing,
-)
-from .names import public_name, slot_name, wire_name
+from .names import DecodeError, importing, public_name, slot_name, wire_name
 
 
 class Primitive(NamedTuple):
@@ -64,52 +55,46 @@ PRIMITIVES = {
     15: Primitive("bool", 1, "?"),
     16: Primitive("byte", 1, "c"),
 }
+SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
 STRING_IDS = {17, 18, 21, 22}
 WIDE_IDS = {18, 22}
 DUMMY = "structure_needs_at_least_one_member"
 
 
-class FieldInfo(NamedTuple):
-    """A field's type.
+class FieldInfo:
+    """A field and its type, from what ROS 2 says of a member; attributes are about one element.
 
-    Exactly one of `primitive`, `text` and `nested` is set. An array has `size`, a sequence
-    `is_sequence` and perhaps `bound`; `text_bound` is a string's own limit.
+    Exactly one of `primitive`, `text` and `nested` is set; `text_bound` is a string's own limit.
+    An array has `size`, a sequence `is_sequence` and perhaps `bound`.
     """
 
-    name: str
-    primitive: Primitive | None
-    text: bool
-    wide: bool
-    text_bound: int | None
-    nested: Structure | None
-    size: int | None
-    is_sequence: bool
-    bound: int | None
-
-    @property
-    def slot(self) -> str:
-        """The slot that holds the value."""
-        return slot_name(self.name)
-
-    @property
-    def public(self) -> str:
-        """The attribute's public name."""
-        return public_name(self.name)
-
-    @property
-    def is_list(self) -> bool:
-        """True if the value holds elements."""
-        return self.is_sequence or self.size is not None
-
-    @property
-    def is_numeric(self) -> bool:
-        """True if an element is an integer or float."""
-        return self.primitive is not None and self.primitive.code not in "?c"
+    def __init__(self, member: Mapping[str, Any], nested: Structure | None) -> None:
+        kind = member["type"]
+        self.name: str = member["name"]
+        self.default: str = member["default_value"]
+        self.type_id: int = kind["type_id"]
+        self.capacity: int = kind["capacity"]
+        self.text_bound: int | None = kind["string_capacity"] or None
+        #: The type id of an element, and SCALAR, ARRAY, BOUNDED_SEQUENCE or SEQUENCE.
+        self.shape, self.base = divmod(self.type_id, 48)
+        self.nested = nested
+        self.primitive = PRIMITIVES.get(self.base)
+        self.text = self.base in STRING_IDS
+        self.wide = self.base in WIDE_IDS
+        self.size = self.capacity if self.shape == ARRAY else None
+        self.is_sequence = self.shape > ARRAY
+        self.bound = self.capacity if self.shape == BOUNDED_SEQUENCE else None
+        self.slot = slot_name(self.name)
+        self.public = public_name(self.name)
+        self.is_list = self.shape != SCALAR
+        self.is_numeric = self.primitive is not None and self.primitive.code not in "?c"
 
 
 class Types:
     """What a package says of types, its own and all that they refer to, in `_type_data.py`.
 
+    Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
+    imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
     Packages may describe types of one name in different ways, so nothing is kept by names alone.
     """
 
@@ -138,8 +123,6 @@ class Structure:
     def __init__(self, types: Types, name: str) -> None:
         self.types = types
         self.name = name
-        #: The members as ROS 2 describes them, a dummy one included.
-        self.members: list[dict[str, Any]] = types.descriptions[name]["fields"]
 
     @property
     def is_own(self) -> bool:
@@ -160,27 +143,18 @@ class Structure:
         return import_module(around.removesuffix("."), self.types.home)
 
     @cached_property
-    def fields(self) -> tuple[FieldInfo, ...]:
-        """The fields, the dummy member left out."""
+    def members(self) -> tuple[FieldInfo, ...]:
+        """The fields as ROS 2 describes them, a dummy one included."""
         return tuple(
-            self._field(member) for member in self.members if member["name"] != DUMMY
+            FieldInfo(member, self.types[nested] if nested else None)
+            for member in self.types.descriptions[self.name]["fields"]
+            for nested in (member["type"]["nested_type_name"],)
         )
 
-    def _field(self, member: dict[str, Any]) -> FieldInfo:
-        type_ = member["type"]
-        shape, element = divmod(type_["type_id"], 48)
-        nested = type_["nested_type_name"]
-        return FieldInfo(
-            name=member["name"],
-            primitive=PRIMITIVES.get(element),
-            text=element in STRING_IDS,
-            wide=element in WIDE_IDS,
-            text_bound=type_["string_capacity"] or None,
-            nested=self.types[nested] if nested else None,
-            size=type_["capacity"] if shape == 1 else None,
-            is_sequence=shape > 1,
-            bound=type_["capacity"] if shape == 2 else None,
-        )
+    @cached_property
+    def fields(self) -> tuple[FieldInfo, ...]:
+        """The fields of messages."""
+        return tuple(field for field in self.members if field.name != DUMMY)
 
     @cached_property
     def least(self) -> int:
@@ -222,9 +196,12 @@ def _structure_of(owner: type) -> Structure:
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
-def type_name(kind: type) -> str:
-    """Return a generated class's full name, package/kind/Name."""
-    return structure_of(kind).name
+def is_copy(kind: type, other: type) -> bool:
+    """Return whether two generated classes are of one type, as those of two libraries may be."""
+    owner, others = (getattr(type(each), "_message", None) for each in (kind, other))
+    if owner is None or others is None or owner.__name__ != others.__name__:
+        return False
+    return structure_of(owner).hash == structure_of(others).hash
 
 
 def slot_types(kind: type) -> tuple[Any, ...]:
@@ -242,31 +219,23 @@ def slot_types(kind: type) -> tuple[Any, ...]:
     return tuple(_slot_type(definition, field) for field in structure_of(kind).fields)
 
 
+#: The names of primitives in rosidl_parser, where these are others.
+_BASIC = {"bool": "boolean", "byte": "octet", "float32": "float", "float64": "double"}
+
+
 def _slot_type(definition: Any, field: FieldInfo) -> Any:
-    element: Any
     if field.nested:
-        package, kind, short = field.nested.name.split("/")
-        element = definition.NamespacedType([package, kind], short)
-    elif field.text and field.text_bound is not None:
-        bounded = definition.BoundedWString if field.wide else definition.BoundedString
-        element = bounded(field.text_bound)
-    elif field.text:
-        element = (
-            definition.UnboundedWString()
-            if field.wide
-            else definition.UnboundedString()
-        )
+        *namespaces, short = field.nested.name.split("/")
+        element = definition.NamespacedType(namespaces, short)
+    elif field.primitive:
+        name = field.primitive.name
+        element = definition.BasicType(_BASIC.get(name, name))
     else:
-        assert field.primitive is not None
-        names = {
-            "bool": "boolean",
-            "byte": "octet",
-            "float32": "float",
-            "float64": "double",
-        }
-        element = definition.BasicType(
-            names.get(field.primitive.name, field.primitive.name)
-        )
+        name = "WString" if field.wide else "String"
+        if field.text_bound is None:
+            element = getattr(definition, f"Unbounded{name}")()
+        else:
+            element = getattr(definition, f"Bounded{name}")(field.text_bound)
     if field.size is not None:
         return definition.Array(element, field.size)
     if field.bound is not None:
@@ -280,99 +249,6 @@ def spelling_hint(name: str, names: list[str]) -> str:
     return f"; did you mean {matches[0]!r}?" if matches else ""
 
 
-# checking values
-
-
-def validate(message: Any, *, wire_only: bool = False) -> None:
-    """Raise ValidationError for the first value that its field cannot hold.
-
-    `wire_only` leaves out what the wire does not enforce: the bounds of strings.
-    """
-    _message(message, structure_of(type(message)), "", wire_only)
-
-
-def validate_field(value: Any, field: FieldInfo) -> None:
-    """Raise ValidationError if a field, which is named by its path, cannot hold a value."""
-    check = _list if field.is_list else _element
-    check(value, field, field.public, wire_only=True)
-
-
-def validate_element(value: Any, field: FieldInfo) -> None:
-    """Raise ValidationError if a field, or a list in it, cannot hold a value."""
-    _element(value, field, field.public, wire_only=False)
-
-
-def validate_count(values: Any, field: FieldInfo) -> None:
-    """Raise ValidationError if a field cannot hold so many values."""
-    _count(values, field, field.public)
-
-
-def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> None:
-    for field in structure.fields:
-        place = inner_path(path, field.public)
-        if not hasattr(message, field.slot):
-            raise ValidationError(path or "message", f"a {structure.name}", message)
-        value = getattr(message, field.slot)
-        if field.is_list:
-            _list(value, field, place, wire_only)
-        else:
-            _element(value, field, place, wire_only)
-
-
-def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
-    if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
-        raise ValidationError(path, "a sequence", values)
-    _count(values, field, path)
-    if field.primitive is not None and _holds(values, field.primitive):
-        return
-    for index, value in enumerate(values):
-        _element(value, field, f"{path}[{index}]", wire_only)
-
-
-def _count(values: Any, field: FieldInfo, path: str) -> None:
-    if field.size is not None and len(values) != field.size:
-        problem = f"has {counted(len(values), 'element')}, needs {field.size}"
-        raise ValidationError(path, f"{field.size} elements", values, problem)
-    if field.bound is not None and len(values) > field.bound:
-        _too_many(path, "element", len(values), field.bound, values)
-
-
-def _holds(values: Any, primitive: Primitive) -> bool:
-    """Return whether an array's own type already says that all elements fit."""
-    if primitive.code in "?c":
-        return isinstance(values, (bytes, bytearray))
-    if isinstance(values, array):
-        return values.typecode == primitive.code
-    dtype = getattr(values, "dtype", None)
-    return dtype is not None and dtype.name == primitive.name and values.ndim == 1
-
-
-def _element(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
-    if field.nested:
-        _message(value, field.nested, path, wire_only)
-    elif field.text:
-        _text(value, field, path, wire_only)
-    else:
-        assert field.primitive is not None
-        _primitive(value, field.primitive, path)
-
-
-def _text(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
-    if not isinstance(value, str):
-        raise ValidationError(path, "a str", value)
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise ValidationError(path, "a str without lone surrogates", value) from None
-    if not wire_only and field.text_bound is not None and len(value) > field.text_bound:
-        _too_many(path, "character", len(value), field.text_bound, value)
-
-
-def _too_many(path: str, what: str, count: int, bound: int, value: object) -> None:
-    problem = f"has {counted(count, what)}, at most {bound} are allowed"
-    raise ValidationError(path, f"at most {counted(bound, what)}", value, problem)
-
-
 def inner_path(path: str, name: object) -> str:
     """Return the path of a field or key in what is at a path."""
     return f"{path}.{name}" if path else str(name)
@@ -381,85 +257,6 @@ def inner_path(path: str, name: object) -> str:
 def counted(count: int, what: str) -> str:
     """Return a number of things in words."""
     return f"{count} {what}{'s' * (count != 1)}"
-
-
-def _primitive(value: Any, primitive: Primitive, path: str) -> None:
-    if primitive.code == "?":
-        number = isinstance(value, (int, float)) and value in (0, 1)
-        if not number and type(value).__name__ not in {"bool_", "bool"}:
-            raise ValidationError(path, primitive.allowed, value)
-    elif primitive.code == "c":
-        if not isinstance(value, bytes) or len(value) != 1:
-            raise ValidationError(path, primitive.allowed, value)
-    elif primitive.code in "fd":
-        _float(value, primitive, path)
-    else:
-        _integer(value, primitive, path)
-
-
-def _integer(value: Any, primitive: Primitive, path: str) -> None:
-    try:
-        number = value.__index__()
-    except (AttributeError, TypeError):
-        raise ValidationError(path, primitive.allowed, value) from None
-    assert primitive.low is not None
-    assert primitive.high is not None
-    if not primitive.low <= number <= primitive.high:
-        raise ValidationError(path, primitive.allowed, value)
-
-
-def _float(value: Any, primitive: Primitive, path: str) -> None:
-    try:
-        number = float(value) if not isinstance(value, (str, bytes)) else None
-    except (TypeError, ValueError, OverflowError):
-        number = None
-    if number is None:
-        raise ValidationError(path, f"a number ({primitive.name})", value)
-    if primitive.high is None or not math.isfinite(number):
-        return
-    if abs(number) > primitive.high:
-        raise ValidationError(path, primitive.allowed, value)
-
-
-def refused(
-    name: str, kind: str, size: int | None, values: Any, error: Exception
-) -> ValidationError:
-    """Return the error for values that a field of numbers does not take.
-
-    `kind` is the name of their type, or its code in `struct`. `error` is what Python or
-    numpy said, and one of its kind is returned: rosidl's classes raise that.
-    """
-    primitive = next(
-        candidate
-        for candidate in PRIMITIVES.values()
-        if kind in (candidate.code, candidate.name)
-    )
-    field = FieldInfo(
-        name, primitive, False, False, None, None, size, size is None, None
-    )
-    failure = ValidationError(
-        name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
-    )
-    if isinstance(values, (bytes, bytearray)) and size is None:
-        problem = (
-            f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
-        )
-        failure = ValidationError(name, "whole numbers of bytes", values, problem)
-    elif (
-        isinstance(values, (list, tuple))
-        or getattr(values, "ndim", 0) == 1
-        or not hasattr(values, "__len__")
-    ):
-        try:
-            _list(values, field, name, wire_only=True)
-        except ValidationError as exact:
-            failure = exact
-    raised = ValidationError
-    if isinstance(error, OverflowError):
-        raised = FieldRangeError
-    elif isinstance(error, TypeError) or isinstance(values, (str, dict)):
-        raised = FieldTypeError
-    return failure.at(failure.path, raised)  # type: ignore[no-any-return]
 
 
 # reading field by field: the buffers that the fast codecs refuse
@@ -479,15 +276,7 @@ def read_carefully(
         # what a constructor makes may be larger than the buffer
         return maker(kind if other is structure else other.find_class())()
 
-    return _Reader(data, order_of(data), make).message(structure, "")
-
-
-def check_buffer(structure: Structure, data: bytes) -> None:
-    """Raise DecodeError, as `deserialize` does, unless `data` is a message of a type.
-
-    No class is needed, so that those of other packages need not be installed.
-    """
-    _Reader(data, order_of(data), lambda _: SimpleNamespace()).message(structure, "")
+    return CarefulReader(data, order_of(data), make).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:
@@ -497,7 +286,7 @@ def least_element(field: FieldInfo) -> int:
     return 4 if field.primitive is None else field.primitive.size
 
 
-class _Reader:
+class CarefulReader:
     """Goes over a buffer and never further than it has bytes for.
 
     `make` returns what takes the values of a structure.

@@ -15,22 +15,13 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
-from ctypes import (
-    PYFUNCTYPE,
-    c_bool,
-    c_int32,
-    c_int64,
-    c_uint8,
-    c_uint32,
-    c_void_p,
-    py_object,
-)
+from ctypes import PYFUNCTYPE, c_bool, c_void_p, py_object
 from functools import cache
 from importlib import import_module
 from importlib.machinery import PathFinder
 from importlib.util import module_from_spec
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 from . import c, introspection
 from .introspection import has_hashes
@@ -52,38 +43,15 @@ _OF_RCL = {"action_msgs", "lifecycle_msgs", "type_description_interfaces"}
 
 #: What rclpy reads from a message's metaclass, and the names in extensions. The type support
 #: comes last, because its presence says that all is there.
-_MESSAGE_CAPSULES = {
+_MESSAGE = {
     "_CREATE_ROS_MESSAGE": "create_ros_message_msg",
     "_DESTROY_ROS_MESSAGE": "destroy_ros_message_msg",
     "_CONVERT_FROM_PY": "convert_from_py_msg",
     "_CONVERT_TO_PY": "convert_to_py_msg",
     _SUPPORT: "type_support_msg",
 }
-
-
-class _Extension(NamedTuple):
-    """The extension module's part for one class; `suffix` ends all its names."""
-
-    module: ModuleType
-    suffix: str
-
-    def message(self) -> dict[str, object]:
-        """Return the five capsules of a message by the metaclass's attributes."""
-        return {
-            attribute: self._capsule(prefix)
-            for attribute, prefix in _MESSAGE_CAPSULES.items()
-        }
-
-    def service(self) -> object:
-        """Return the capsule of a service."""
-        return self._capsule("type_support_srv")
-
-    def action(self) -> object:
-        """Return the capsule of an action."""
-        return self._capsule("type_support_action")
-
-    def _capsule(self, prefix: str) -> object:
-        return getattr(self.module, f"{prefix}__{self.suffix}")
+_SERVICE = {_SUPPORT: "type_support_srv"}
+_ACTION = {_SUPPORT: "type_support_action"}
 
 
 def _snake(name: str) -> str:
@@ -121,27 +89,21 @@ def _type_hash(support: object, structure: Any) -> str:
     return f"RIHS{value.version:02d}_{bytes(value.value).hex()}"
 
 
-_KINDS = (
-    ("type_support_msg", c.MessageTypeSupport),
-    ("type_support_srv", c.ServiceTypeSupport),
-    ("type_support_action", c.ActionTypeSupport),
-)
-
-
-def _extension(cls: type, described: Structure) -> _Extension | None:
-    """Return the extension module's part for a class, else None if it is absent or outdated."""
-    package, kind, short = described.name.split("/")
+def _built(
+    cls: type, structure: Structure, names: dict[str, str], support_type: Any
+) -> dict[str, object]:
+    """Return an extension's capsules for a class; none if it is absent or outdated."""
+    package, kind, short = structure.name.split("/")
     if cls.__module__.partition(".")[0] != package:
-        return None
+        return {}
     module = _import(package)
-    if module is None:
-        return None
-    suffix = f"{kind}__{_snake(short)}"
-    for prefix, structure in _KINDS:
-        support = getattr(module, f"{prefix}__{suffix}", None)
-        if support and _type_hash(support, structure) == described.hash:
-            return _Extension(module, suffix)
-    return None
+    ending = f"__{kind}__{_snake(short)}"
+    support = getattr(module, names[_SUPPORT] + ending, None)
+    if not support or _type_hash(support, support_type) != structure.hash:
+        return {}
+    return {
+        attribute: getattr(module, name + ending) for attribute, name in names.items()
+    }
 
 
 # type support
@@ -209,13 +171,11 @@ def import_message(cls: Any) -> None:
     """Give `type(cls)` the capsules that rclpy reads from a message class."""
     if _base() is not None:
         _base().register(cls)
-    built = _extension(cls, structure_of(cls))
-    if built:
-        _set_capsules(cls, built.message())
-        return
-    handle, *functions = map(c.capsule, _message(cls))
-    capsules = zip(_MESSAGE_CAPSULES, (*functions, handle), strict=True)
-    _set_capsules(cls, dict(capsules))
+    built = _built(cls, structure_of(cls), _MESSAGE, c.MessageTypeSupport)
+    if not built:
+        handle, *functions = map(c.capsule, _message(cls))
+        built = dict(zip(_MESSAGE, (*functions, handle), strict=True))
+    _set_capsules(cls, built)
 
 
 def import_service(cls: Any) -> None:
@@ -223,24 +183,19 @@ def import_service(cls: Any) -> None:
     request, response = map(_handle, (cls.Request, cls.Response))
     # ROS 2 Humble knows no events, and has no package that they need
     happened = _handle(cls.Event) if has_hashes() else 0
-    built = _extension(cls, structure_of(cls))
-    if built:
-        _set_capsules(cls, {_SUPPORT: built.service()})
-        return
     structure = structure_of(cls)
-    identifier, data = _implementation().service(
-        structure.name, request, response, happened
-    )
-    support = c.ServiceTypeSupport(
-        identifier,
-        data,
-        introspection.library().same_service,
-        request,
-        response,
-        *(_event(cls, happened) if happened else _Event()),
-        introspection.about(structure),
-    )
-    _set_capsules(cls, {_SUPPORT: c.capsule(c.pointer(support))})
+    built = _built(cls, structure, _SERVICE, c.ServiceTypeSupport)
+    if not built:
+        handles = (request, response, happened)
+        support = c.ServiceTypeSupport(
+            *_implementation().service(structure.name, *handles),
+            introspection.library()[2],
+            *handles,
+            *(_event_functions(cls) if happened else (0, 0)),
+            introspection.about(structure),
+        )
+        built = {_SUPPORT: c.capsule(c.pointer(support))}
+    _set_capsules(cls, built)
 
 
 def import_action(cls: Any) -> None:
@@ -260,36 +215,15 @@ def import_action(cls: Any) -> None:
             parts.GoalStatusMessage,
         )
     ]
-    built = _extension(cls, structure_of(cls))
-    if built:
-        _set_capsules(cls, {_SUPPORT: built.action()})
-        return
-    about = introspection.about(structure_of(cls))
-    support = c.ActionTypeSupport(*handles, about)
-    _set_capsules(cls, {_SUPPORT: c.capsule(c.pointer(support))})
+    structure = structure_of(cls)
+    built = _built(cls, structure, _ACTION, c.ActionTypeSupport)
+    if not built:
+        support = c.ActionTypeSupport(*handles, introspection.about(structure))
+        built = {_SUPPORT: c.capsule(c.pointer(support))}
+    _set_capsules(cls, built)
 
 
 # events of service introspection
-
-
-class _EventInfo(ctypes.Structure):
-    """`rosidl_service_introspection_info_t`."""
-
-    _fields_ = (
-        ("event_type", c_uint8),
-        ("sec", c_int32),
-        ("nanosec", c_uint32),
-        ("client_gid", c_uint8 * 16),
-        ("sequence_number", c_int64),
-    )
-
-
-class _Event(NamedTuple):
-    """The event part of a service's type support: all NULL where event messages cannot be had."""
-
-    handle: int = 0
-    create: int = 0
-    destroy: int = 0
 
 
 class _Memory:
@@ -310,7 +244,7 @@ class _Memory:
         return [] if memory is None else [self.fetch(memory)]
 
 
-def _event(cls: Any, handle: int) -> _Event:
+def _event_functions(cls: Any) -> tuple[int, int]:
     """Return how rcl makes and frees messages of a service's Event class.
 
     Both functions are needed as soon as there is a handle: rcl does not check for NULL.
@@ -358,9 +292,9 @@ def _event(cls: Any, handle: int) -> _Event:
             pass
         return True
 
-    info = ctypes.POINTER(_EventInfo)
-    return _Event(
-        handle,
-        c.callback(PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create),
+    info = ctypes.POINTER(c.EventInfo)
+    prototype = PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p)
+    return (
+        c.callback(prototype, create),
         c.callback(PYFUNCTYPE(c_bool, c_void_p, c_void_p), destroy),
     )

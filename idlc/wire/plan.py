@@ -17,10 +17,15 @@ Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 
 
 class Place(msgspec.Struct, frozen=True):
-    """The location of a value: a slot of the object in a local variable, of structure `type`."""
+    """The location of a value: a slot of the object in a local variable, of structure `type`.
+
+    `path` has the names of all fields that lead to it, so that no other field changes it; `local`
+    is the variable of the value.
+    """
 
     owner: str
     slot: str
+    path: str
     local: str
     type: ir.TypeName
 
@@ -153,7 +158,7 @@ FEW = 4
 
 def steps(message: ir.Message, messages: Messages, names: python_names.Locals) -> tuple[Step, ...]:
     """Return the steps of a structure whose object is in the variable `message`."""
-    return tuple(_steps(message, messages, names, "message", ()))
+    return tuple(_steps(message, messages, names, "message", ""))
 
 
 def _steps(
@@ -161,14 +166,15 @@ def _steps(
     messages: Messages,
     names: python_names.Locals,
     owner: str,
-    path: tuple[str, ...],
+    path: str,
 ) -> list[Step]:
     if not message.fields:
         return [Dummy()]
     plan: list[Step] = []
     for field in message.fields:
-        inner = (*path, field.name)
-        place = Place(owner, python_names.slot(field.name), names.shortest(inner), message.name)
+        inner = f"{path}_{field.name}" if path else field.name
+        slot = python_names.slot(field.name)
+        place = Place(owner, slot, inner, names.field(inner), message.name)
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             plan.append(Enter(place, field.type.target, not nested.fields))
@@ -197,8 +203,8 @@ def _step(
             if isinstance(element, ir.String):
                 return Texts(place, element.wide, length, bound)
             if isinstance(element, ir.Ref):
-                item = names.new(f"{place.local}_item")
-                body = _steps(messages[element.target], messages, names, item, (item,))
+                item = names.new(f"{place.path}_item")
+                body = _steps(messages[element.target], messages, names, item, item)
                 return Items(place, element.target, item, tuple(body), length, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
 

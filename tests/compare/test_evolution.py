@@ -75,7 +75,7 @@ def test_the_generated_codec_reads_old_bytes_as_the_reference_does(tmp_path, mon
             try:
                 expected, _ = reference_cdr.decode(new, data, after.messages)
             except reference_cdr.ERRORS:
-                errors = importlib.import_module(f"{package}._idlc.errors")
+                errors = importlib.import_module(f"{package}._idlc")
                 with pytest.raises(errors.DecodeError):
                     getattr(classes, name).deserialize(HEADER + data)
                 failed += 1

@@ -74,7 +74,7 @@ def test_one_field_is_little(tmp_path, monkeypatch, capsys):
     files = [path for path in Path("out").rglob("*") if path.is_file()]
     texts = {path.name: path.read_text(encoding="utf-8") for path in files}
     assert len(files) <= 8
-    assert sum(len(text.splitlines()) for text in texts.values()) <= 164
+    assert sum(len(text.splitlines()) for text in texts.values()) <= 162
     assert len(texts["_idlc.py"].splitlines()) <= 25
 
 
@@ -117,8 +117,8 @@ def test_it_works_with_the_runtime_and_nothing_else(site, tmp_path):
     result = execute(site, tmp_path, code=USE, options=("-I",))
     assert result.stderr == ""
     assert result.stdout.splitlines() == [
-        "idlc_runtime.errors the encapsulation header needs 4 bytes, there are 0 at byte 0",
-        "idlc_runtime.errors names[0]: has 4 characters, at most 3 are allowed",
+        "idlc_runtime.names the encapsulation header needs 4 bytes, there are 0 at byte 0",
+        "idlc_runtime.names names[0]: has 4 characters, at most 3 are allowed",
         "",
     ]
 
@@ -266,7 +266,7 @@ def test_switching_removes_or_writes_the_copy(tmp_path, monkeypatch, capsys):
 def test_an_edited_copy_is_not_removed(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(write(tmp_path / "demo", ONE_FIELD).parent)
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
-    edited = Path("out/demo/_idlc/errors.py")
+    edited = Path("out/demo/_idlc/names.py")
     edited.write_text(edited.read_text(encoding="utf-8") + "#\n", encoding="utf-8")
     assert main(["gen", "demo", "-o", "out/demo", "--runtime", "installed"]) == 1
     assert "IDL613" in capsys.readouterr().err

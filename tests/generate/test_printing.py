@@ -1,4 +1,4 @@
-"""Where a line is broken changes nothing: neither what it says nor what a message holds."""
+"""Names in generated code: of any length, and each from its own field alone."""
 
 import ast
 import random
@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from idlc.generate.python import lines
+from idlc.generate.python.render import render_package
 from tests.support import generated, values
 
 PARTS = {
@@ -45,13 +45,6 @@ def every_kind(length):
     """Return fields of all kinds as text, every other time in reverse."""
     fields = [f"{kind} {named(number, length)}\n" for number, kind in enumerate(KINDS)]
     return "".join(fields[:: 1 if length % 2 else -1])
-
-
-def test_one_target_that_does_not_fit_on_a_line_remains_a_tuple():
-    for width in range(60, 120):
-        name = "x" * (width - len("(,) = read(data)"))
-        found = lines.assign(lines.tuple_of(name), lines.call("read", "data"), 0)
-        assert isinstance(ast.parse("\n".join(found)).body[0].targets[0], ast.Tuple), found
 
 
 @pytest.fixture(scope="module")
@@ -96,3 +89,35 @@ def test_no_line_is_longer_than_its_longest_name_makes_it(lengths):
         [sys.executable, "-m", "ruff", *words], capture_output=True, text=True, check=False
     )
     assert result.returncode == 0, result.stdout
+
+
+FIELDS = """bool flag
+Deep inner
+string data
+float64[] values
+Mixed[] parts
+Number[3] numbers
+uint8[16] key
+byte[] octets
+string size
+"""
+
+
+def names_of(fields):
+    """Return the names that a codec uses, but those of what reads and writes runs of values."""
+    model = generated.model_of("named_msgs", {**PARTS, "msg/All.msg": fields})
+    (codec,) = (f.text for f in render_package(model) if f.path == "msg/_all__codec.py")
+    names = {node.id for node in ast.walk(ast.parse(codec)) if isinstance(node, ast.Name)}
+    return {name for name in names if not name.startswith(("read_", "write_"))}
+
+
+@pytest.mark.parametrize("kind", ["float64", "string", "Mixed", "Number[]"])
+def test_one_more_field_renames_no_other(kind):
+    lines = FIELDS.splitlines(keepends=True)
+    before = names_of(FIELDS)
+    assert {"inner_inner", "data_", "parts_item", "size_"} <= before
+    assert not {name for name in before if name.endswith("_2")}
+    for place in range(len(lines) + 1):
+        for name in ("added", "x", "value", "count"):
+            more = [*lines[:place], f"{kind} {name}\n", *lines[place:]]
+            assert before - names_of("".join(more)) <= {"view", "low", "pad4", "pad8"}

@@ -1,5 +1,6 @@
 """When a run may be left out: idlc's own files count, wherever they stand."""
 
+import json
 import os
 import shutil
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from idlc.diagnostics.report import Report
 from idlc.generate import target
 from idlc.generate.gen import GenOptions, gen
+from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 
@@ -72,6 +74,26 @@ def test_an_edit_of_the_same_size_and_time_is_seen(both, path):
     assert written(both, "a_msgs") == (0, [])
     edited.write_bytes(content)
     assert written(both, "b_msgs") == (0, [])
+
+
+@pytest.mark.parametrize("change", ["another file", "one file more", "one file less"])
+def test_a_copy_of_the_runtime_by_another_idlc_is_replaced(both, change):
+    """Versions between two releases have one number, and theirs may be the newer lock."""
+    out = both / "out" / "b_msgs"
+    before = {path: path.read_bytes() for path in out.rglob("*.py")}
+    record = json.loads((out / "idlc.lock").read_text())
+    if change == "one file less":
+        (out / "_idlc/cdr.py").unlink()
+        del record["outputs"]["_idlc/cdr.py"]
+    else:
+        path = "_idlc/cdr.py" if change == "another file" else "_idlc/older.py"
+        (out / path).write_text("# of another idlc\n")
+        record["outputs"][path] = digest(b"# of another idlc\n")
+    (out / "idlc.lock").write_text(json.dumps(record))
+    done, problems = written(both, "b_msgs")
+    assert problems == []
+    assert done > 0 or change == "one file more"
+    assert {path: path.read_bytes() for path in out.rglob("*.py")} == before
 
 
 def test_other_line_ends_are_no_edit(both):

@@ -89,7 +89,7 @@ def test_folders_and_the_house_stay_small():
     assert len(MODULES) <= MOST_MODULES
     folders = Counter(name_of(path.parent) for path in MODULES.values())
     crowded = {folder for folder, number in folders.items() if number > MOST_IN_A_FOLDER}
-    assert crowded == CROWDED
+    assert crowded <= CROWDED
 
 
 def only_forwards(module: str) -> bool:

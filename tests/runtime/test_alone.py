@@ -102,6 +102,41 @@ def test_the_support_package_imports_nothing_of_idlc():
             assert found <= allowed, path.name
 
 
+def test_a_package_does_not_become_heavier():
+    """Everybody who generates a package commits this, and reviews it."""
+    modules = list((ROOT / "idlc" / "runtime").rglob("*.py"))
+    assert {path.parent.name for path in modules} == {"runtime"}
+    assert len(modules) <= 16
+    text = "".join(path.read_text(encoding="utf-8") for path in modules)
+    assert text.count("\n") <= 5200
+    assert len(text.encode()) <= 200_000
+    example = ROOT / "examples/my_robot_controller/my_robot_controller/_idlc"
+    assert (
+        len([path for path in example.rglob("*") if path.suffix != ".pyc" and path.is_file()]) <= 17
+    )
+
+
+def test_columns_need_idlc_and_one_sentence_says_so(folder):
+    """In a fresh environment, as on a robot."""
+    result = run(
+        folder,
+        """
+from plain_msgs.msg import Plain
+for read in (Plain.to_columns, Plain.to_arrow):
+    try:
+        read([Plain().serialize()])
+    except ImportError as error:
+        print(error.name, error)
+""",
+    )
+    assert result.stderr == ""
+    sentence = (
+        "idlc columns are read by idlc, which cannot be imported (No module named 'idlc'): "
+        "pip install --upgrade 'idlc[recordings]'\n"
+    )
+    assert result.stdout == 2 * sentence
+
+
 def test_it_may_be_part_of_another_package(folder, tmp_path):
     generated.write_package(tmp_path / "robot", "plain_msgs", PLAIN)
     result = run(

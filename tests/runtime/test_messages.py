@@ -1,7 +1,6 @@
 """What a generated class offers to who uses it."""
 
 import copy
-import ctypes
 import dataclasses
 import json
 import math
@@ -196,23 +195,6 @@ def test_equality_looks_at_every_element():
         hash(robot())
 
 
-@pytest.fixture(params=["ctypes", "no ctypes", "no memcmp"])
-def memory(request, monkeypatch):
-    """Compare memory as where ctypes is loaded, where it is not, and as on Windows."""
-    objects = sys.modules["robot_msgs._idlc.objects"]
-    monkeypatch.setattr(objects, "_memcmp_function", None)
-    if request.param == "no ctypes":
-        monkeypatch.delitem(sys.modules, "ctypes")
-    elif request.param == "no memcmp":
-        monkeypatch.setattr(ctypes.PyDLL, "__getitem__", not_there)
-    yield
-    assert (objects._memcmp_function is not None) == (request.param == "ctypes")
-
-
-def not_there(library, name):
-    raise AttributeError(name)
-
-
 @pytest.mark.parametrize("size", [1, 64, 65, 1 << 16, (1 << 16) + 1, 200_000])
 @pytest.mark.parametrize("at", [0, -1])
 @pytest.mark.parametrize(("kind", "field"), [("Robot", "image"), ("Many", "ticks")])
@@ -227,7 +209,7 @@ def test_equality_of_arrays_of_every_size(kind, field, size, at):
     assert kind(**{field: data}) == kind(**{field: data})
 
 
-def test_equality_of_long_arrays_wherever_memory_is_compared(memory):
+def test_equality_of_long_arrays():
     data = bytearray(300_000)
     mine = robot(image=data)
     assert mine == robot(image=data)

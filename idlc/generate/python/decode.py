@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from idlc.generate.python.lines import Comprehension, Group, Node, call, tuple_of
+from idlc.generate.python.lines import Comprehension, Group, call
 from idlc.generate.python.positions import START, Block, Cursor, Emitter, Line, Statement, Tables
 from idlc.model import ir
 from idlc.wire import plan
@@ -22,16 +22,18 @@ TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
 class UnpackedGroup:
-    """Fixed-size values that are read together."""
+    """Fixed-size values that are read together; `path` is that of the first."""
 
     def __init__(self) -> None:
+        self.path = ""
         self.fields: list[str] = []
         self.targets: list[str] = []
         self.sizes: list[tuple[int, int]] = []
         self.after: list[Statement] = []
 
-    def add(self, token: str, align: int, size: int, target: str = "") -> None:
-        """Add a value of `size` bytes, stored in `target`."""
+    def add(self, token: str, align: int, size: int, target: str, path: str) -> None:
+        """Add a value of `size` bytes, stored in `target` unless that is empty."""
+        self.path = self.path or path
         self.fields.append(token)
         self.sizes.append((align, size))
         if target:
@@ -45,9 +47,9 @@ class UnpackedGroup:
             cursor = cursor.skip(cursor.alignment.padding(align) + size)
         return cursor
 
-    def assignment(self, value: Group) -> Line:
+    def assignment(self, value: str) -> Line:
         """Return the statement that reads the values."""
-        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
+        return Line(value, Group("", tuple(self.targets))) if self.targets else Line(value)
 
 
 class UnpackBuilder(Emitter):
@@ -83,11 +85,11 @@ class UnpackBuilder(Emitter):
             self.line(f"words[{self.position.text(4)} >> 2]", group.targets[0])
             self.position = group.skipped(self.position)
         elif self.position.alignment.knows(widest):
-            reader = self.tables.reader(fields, self.position.alignment.residue)
+            reader = self.tables.reader(group.path, fields, self.position.alignment.residue)
             self.body.append(group.assignment(call(reader, "data", offset)))
             self.position = group.skipped(self.position)
         else:
-            table = f"{self.tables.reader(fields, None)}[{offset} & 7]"
+            table = f"{self.tables.reader(group.path, fields, None)}[{offset} & 7]"
             struct = table if last else "struct"
             if not last:
                 self.line(table, struct)
@@ -116,14 +118,14 @@ class UnpackBuilder(Emitter):
             self.line(value, base)
         self.position = self.position.at(base, offset)
 
-    def number(self, target: str) -> None:
+    def number(self, target: str, path: str) -> None:
         """Read a count or size into a variable, together with the numbers before it."""
-        self.group.add("I", 4, 4, target)
+        self.group.add("I", 4, 4, target, path)
         self.flush()
 
-    def count(self, bound: int | None) -> str:
+    def count(self, bound: int | None, path: str) -> str:
         """Read the count of a sequence and check its upper limit."""
-        self.number("count")
+        self.number("count", path)
         if bound is not None:
             self.body.append(Block(f"if count > {bound}:", TOO_MANY))
         return "count"
@@ -233,11 +235,10 @@ class _Decoder(UnpackBuilder):
             case plan.Enter(place, type_):
                 self.body += self.make_nested(place, type_)
             case plan.Text(place, wide):
-                self.line(self.wide_text() if wide else self.text(), place.text)
+                self.line(self.wide_text(place) if wide else self.text(place), place.text)
             case plan.Bytes(place, primitive, bound):
-                name = f"read_{plan.LIST_PRIMITIVES[primitive]}"
-                raw = self.buffer(self.count(bound), 1, 1, self.source)
-                self.line(call(self.tables.function(name, name), raw), place.text)
+                raw = self.buffer(self.count(bound, place.path), 1, 1, self.source)
+                self.line(call(self.tables.list_reader(primitive), raw), place.text)
             case plan.Numbers():
                 self.numbers(step)
             case plan.Texts():
@@ -251,13 +252,13 @@ class _Decoder(UnpackBuilder):
         """Add a value to a group."""
         match step:
             case plan.Number(place, letter, size):
-                group.add(letter, size, size, place.text)
+                group.add(letter, size, size, place.text, place.path)
             case plan.Block(place):
-                group.add(step.token, step.unit, step.size, place.local)
+                group.add(step.token, step.unit, step.size, place.local, place.path)
                 reader = self.tables.block_reader(step)
                 group.after.append(Line(call(reader, place.local), place.text))
             case _:
-                group.add("x", 1, 1)
+                group.add("x", 1, 1, "", "nothing")
 
     def make_nested(self, place: plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
         """Return the statements that make a nested object."""
@@ -265,7 +266,7 @@ class _Decoder(UnpackBuilder):
 
     # Values of variable size.
 
-    def text(self) -> Node:
+    def text(self, place: plan.Place) -> str:
         """Read the size of a string; return the expression that reads the string.
 
         The last byte must be zero; reading it checks the bounds.
@@ -277,7 +278,7 @@ class _Decoder(UnpackBuilder):
             start = self.start()
             size = f"words[{start} >> 2]"
         else:
-            self.number(size)
+            self.number(size, place.path)
             start = self.start()
         self.line(f"{self.position.text(-1)} + {size}", "end")
         self.body.append(Block("if data[end]:", UNENDED))
@@ -286,18 +287,17 @@ class _Decoder(UnpackBuilder):
             return call("to_str", f"chars{slice_of(start)}")
         return call(self.tables.text(), f"data{slice_of(start)}")
 
-    def wide_text(self) -> Node:
+    def wide_text(self, place: plan.Place) -> str:
         """Read the size of a wstring; return the expression that reads the wstring."""
-        self.number("count")
+        self.number("count", place.path)
         raw = self.buffer("count", 4, 4, "data")
         return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
 
     def numbers(self, step: plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
-        raw = self.buffer(self.count(step.bound), step.unit, step.unit, "view")
-        kind = self.foreign.get(step.place.type)
-        reading = f"reading.of({kind})" if kind else "reading"
-        self.line(call(self.tables.sequence_reader(step, reading), raw), step.place.text)
+        raw = self.buffer(self.count(step.bound, step.place.path), step.unit, step.unit, "view")
+        foreign = self.foreign.get(step.place.type)
+        self.line(call(self.tables.sequence_reader(step, foreign), raw), step.place.text)
 
     def block(self, step: plan.Block) -> None:
         """Read a large array of fixed size as one buffer."""
@@ -312,7 +312,7 @@ class _Decoder(UnpackBuilder):
     def begin(self, step: plan.Texts | plan.Items) -> str:
         """Read the count, or return the size."""
         if step.size is None:
-            return self.count(step.bound)
+            return self.count(step.bound, step.place.path)
         self.flush()
         return str(step.size)
 
@@ -322,7 +322,7 @@ class _Decoder(UnpackBuilder):
         self.align(4)
         reader = self.tables.texts_reader(step)
         texts = call(reader, "data", self.position.text(), count)
-        self.line(texts, tuple_of(step.place.text, "end"))
+        self.line(texts, f"{step.place.text}, end")
         self.position = Cursor("end", 0, multiple_of(4 if step.wide else 1))
 
     def items(self, step: plan.Items) -> None:
@@ -352,7 +352,7 @@ class _Decoder(UnpackBuilder):
         # not within a loop: it goes over all that follows
         if many and not worded and self.source == "data" and not self.looping:
             strings = call(self.tables.strings(), "data", self.position.text())
-            self.line(strings, tuple_of("words", "chars", "to_str"))
+            self.line(strings, "words, chars, to_str")
             self.worded = True
         self.loop(f"for {step.item} in {step.place.local}:", element)
         self.worded = worded
@@ -371,10 +371,10 @@ class _Decoder(UnpackBuilder):
                 entered += self.make_nested(part.place, part.type)
             else:
                 self.fixed(part, group)
-        reader = self.tables.rows("".join(group.fields))
+        reader = self.tables.rows(step.item, "".join(group.fields))
         values = self.tables.local(f"{step.item}_values") if group.targets else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
-        stored = [Line(values, tuple_of(*group.targets))] if group.targets else []
+        stored = [Line(values, Group("", tuple(group.targets)))] if group.targets else []
         body = (
             Line(f"{self.makers[step.type]}()", step.item),
             Line(call(f"{step.place.local}.append", step.item)),

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import msgspec
 
-from idlc.generate.python.lines import Comprehension, Group, Node, call, tuple_of
+from idlc.generate.python.lines import Comprehension, Group, Node, call
 from idlc.generate.python.positions import (
     Block,
     Emitter,
@@ -34,10 +34,14 @@ _POSITIONS = re.compile(r"\b(?:at|low)\b")
 
 
 class PackedGroup:
-    """Fixed-size values that follow each other, with at most one text: one Struct."""
+    """Fixed-size values that follow each other, with at most one text: one Struct.
+
+    `path` is that of the first value.
+    """
 
     def __init__(self, start: Position) -> None:
         self.start = start.alignment
+        self.path = ""
         self.fields: list[str] = []
         self.values: list[Node] = []
         self.text_size = ""
@@ -68,18 +72,19 @@ class PackBuilder(Emitter):
         match step:
             case plan.Number(place, "?"):
                 truths = self.tables.function("truths", "TRUTHS")
-                self.field("?", 1, 1, f"{truths}[{place.text}]")
+                self.field("?", 1, 1, f"{truths}[{place.text}]", place.path)
             case plan.Number(place, letter, size):
-                self.field(letter, size, size, place.text)
+                self.field(letter, size, size, place.text, place.path)
             case plan.Block(place):
                 value = call(self.tables.block_writer(step), place.text)
-                self.field(step.token, step.unit, step.size, value)
+                self.field(step.token, step.unit, step.size, value, place.path)
             case _:
-                self.field("x", 1, 1)
+                self.field("x", 1, 1, None, "nothing")
 
-    def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
+    def field(self, token: str, align: int, size: int, value: Node | None, path: str) -> None:
         """Add a value to the group."""
         group = self.group
+        group.path = group.path or path
         group.fields.append(token)
         group.widest = max(group.widest, align)
         if value is not None:
@@ -91,10 +96,10 @@ class PackBuilder(Emitter):
         """Add a string to the group; a group has at most one."""
         if self.group.text_size:
             self.flush(4)
-        size = self.tables.local(f"{place.local}_size")
+        size = self.tables.local(f"{place.path}_size")
         self.line(f"{place.text}.encode()", place.local)
         self.line(call("len", place.local), size)
-        self.field("I", 4, 4, f"{size} + 1")
+        self.field("I", 4, 4, f"{size} + 1", place.path)
         self.group.fields.append("*")
         self.group.values.append(place.local)
         self.group.text_size = size
@@ -110,7 +115,7 @@ class PackBuilder(Emitter):
             group.widest = max(group.widest, align)
             phase = group.phase()
             start = None if phase else group.start.residue
-            writer = self.tables.writer("".join(group.fields), bool(group.text_size), start, align)
+            writer = self.tables.writer(group.path, "".join(group.fields), start, align)
             key = f"[{group.text_size}]" if group.text_size else ""
             method = ".pack" if phase and not key else ""
             self.put(Group(f"{writer}{phase}{key}{method}", tuple(group.values)), phase)
@@ -173,7 +178,7 @@ NONE: frozenset[str] = frozenset()
 def encode(steps: tuple[plan.Step, ...], tables: Tables, indent: int) -> list[str]:
     """Return the lines that write a message; what they use is defined in `tables`."""
     encoder = _Encoder(tables, Position(Alignment()))
-    encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
+    encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"), "head")
     for step in steps:
         encoder.step(step)
     encoder.flush(1)
@@ -208,7 +213,7 @@ class _Encoder(PackBuilder):
                     self.text(place)
             case plan.Bytes(place, primitive, bound):
                 function = plan.LIST_PRIMITIVES[primitive]
-                writer = self.tables.function(function, function)
+                writer = self.tables.function(f"{function}_of", function)
                 self.buffer(place, call(writer, place.text), 1, bound)
             case plan.Numbers():
                 self.numbers(step)
@@ -243,7 +248,7 @@ class _Encoder(PackBuilder):
         self.line(value, local)
         self.bound(f"len({local})", bound)
         count = f"len({local})" if unit == 1 else f"len({local}) // {unit}"
-        self.field("I", 4, 4, count)
+        self.field("I", 4, 4, count, place.path)
         self.flush(1)
         self.put(local)
         self.position.skip(f"len({local})", unit)
@@ -252,7 +257,7 @@ class _Encoder(PackBuilder):
     def numbers(self, step: plan.Numbers) -> None:
         """Emit a numeric sequence."""
         local = step.place.local
-        count = self.tables.local(f"{local}_count")
+        count = self.tables.local(f"{step.place.path}_count")
         if self.looping:
             self.line(call(self.tables.sequence_copier(step), step.place.text), local)
             self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
@@ -264,7 +269,7 @@ class _Encoder(PackBuilder):
             self.line(f"len({local})", count)
             self.again.append(f"len({local}) != {count}")
         self.bound(count, step.bound)
-        self.field("I", 4, 4, count)
+        self.field("I", 4, 4, count, step.place.path)
         self.flush(1)
         repeat = plan.Fixed(step.unit, step.unit, step.unit)
         self.elements(local, count, repeat, unless=count)
@@ -283,14 +288,15 @@ class _Encoder(PackBuilder):
         """Emit the check of a size, or the count."""
         self.bound(count, step.bound)
         if step.size is None:
-            self.field("I", 4, 4, count)
+            self.field("I", 4, 4, count, step.place.path)
         else:
             self.check(f"{count} != {step.size}", "wrong number of elements")
 
     def rows(self, step: plan.Items) -> None:
         """Emit structures of strings: sizes and ends are looked up, all is encoded once."""
         local = step.place.local
-        rows, block = self.tables.local(f"{local}_rows"), self.tables.local(f"{local}_block")
+        path = step.place.path
+        rows, block = self.tables.local(f"{path}_rows"), self.tables.local(f"{path}_block")
         sized = self.tables.function("sized", "sizes(order)")
         ended = self.tables.function("ended", "ENDS")
         places = [part.place for part in step.body if isinstance(part, plan.Text)]
@@ -300,12 +306,11 @@ class _Encoder(PackBuilder):
             for part in (f"{sized}[len({name})]", name, f"{ended}[len({name})]")
         ]
         lines = [Line(place.text, place.local) for place in places]
-        lines.append(Line(tuple_of(*parts), rows, "+="))
+        lines.append(Line(Group("", tuple(parts)), rows, "+="))
         loop = f"for {step.item} in {local}"
-        values = tuple_of(*(place.text for place in places))
-        each = self.tables.local("each")
-        texts = Comprehension(each, ((step.item, local), (each, values)))
-        unsized = call(self.tables.function("unsized", "unsized"), texts)
+        values = Group("", tuple(place.text for place in places)).flat()
+        texts = Comprehension("each", ((step.item, local), ("each", values)))
+        unsized = call(self.tables.function("unsized", "unsized"), texts.flat())
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
         attempt = Block("try:", (Block(f"{loop}:", tuple(lines)),))
@@ -341,9 +346,9 @@ class _Encoder(PackBuilder):
         inner = _Encoder(self.tables, Position(Alignment(8, 4)))
         for part in inlined(step):
             inner.fixed(part)
-        writer = self.tables.writer("".join(inner.group.fields), False, 4, 1)
+        writer = self.tables.writer(step.item, "".join(inner.group.fields), 4, 1)
         row = Group(writer, tuple(inner.group.values))
-        block = self.tables.local(f"{local}_block")
+        block = self.tables.local(f"{step.place.path}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
         blocks = Comprehension(row, ((step.item, local),))
         self.line(Group(f'b"{gap}".join', (blocks,)), block)

@@ -15,6 +15,7 @@ import msgspec
 
 from idlc.generate.python.lines import Group, Node, any_of, assign, call, layout_lines
 from idlc.model import ir, python_names
+from idlc.model.names import snake_case
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
@@ -279,7 +280,7 @@ def function(body: tuple[Statement, ...], indent: int, again: tuple[str, ...]) -
             begun = True
             result.extend(assign("parts", Group("", parts, brackets="[]"), indent))
             if not last:
-                result.extend(assign("put", "parts.append", indent))
+                result.append(f"{' ' * indent}put = parts.append")
         else:
             for part in parts:
                 result.extend(layout_lines(Group("put", (part,)), indent))
@@ -352,40 +353,44 @@ class Tables:
 
     def ordered_call(self, name: str, function: str, *arguments: str, after: str = "") -> str:
         """Return the name of a runtime function's result for the byte order."""
-        value = Group(f"_idlc.{function}", ("order", *arguments), after)
-        return self.define(name, (function, *arguments, after), value)
+        value = call(f"_idlc.{function}", "order", *arguments) + after
+        return self.define(name, (name, value), value)
 
     def function(self, name: str, expression: str) -> str:
         """Return the name of a runtime function."""
         return self.define(name, expression, f"_idlc.{expression}")
 
-    def reader(self, fields: str, start: int | None) -> str:
-        """Return the reader of a group: a function, or without `start` a table by position."""
-        name = f"read_{_content(fields)}"
+    def reader(self, path: str, fields: str, start: int | None) -> str:
+        """Return the reader of a group: a function, or without `start` a table by position.
+
+        It is named by the `path` of the value that it begins with, as all readers and writers are.
+        """
+        path, start = _shared(path, fields, start, 1)
         if start is None:
-            return self.ordered_call(f"{name}_at", "phases", f'"{fields}"')
+            return self.ordered_call(f"read_{path}_at", "phases", f'"{fields}"')
         arguments = (f'"{fields}"', f"start={start}") if start else (f'"{fields}"',)
-        return self.ordered_call(name, "layout", *arguments, after=".unpack_from")
+        return self.ordered_call(f"read_{path}", "layout", *arguments, after=".unpack_from")
 
-    def rows(self, fields: str) -> str:
+    def rows(self, path: str, fields: str) -> str:
         """Return the function that yields the values of one structure after the other."""
-        return self.ordered_call(
-            "read_rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack"
-        )
+        name = f"read_{path}"
+        return self.ordered_call(name, "layout", f'"{fields}"', "start=4", after=".iter_unpack")
 
-    def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
+    def writer(self, path: str, fields: str, start: int | None, align: int) -> str:
         """Return the writer of a group: a function, or a table by text size or by position."""
-        name = f"write_{_content(fields)}"
+        texts = "*" in fields
+        path, start = _shared(path, fields, start, align)
         arguments = [f'"{fields}"']
         if start:
             arguments.append(f"start={start}")
         if align > 1:
             arguments.append(f"align={align}")
         if start is None:
-            return self.ordered_call(f"{name}_at", "text_phases" if texts else "phases", *arguments)
+            function = "text_phases" if texts else "phases"
+            return self.ordered_call(f"write_{path}_at", function, *arguments)
         if texts:
-            return self.ordered_call(name, "Texts", *arguments)
-        return self.ordered_call(name, "layout", *arguments, after=".pack")
+            return self.ordered_call(f"write_{path}", "Texts", *arguments)
+        return self.ordered_call(f"write_{path}", "layout", *arguments, after=".pack")
 
     def pad(self, align: int) -> str:
         """Return the table of padding to `align`, by position."""
@@ -412,14 +417,18 @@ class Tables:
     def block_reader(self, step: plan.Block) -> str:
         """Return the function that turns bytes into a fixed-size array."""
         if step.primitive in plan.LIST_PRIMITIVES:
-            kind = plan.LIST_PRIMITIVES[step.primitive]
-            return self.function(f"read_{kind}", f"read_{kind}")
+            return self.list_reader(step.primitive)
         return self._array("array_of", "array_reader", step, "reading")
+
+    def list_reader(self, primitive: str) -> str:
+        """Return the function that turns bytes into a list of bools or bytes."""
+        kind = plan.LIST_PRIMITIVES[primitive]
+        return self.function(f"list_of_{kind}", f"read_{kind}")
 
     def _array(self, stem: str, function: str, step: plan.Block, *more: str) -> str:
         dtype = ir.PRIMITIVES[step.primitive].dtype
         expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
-        return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
+        return self.define(f"{stem}_{dtype}_{step.count}", expression, expression)
 
     def sequence_writer(self, step: plan.Numbers) -> str:
         """Return the function that makes an array of another sequence of numbers."""
@@ -431,30 +440,35 @@ class Tables:
         expression = f'_idlc.sequence_copier(order, "{step.code}")'
         return self.define(f"bytes_of_{step.numpy}", expression, expression)
 
-    def sequence_reader(self, step: plan.Numbers, reading: str) -> str:
-        """Return the function that turns a buffer into a sequence of numbers."""
+    def sequence_reader(self, step: plan.Numbers, foreign: str | None) -> str:
+        """Return the function that turns a buffer into a sequence of numbers.
+
+        `foreign` is the class that holds it, if that is of another package.
+        """
+        reading = f"reading.of({foreign})" if foreign else "reading"
         expression = f'_idlc.sequence_reader(order, "{step.code}", {reading})'
-        return self.define(f"read_{step.numpy}", expression, expression)
+        name = f"{step.numpy}_of_{snake_case(foreign)}" if foreign else step.numpy
+        return self.define(f"sequence_of_{name}", expression, expression)
 
     def texts_writer(self, step: plan.Texts) -> str:
         """Return the function that writes an array of strings; one for each field."""
-        local = step.place.local
+        path = step.place.path
         arguments = ["order"]
         if step.size is not None:
             arguments.append(f"size={step.size}")
         elif step.bound is not None:
             arguments.append(f"bound={step.bound}")
         expression = call("_idlc.wide_block" if step.wide else "_idlc.text_block", *arguments)
-        return self.define(f"write_{local}", f"write texts {local}", expression)
+        return self.define(f"write_{path}", f"write texts {path}", expression)
 
     def texts_reader(self, step: plan.Texts) -> str:
         """Return the function that reads an array of strings; one for each field."""
-        local = step.place.local
+        path = step.place.path
         if step.wide:
             expression = call("_idlc.wide_texts_reader", "order")
         else:
             expression = call("_idlc.texts_reader", "order", self.text())
-        return self.define(f"read_{local}", f"texts {local}", expression)
+        return self.define(f"read_{path}", f"texts {path}", expression)
 
     def text(self) -> str:
         """Return the name of the function that makes a string of bytes."""
@@ -470,10 +484,9 @@ class Tables:
         return self.define("small", "small", "reading.small")
 
 
-def _content(fields: str) -> str:
-    """Return a word for the content of a layout."""
-    if fields.startswith("4s"):
-        return "head"
-    if "*" in fields:
-        return "text"
-    return "count" if fields == "I" else "values"
+def _shared(path: str, fields: str, start: int | None, align: int) -> tuple[str, int | None]:
+    """Return the name and start of a layout: counts and texts anywhere have one in common."""
+    word = {"I": "count", "I*": "text"}.get(fields)
+    if word is None or align > 4:
+        return path, start
+    return word if align == 1 else f"{word}_{align}", None if start is None else start % 4

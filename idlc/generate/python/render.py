@@ -89,7 +89,7 @@ def _makers(
     for type_ in (own, *_types(steps)):
         if type_ not in makers:
             name = "kind" if type_ == own else references.name(type_)
-            stem = f"new_{snake_case(type_.name)}".replace("__", "_")
+            stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
             makers[type_] = tables.define(stem, f"maker {name}", call("_idlc.maker", name))
     return makers
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -18,9 +19,9 @@ from idlc.recordings.columns.scan import (
 )
 from idlc.recordings.columns.source import Flat, Pieces, Source
 from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
-from idlc.runtime.errors import DecodeError
-from idlc.runtime.objects import owner_of
-from idlc.runtime.typeinfo import check_buffer, structure_of
+from idlc.runtime.cdr import order_of
+from idlc.runtime.names import DecodeError, owner_of
+from idlc.runtime.typeinfo import CarefulReader, structure_of
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -148,7 +149,10 @@ def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        check_buffer(structure_of(kind), messages.raw(first))
+        raw = messages.raw(first)
+        # classes of other packages need not be installed
+        reader = CarefulReader(raw, order_of(raw), lambda _: SimpleNamespace())
+        reader.message(structure_of(kind), "")
     except DecodeError as error:
         path = f"[{first}].{error.path}" if error.path else f"[{first}]"
         raise _runtime_of(kind).DecodeError(error.problem, path, error.offset) from error

@@ -70,6 +70,9 @@ class NumberArray(Generic[Element]):
 
     dtype: Any
 
+    def __init_subclass__(cls, dtype: Any) -> None:
+        cls.dtype = dtype
+
     def __init__(self, size: int) -> None:
         self.size = size
 
@@ -85,7 +88,7 @@ class NumberArray(Generic[Element]):
                 return
             except (TypeError, ValueError, OverflowError) as error:
                 failure = error
-            from .typeinfo import refused
+            from .checked import refused
 
             raise refused(name, dtype.name, size, values, failure) from None
 
@@ -112,64 +115,44 @@ class NumberArray(Generic[Element]):
         def __set__(self, message: object, values: ArrayLike) -> None: ...
 
 
-class Int8Array(NumberArray["np.int8"]):
+class Int8Array(NumberArray["np.int8"], dtype=INT8):
     """An array of int8."""
 
-    dtype = INT8
 
-
-class UInt8Array(NumberArray["np.uint8"]):
+class UInt8Array(NumberArray["np.uint8"], dtype=UINT8):
     """An array of uint8, or of char."""
 
-    dtype = UINT8
 
-
-class Int16Array(NumberArray["np.int16"]):
+class Int16Array(NumberArray["np.int16"], dtype=INT16):
     """An array of int16."""
 
-    dtype = INT16
 
-
-class UInt16Array(NumberArray["np.uint16"]):
+class UInt16Array(NumberArray["np.uint16"], dtype=UINT16):
     """An array of uint16."""
 
-    dtype = UINT16
 
-
-class Int32Array(NumberArray["np.int32"]):
+class Int32Array(NumberArray["np.int32"], dtype=INT32):
     """An array of int32."""
 
-    dtype = INT32
 
-
-class UInt32Array(NumberArray["np.uint32"]):
+class UInt32Array(NumberArray["np.uint32"], dtype=UINT32):
     """An array of uint32."""
 
-    dtype = UINT32
 
-
-class Int64Array(NumberArray["np.int64"]):
+class Int64Array(NumberArray["np.int64"], dtype=INT64):
     """An array of int64."""
 
-    dtype = INT64
 
-
-class UInt64Array(NumberArray["np.uint64"]):
+class UInt64Array(NumberArray["np.uint64"], dtype=UINT64):
     """An array of uint64."""
 
-    dtype = UINT64
 
-
-class Float32Array(NumberArray["np.float32"]):
+class Float32Array(NumberArray["np.float32"], dtype=FLOAT32):
     """An array of float32."""
 
-    dtype = FLOAT32
 
-
-class Float64Array(NumberArray["np.float64"]):
+class Float64Array(NumberArray["np.float64"], dtype=FLOAT64):
     """An array of float64."""
-
-    dtype = FLOAT64
 
 
 def array_writer(order: str, name: str, size: int) -> Callable[[Any], bytes]:
@@ -224,32 +207,3 @@ def array_reader(
         return ndarray(size, dtype, bytearray(raw)).byteswap()
 
     return native if order == NATIVE or dtype.itemsize == 1 else swapped
-
-
-__all__ = [
-    "FLOAT32",
-    "FLOAT64",
-    "INT8",
-    "INT16",
-    "INT32",
-    "INT64",
-    "UINT8",
-    "UINT16",
-    "UINT32",
-    "UINT64",
-    "Float32Array",
-    "Float64Array",
-    "Int8Array",
-    "Int16Array",
-    "Int32Array",
-    "Int64Array",
-    "UInt8Array",
-    "UInt16Array",
-    "UInt32Array",
-    "UInt64Array",
-    "array_reader",
-    "array_writer",
-    "buffer_writer",
-    "view_reader",
-    "zeros",
-]

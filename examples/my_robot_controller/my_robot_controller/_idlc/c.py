@@ -2,16 +2,15 @@
 
 Everything given to C must live as long as the process, so it goes through `keep`.
 
-An exception that leaves a ctypes callback leaves the result *uninitialised*, and a thread
-that runs Python code may have to let another one run, whatever its C callers hold. So there
-are three kinds of functions for C. Those whose result is a pointer are built from C callables
-only (`constant`, `resolver`): no bytecode runs in them, hence no signal handler either. Those
-that `callback` makes are Python that catches everything.
+An exception that leaves a ctypes callback leaves the result *uninitialised*. So functions whose
+result is a pointer are built from C callables only (`constant`, `resolver`): no bytecode runs in
+them, hence no signal handler either. `callback` takes Python that catches everything.
 
-A middleware calls the functions of a type support while it has locks of its own, and from
-any thread. Whoever waits there for the interpreter's lock, or gives it away, can wait for
-ever for a thread that wants such a lock. So these functions are machine code: a few
-hundred bytes that are the same for all types, and words that differ from type to type.
+A thread that runs Python may have to let another one run, whatever its C callers hold: a
+middleware calls type support while it has locks of its own, and from any thread. Whoever waits
+there for the interpreter's lock, or gives it away, can wait for ever for a thread that wants such
+a lock. So these functions are machine code: a few hundred bytes that are the same for all types,
+and words that differ from type to type.
 """
 
 from __future__ import annotations
@@ -24,18 +23,9 @@ import operator
 import os
 import struct
 import sys
+from base64 import b64decode
 from collections.abc import Callable
-from ctypes import (
-    c_char,
-    c_char_p,
-    c_int,
-    c_size_t,
-    c_ssize_t,
-    c_uint8,
-    c_uint64,
-    c_void_p,
-    py_object,
-)
+from ctypes import c_char_p, c_int, c_size_t, c_uint8, c_uint64, c_void_p, py_object
 from importlib import import_module
 from itertools import accumulate, repeat
 from types import FunctionType
@@ -55,126 +45,72 @@ def keep(value: T) -> T:
     return value
 
 
-class String(ctypes.Structure):
-    """`rosidl_runtime_c__String` and its twin in type descriptions; `size` without the NUL."""
-
-    _fields_ = (("data", c_char_p), ("size", c_size_t), ("capacity", c_size_t))
-
-
-class Sequence(ctypes.Structure):
-    """Any `X__Sequence`; `data` points to `size` elements."""
-
-    _fields_ = (("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t))
+def structure(name: str, pointers: str = "", /, **fields: Any) -> Any:
+    """Return a C structure of some pointers, by their names, and of fields that follow them."""
+    types = dict.fromkeys(pointers.split(), c_void_p) | fields
+    return type(name, (ctypes.Structure,), {"_fields_": tuple(types.items())})
 
 
-class FlaggedSequence(ctypes.Structure):
-    """A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before."""
+_SIZES = {"size": c_size_t, "capacity": c_size_t}
+#: `rosidl_runtime_c__String` and its twin in type descriptions; `size` without the NUL.
+String = structure("String", data=c_char_p, **_SIZES)
+#: Any `X__Sequence`; `data` points to `size` elements.
+Sequence = structure("Sequence", "data", **_SIZES)
+#: A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before.
+FlaggedSequence = structure("FlaggedSequence", "data", **_SIZES, flags=c_uint64)
 
-    _fields_ = (*Sequence._fields_, ("flags", c_uint64))
+# `rosidl_runtime_c__type_description__FieldType`, and so on
+FieldType = structure(
+    "FieldType",
+    type_id=c_uint8,
+    capacity=c_uint64,
+    string_capacity=c_uint64,
+    nested_type_name=String,
+)
+Field = structure("Field", name=String, type=FieldType, default_value=String)
+IndividualDescription = structure("Individual", type_name=String, fields=Sequence)
+Description = structure(
+    "Description", type_description=IndividualDescription, referenced=Sequence
+)
+Source = structure(
+    "Source", type_name=String, encoding=String, raw_file_contents=String
+)
 
+#: `rosidl_type_hash_t`; version 1 is RIHS01.
+TypeHash = structure("TypeHash", version=c_uint8, value=c_uint8 * 32)
+#: The three functions by which rcl asks for hash, description and sources: never NULL.
+About = structure("About", "type_hash description sources")
 
-class FieldType(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__FieldType`."""
-
-    _fields_ = (
-        ("type_id", c_uint8),
-        ("capacity", c_uint64),
-        ("string_capacity", c_uint64),
-        ("nested_type_name", String),
-    )
-
-
-class Field(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__Field`."""
-
-    _fields_ = (("name", String), ("type", FieldType), ("default_value", String))
-
-
-class IndividualDescription(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__IndividualTypeDescription`."""
-
-    _fields_ = (("type_name", String), ("fields", Sequence))
-
-
-class Description(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__TypeDescription`."""
-
-    _fields_ = (("type_description", IndividualDescription), ("referenced", Sequence))
-
-
-class Source(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__TypeSource`."""
-
-    _fields_ = (
-        ("type_name", String),
-        ("encoding", String),
-        ("raw_file_contents", String),
-    )
-
-
-class TypeHash(ctypes.Structure):
-    """`rosidl_type_hash_t`; version 1 is RIHS01."""
-
-    _fields_ = (("version", c_uint8), ("value", c_uint8 * 32))
-
-
-class About(ctypes.Structure):
-    """The three functions by which rcl asks for hash, description and sources: never NULL."""
-
-    _fields_ = (
-        ("type_hash", c_void_p),
-        ("description", c_void_p),
-        ("sources", c_void_p),
-    )
+# `rosidl_message_type_support_t`, and so on
+MessageTypeSupport = structure("Message", "identifier data func", about=About)
+ServiceTypeSupport = structure(
+    "Service",
+    "identifier data func request response event event_create event_destroy",
+    about=About,
+)
+ActionTypeSupport = structure(
+    "Action",
+    "goal_service result_service cancel_service feedback_message status_message",
+    about=About,
+)
+#: `rosidl_service_introspection_info_t`.
+EventInfo = structure(
+    "EventInfo",
+    event_type=c_uint8,
+    sec=ctypes.c_int32,
+    nanosec=ctypes.c_uint32,
+    client_gid=c_uint8 * 16,
+    sequence_number=ctypes.c_int64,
+)
 
 
-class MessageTypeSupport(ctypes.Structure):
-    """`rosidl_message_type_support_t`."""
-
-    _fields_ = (
-        ("identifier", c_void_p),
-        ("data", c_void_p),
-        ("func", c_void_p),
-        ("about", About),
-    )
-
-
-class ServiceTypeSupport(ctypes.Structure):
-    """`rosidl_service_type_support_t`."""
-
-    _fields_ = (
-        ("identifier", c_void_p),
-        ("data", c_void_p),
-        ("func", c_void_p),
-        ("request", c_void_p),
-        ("response", c_void_p),
-        ("event", c_void_p),
-        ("event_create", c_void_p),
-        ("event_destroy", c_void_p),
-        ("about", About),
-    )
-
-
-class ActionTypeSupport(ctypes.Structure):
-    """`rosidl_action_type_support_t`."""
-
-    _fields_ = (
-        ("goal_service", c_void_p),
-        ("result_service", c_void_p),
-        ("cancel_service", c_void_p),
-        ("feedback_message", c_void_p),
-        ("status_message", c_void_p),
-        ("about", About),
-    )
-
-
-def string(text: str) -> String:
+def string(text: str) -> Any:
     """Return `text` as a C string with a size; its bytes live as long as the structure."""
     data = text.encode()
     return String(data, len(data), len(data) + 1)
 
 
-def sequence(items: list[Any], element: type[ctypes.Structure]) -> Sequence:
+def sequence(items: list[Any], element: Any) -> Any:
     """Return a sequence of copies of `items`, kept for ever."""
     array = keep((element * len(items))(*items))
     return Sequence(ctypes.addressof(array), len(items), len(items))
@@ -232,7 +168,7 @@ if sys.maxsize < 1 << 62:
 #: CHARACTERS is a copy.
 MEMORY = memoryview((c_uint8 * (1 << 62)).from_address(0)).cast("B")
 WORDS = MEMORY.cast("Q")
-CHARACTERS = (c_char * (1 << 62)).from_address(0)
+CHARACTERS = (ctypes.c_char * (1 << 62)).from_address(0)
 #: Where the content of a `bytes` object begins, from its `id`; a terminating zero
 #: follows it.
 BYTES_OFFSET = bytes.__basicsize__ - 1
@@ -400,67 +336,51 @@ FUNCTIONS = {
     "structs": "empty create destroy convert_from_py convert_to_py "
     "finish resize length in_sequence in_array",
 }
-#: Their code by processor, in hexadecimal, with spaces between them. A test assembles the text
+#: Their code by processor, in base 64, with spaces between them. A test assembles the text
 #: that is named and compares.
 CODE = {
     ("fastrtps", "x86_64"): (  # machine_code_fastrtps_x86_64.s
-        "f30f1efa5355415441554883ec1831c0488b1dd1010000488b1c1f4885db746448031dd10100"
-        "004c8b2b4883c308488b2da30100004801f54c8b6500488b159d010000488b14164c29e24c39"
-        "ea722a4d85ed741c4c89e7488b33488b53084901d44929d5ff154e0100004883c310ebdf4c89"
-        "6500b8010000004883c418415d415c5d5bc3488b1575010000488b14174885d274e5488b1d6d"
-        "0100004c8b2c1a4983ed044803154e0100004883c204488914244c896c24084889e3e96fffff"
-        "ff90 f30f1efa534889f3488b0509010000488b04074883e804488b3502010000488b3437482"
-        "9c64889c7ff15d20000004885c0741a48031df6000000488b3b488903ff15c2000000b801000"
-        "0005bc3ff15bd00000031c05bc390 f30f1efa488b05c5000000488b04074885c0740b480305"
-        "c5000000488b00c3488b05c2000000488b04074885c0740f488b15ba000000488b04104883e8"
-        "04c390 f30f1efac6070031c0c3660f1f440000 f30f1efa488b159d000000488b024885c074"
-        "214889f1448a00443a01751048ffc048ffc14584c075ed488b4208c34883c210ebd7c30f1f00"
-        " f30f1efa488b3d6d000000ff256f0000000f1f8000000000"
+        "8w8e+lNVQVRBVUiD7BgxwEiLHdEBAABIixwfSIXbdGRIAx3RAQAATIsrSIPDCEiLLaMBAABIAfVM"
+        "i2UASIsVnQEAAEiLFBZMKeJMOepyKk2F7XQcTInnSIszSItTCEkB1Ekp1f8VTgEAAEiDwxDr30yJ"
+        "ZQC4AQAAAEiDxBhBXUFcXVvDSIsVdQEAAEiLFBdIhdJ05UiLHW0BAABMiywaSYPtBEgDFU4BAABI"
+        "g8IESIkUJEyJbCQISInj6W////+Q 8w8e+lNIifNIiwUJAQAASIsEB0iD6ARIizUCAQAASIs0N0g"
+        "pxkiJx/8V0gAAAEiFwHQaSAMd9gAAAEiLO0iJA/8VwgAAALgBAAAAW8P/Fb0AAAAxwFvDkA== 8w"
+        "8e+kiLBcUAAABIiwQHSIXAdAtIAwXFAAAASIsAw0iLBcIAAABIiwQHSIXAdA9IixW6AAAASIsEEE"
+        "iD6ATDkA== 8w8e+sYHADHAw2YPH0QAAA== 8w8e+kiLFZ0AAABIiwJIhcB0IUiJ8USKAEQ6AXUQ"
+        "SP/ASP/BRYTAde1Ii0IIw0iDwhDr18MPHwA= 8w8e+kiLPW0AAAD/JW8AAAAPH4AAAAAA"
     ),
     ("fastrtps", "aarch64"): (  # machine_code_fastrtps_aarch64.s
-        "5f2403d5fd7bbca9f35301a9f55b02a9fd030091730f0058136873f8730300b4820f00587302"
-        "028b768640f800008052140e00589402018b950240f9e20d0058226862f8420015cb5f0016eb"
-        "63010054160100b4e00315aa610ac1a8b502028bd60202cb700b005800023fd6f9ffff179502"
-        "00f920008052f35341a9f55b42a9fd7bc4a8c0035fd6820c0058026862f80000805222ffffb4"
-        "430c0058566863f8d61200d1630b00584200038b42100091f3c30091625a00a9ddffff171f20"
-        "03d5 5f2403d5fd7bbea9f30b00f9fd030091f30301aae2080058026862f8421000d1c108005"
-        "8016861f8210002cbe00302aa5007005800023fd6400100b4620800587302028b610240f9600"
-        "200f9e00301aa9006005800023fd620008052040000145006005800023fd600008052f30b40f"
-        "9fd7bc2a8c0035fd6 5f2403d521060058016861f8810000b440060058206860f8c0035fd621"
-        "060058006861f8800000b401060058006861f8001000d1c0035fd6 5f2403d51f00003900008"
-        "0d2c0035fd6 5f2403d522050058430040f9630100b4e40301aa6514403886144038bf00066b"
-        "8100005485ffff35400440f9c0035fd642400091f5ffff17000080d2c0035fd6 5f2403d5600"
-        "300589003005800021fd6"
+        "XyQD1f17vKnzUwGp9VsCqf0DAJFzDwBYE2hz+HMDALSCDwBYcwICi3aGQPgAAIBSFA4AWJQCAYuV"
+        "AkD54g0AWCJoYvhCABXLXwAW62MBAFQWAQC04AMVqmEKwai1AgKL1gICy3ALAFgAAj/W+f//F5UC"
+        "APkgAIBS81NBqfVbQqn9e8SowANf1oIMAFgCaGL4AACAUiL//7RDDABYVmhj+NYSANFjCwBYQgAD"
+        "i0IQAJHzwwCRYloAqd3//xcfIAPV XyQD1f17vqnzCwD5/QMAkfMDAariCABYAmhi+EIQANHBCAB"
+        "YAWhh+CEAAsvgAwKqUAcAWAACP9ZAAQC0YggAWHMCAothAkD5YAIA+eADAaqQBgBYAAI/1iAAgFI"
+        "EAAAUUAYAWAACP9YAAIBS8wtA+f17wqjAA1/W XyQD1SEGAFgBaGH4gQAAtEAGAFggaGD4wANf1i"
+        "EGAFgAaGH4gAAAtAEGAFgAaGH4ABAA0cADX9Y= XyQD1R8AADkAAIDSwANf1g== XyQD1SIFAFhD"
+        "AED5YwEAtOQDAaplFEA4hhRAOL8ABmuBAABUhf//NUAEQPnAA1/WQkAAkfX//xcAAIDSwANf1g=="
+        " XyQD1WADAFiQAwBYAAIf1g=="
     ),
     ("structs", "x86_64"): (  # machine_code_structs_x86_64.s
-        "535541544155415641574883ec084989fc488b1e488d6e084885db74664c8b6d004d01e54d89"
-        "ef4c8b75084d85f675084d8b7d004d8b751048837d1800741a4d85f674154c89ff488b7518e8"
-        "b0ffffff4c037d1049ffceebe648837d0800751a498b7d0031f6ff156c01000031c049894500"
-        "49894508498945104883c52048ffcbeb954883c408415f415e415d415c5d5bc3660f1f440000"
-        " f30f1efabf01000000488b356001000031d2ff2520010000 f30f1efa534889fb488b353901"
-        "0000e83cffffff4889df5b31f6ff2508010000 f30f1efa53554883ec084889fb4889f54889f"
-        "7488b350e010000e811ffffff488b3dfa0000004889ee4889daff15de00000085c00f94c0488"
-        "3c4085d5bc36690 f30f1efa4889fe488b3dd2000000ff25c40000000f1f4000 f30f1efa488"
-        "b35c5000000e9c8feffff f30f1efa53554883ec084889fb4889f5488b35b1000000e8acfeff"
-        "ffb8010000004885ed74274889ef488b35a000000031d2ff15600000004885c0741048890348"
-        "896b0848896b10b8010000004883c4085d5bc30f1f4000 f30f1efa488b4708c30f1f8000000"
-        "000 f30f1efa488b055d000000480fafc6480307c30f1f440000 f30f1efa488b05450000004"
-        "80fafc64801f8c30f1f440000"
+        "U1VBVEFVQVZBV0iD7AhJifxIix5IjW4ISIXbdGZMi20ATQHlTYnvTIt1CE2F9nUITYt9AE2LdRBI"
+        "g30YAHQaTYX2dBVMif9Ii3UY6LD///9MA30QSf/O6+ZIg30IAHUaSYt9ADH2/xVsAQAAMcBJiUUA"
+        "SYlFCEmJRRBIg8UgSP/L65VIg8QIQV9BXkFdQVxdW8NmDx9EAAA= 8w8e+r8BAAAASIs1YAEAADH"
+        "S/yUgAQAA 8w8e+lNIiftIizU5AQAA6Dz///9Iid9bMfb/JQgBAAA= 8w8e+lNVSIPsCEiJ+0iJ9"
+        "UiJ90iLNQ4BAADoEf///0iLPfoAAABIie5Iidr/Fd4AAACFwA+UwEiDxAhdW8NmkA== 8w8e+kiJ"
+        "/kiLPdIAAAD/JcQAAAAPH0AA 8w8e+kiLNcUAAADpyP7//w== 8w8e+lNVSIPsCEiJ+0iJ9UiLNb"
+        "EAAADorP7//7gBAAAASIXtdCdIie9IizWgAAAAMdL/FWAAAABIhcB0EEiJA0iJawhIiWsQuAEAAA"
+        "BIg8QIXVvDDx9AAA== 8w8e+kiLRwjDDx+AAAAAAA== 8w8e+kiLBV0AAABID6/GSAMHww8fRAAA"
+        " 8w8e+kiLBUUAAABID6/GSAH4ww8fRAAA"
     ),
     ("structs", "aarch64"): (  # machine_code_structs_aarch64.s
-        "fd7bbca9f35301a9f55b02a9f76303a9fd030091f30300aa348440f8f50301aab40300b4b602"
-        "40f9d602138bf70316aab80640f9780000b5d70240f9d80a40f9a10e40f9210100b4180100b4"
-        "e00317aaa10e40f9ebffff97a00a40f9f702008b180700d1f9ffff17a00640f9e00000b5c002"
-        "40f9010080d2900b005800023fd6df7e00a9df0a00f9b5820091940600d1e4ffff17f35341a9"
-        "f55b42a9f76343a9fd7bc4a8c0035fd6 5f2403d5200080d2410b0058020080d250090058000"
-        "21fd6 5f2403d5fd7bbea9fd030091e00b00f9c1090058cbffff97e00b40f9fd7bc2a8010080"
-        "d23008005800021fd61f2003d5 5f2403d5fd7bbea9fd030091e00701a9e00301aa21080058b"
-        "effff97e20741a980070058f006005800023fd61f000071e0179f1afd7bc2a8c0035fd61f200"
-        "3d5 5f2403d5e10300aa40060058f005005800021fd61f2003d5 5f2403d5e1050058acffff1"
-        "71f2003d5 5f2403d5fd7bbea9fd030091e00701a941050058a5ffff97e00f40f9200100b401"
-        "050058020080d21003005800023fd6a00000b4e10b41a9200800a9220800f920008052fd7bc2"
-        "a8c0035fd61f2003d5 5f2403d5000440f9c0035fd61f2003d5 5f2403d5e2020058000040f9"
-        "2000029bc0035fd61f2003d5 5f2403d5220200582000029bc0035fd6"
+        "/Xu8qfNTAan1WwKp92MDqf0DAJHzAwCqNIRA+PUDAaq0AwC0tgJA+dYCE4v3AxaquAZA+XgAALXX"
+        "AkD52ApA+aEOQPkhAQC0GAEAtOADF6qhDkD56///l6AKQPn3AgCLGAcA0fn//xegBkD54AAAtcAC"
+        "QPkBAIDSkAsAWAACP9bffgCp3woA+bWCAJGUBgDR5P//F/NTQan1W0Kp92NDqf17xKjAA1/W XyQ"
+        "D1SAAgNJBCwBYAgCA0lAJAFgAAh/W XyQD1f17vqn9AwCR4AsA+cEJAFjL//+X4AtA+f17wqgBAI"
+        "DSMAgAWAACH9YfIAPV XyQD1f17vqn9AwCR4AcBqeADAaohCABYvv//l+IHQamABwBY8AYAWAACP"
+        "9YfAABx4BefGv17wqjAA1/WHyAD1Q== XyQD1eEDAKpABgBY8AUAWAACH9YfIAPV XyQD1eEFAFi"
+        "s//8XHyAD1Q== XyQD1f17vqn9AwCR4AcBqUEFAFil//+X4A9A+SABALQBBQBYAgCA0hADAFgAAj"
+        "/WoAAAtOELQakgCACpIggA+SAAgFL9e8KowANf1h8gA9U= XyQD1QAEQPnAA1/WHyAD1Q== XyQD"
+        "1eICAFgAAED5IAACm8ADX9YfIAPV XyQD1SICAFggAAKbwANf1g=="
     ),
 }
 
@@ -485,7 +405,7 @@ def machine_code(kind: str, words: dict[str, int]) -> dict[str, int]:
 
 def linked(kind: str, machine: str) -> tuple[bytes, dict[str, int]]:
     """Return all code for a processor, and the offset of each function in it."""
-    parts = [bytes.fromhex(code) for code in CODE[kind, machine].split()]
+    parts = [b64decode(code) for code in CODE[kind, machine].split()]
     offsets = accumulate(map(len, parts), initial=0)
     names = FUNCTIONS[kind].split()
     return b"".join(parts), dict(zip(names, offsets, strict=False))
@@ -497,8 +417,8 @@ def _executable(code: bytes) -> int:
     That is allowed on more systems than to make memory executable that was written to.
     """
     library = ctypes.CDLL(None, use_errno=True)
-    library.mmap.restype = c_ssize_t
-    library.mmap.argtypes = (c_void_p, c_size_t, c_int, c_int, c_int, c_ssize_t)
+    library.mmap.restype = ctypes.c_ssize_t
+    library.mmap.argtypes = (c_void_p, c_size_t, c_int, c_int, c_int, ctypes.c_ssize_t)
     try:
         file = os.memfd_create("idlc")
     except (AttributeError, OSError) as error:

@@ -15,7 +15,7 @@ from array import array
 from struct import Struct, calcsize
 from sys import byteorder
 
-from .errors import DecodeError
+from .names import DecodeError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing import Any, TypeAlias, TypeVar
 
     BySize: TypeAlias = dict[int, Callable[..., bytes]]
-    Value = TypeVar("Value")
+    _Value = TypeVar("_Value")
 else:
     BySize = dict
 
@@ -106,7 +106,7 @@ def text_phases(order: str, fields: str, align: int = 1) -> tuple[Texts, ...]:
     return tuple(Texts(order, fields, start, align) for start in range(8))
 
 
-def listed(values: Collection[Value]) -> list[Value]:
+def listed(values: Collection[_Value]) -> list[_Value]:
     """Return what is in a sequence at this moment; an iterator, which ends, is none."""
     return [*values] if len(values) else []
 

@@ -1,28 +1,40 @@
-"""Messages as dictionaries, as dataclasses, and as pydantic checks and writes them."""
+"""Messages as dictionaries, as dataclasses, and as pydantic checks and writes them.
+
+Also the names that only annotations use: whoever evaluates these comes here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, get_type_hints
 
-from .errors import ValidationError
-from .names import slot_name
-from .objects import owner_of
-from .typeinfo import (
-    FieldInfo,
-    Structure,
-    inner_path,
-    spelling_hint,
-    structure_of,
-    validate,
-    validate_count,
-    validate_element,
-)
+from .checked import validate, validate_count, validate_element
+from .names import ValidationError, owner_of, slot_name
+from .typeinfo import FieldInfo, Structure, inner_path, spelling_hint, structure_of
 
 if TYPE_CHECKING:
     import dataclasses
     from collections.abc import Iterator
+else:
+    import typing
+
+    # Python 3.10 has none, and anything that takes an index will do
+    Unpack = getattr(typing, "Unpack", typing.Optional)
+
+
+#: What numeric sequences take.
+Integers: TypeAlias = Iterable[int]
+Floats: TypeAlias = Iterable[float]
+#: The function that receives a message's parts.
+Join: TypeAlias = Callable[[list[Any]], Any]
+
+
+class Options(TypedDict, total=False):
+    """The keywords of every constructor besides the fields."""
+
+    #: Raise AssertionError when a wrong value is assigned, as rosidl's classes do.
+    check_fields: bool
 
 
 def to_dict(message: Any) -> dict[str, Any]:
@@ -77,16 +89,12 @@ def _from_dict(kind: Any, structure: Structure, values: Any, path: str) -> Any:
             hint = spelling_hint(str(key), list(fields))
             problem = f"{structure.name} has no such field{hint}"
             raise ValidationError(inner_path(path, key), "absent", value, problem)
-        place = inner_path(path, field.public)
-        _set(message, field, _value(value, field, place), path)
+        made = _value(value, field, inner_path(path, field.public))
+        try:
+            setattr(message, field.public, made)
+        except ValidationError as error:
+            raise error.at(inner_path(path, error.path), ValidationError) from None
     return message
-
-
-def _set(message: Any, field: FieldInfo, value: Any, path: str) -> None:
-    try:
-        setattr(message, field.public, value)
-    except ValidationError as error:
-        raise error.at(inner_path(path, error.path), ValidationError) from None
 
 
 def _value(value: Any, field: FieldInfo, path: str) -> Any:
@@ -117,8 +125,8 @@ def _element(value: Any, field: FieldInfo, path: str) -> Any:
 
 
 @cache
-def dataclass_params() -> Any:
-    """Return the `__dataclass_params__` of all messages."""
+def dataclass_params(_kind: Any) -> Any:
+    """Return the `__dataclass_params__` of a class, which are those of all."""
     import dataclasses
 
     model: Any = dataclasses.make_dataclass("Message", [], slots=True)

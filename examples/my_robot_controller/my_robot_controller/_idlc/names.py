@@ -1,4 +1,4 @@
-"""The names of an interface in Python, and module attributes that are imported on first use.
+"""The names of an interface in Python, names that are imported on first use, and errors.
 
 Wire names stay as they are in files, dictionaries and type descriptions. In Python a name that
 is a keyword gets a trailing underscore; no name of ROS can end in one, so two names never meet.
@@ -41,6 +41,14 @@ def wire_name(name: str) -> str:
     return name.removesuffix("_")
 
 
+def owner_of(kind: type) -> Any:
+    """Return the generated class that a class is, or that a user's class derives from."""
+    owner = getattr(type(kind), "_message", None)
+    if owner is None:
+        raise TypeError(f"{kind.__name__} is not a generated message class")
+    return owner
+
+
 def lazily(
     package: str, modules: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -65,3 +73,100 @@ def lazily(
         return sorted(own - {"TYPE_CHECKING", "annotations"})
 
     return get, names
+
+
+# errors
+
+
+class DecodeError(ValueError):
+    """Bytes that are not a message of the expected type.
+
+    `path` names the field that could not be read, `offset` the byte at which it should begin,
+    counted from the start of the buffer.
+    """
+
+    def __init__(self, problem: str, path: str = "", offset: int = 0) -> None:
+        super().__init__(problem, path, offset)
+        self.problem = problem
+        self.path = path
+        self.offset = offset
+
+    def __str__(self) -> str:
+        where = f"{self.path}: " if self.path else ""
+        return f"{where}{self.problem} at byte {self.offset}"
+
+
+class ValidationError(ValueError):
+    """A value that its field cannot hold.
+
+    `path` names the field, `allowed` says what it can hold, `value` is what it holds. A
+    `problem` is reported instead of "must be `allowed`, not `value`".
+    """
+
+    def __init__(
+        self, path: str, allowed: str, value: object, problem: str = ""
+    ) -> None:
+        super().__init__(path, allowed, value, problem)
+        self.path = path
+        self.allowed = allowed
+        self.value = value
+        self.problem = problem
+
+    def __str__(self) -> str:
+        where = f"{self.path}: " if self.path else ""
+        if self.problem:
+            return where + self.problem
+        text = repr(self.value)
+        if len(text) > 80:
+            text = text[:77] + "..."
+        return f"{where}must be {self.allowed}, not {text}"
+
+    def at(self, path: str, kind: type[ValidationError] | None = None) -> Any:
+        """Return the same error for another path, or of another kind."""
+        return (kind or type(self))(path, self.allowed, self.value, self.problem)
+
+
+class FieldTypeError(ValidationError, TypeError):
+    """A value of the wrong type, detected at its assignment."""
+
+
+class FieldRangeError(ValidationError, OverflowError):
+    """A number that is too large or too small, detected at its assignment."""
+
+
+class FieldCheckError(ValidationError, AssertionError):
+    """A value that `check_fields` refuses; rosidl's classes raise AssertionError."""
+
+
+class FieldNameError(FieldTypeError, FieldCheckError):
+    """A name that no field has; rosidl's `check_fields` raises AssertionError before Lyrical."""
+
+
+class importing:
+    """A context that says, when an import in it fails, how to get the package."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, _kind: object, error: BaseException | None, _trace: object
+    ) -> None:
+        if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
+            return
+        if (
+            error.name == "idlc_runtime"
+        ):  # a package says itself that it lacks its runtime
+            return
+        package = (error.name or "").partition(".")[0] or "another package"
+        raise MissingPackageError(
+            f"this message needs {package}, which cannot be imported ({error}). "
+            f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
+            f"{package.replace('_', '-')}), or let those who generate this code run "
+            f"`idlc gen` with --vendor-deps: then it comes with what it needs.",
+            name=error.name,
+            path=error.path,
+        ) from error
+
+
+class MissingPackageError(ImportError):
+    """Another package's messages cannot be imported."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 from array import array
 
 from .cdr import NATIVE, single_bytes
-from .errors import FieldTypeError
-from .names import name_of
+from .names import FieldTypeError, name_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -76,6 +75,9 @@ class NumberSequence(Generic[Number]):
 
     code: str
 
+    def __init_subclass__(cls, code: str) -> None:
+        cls.code = code
+
     def property_of(self, slot: Any) -> property:
         """Return the property over the slot member `slot`."""
         code = self.code
@@ -88,7 +90,7 @@ class NumberSequence(Generic[Number]):
                 return
             except (TypeError, ValueError, OverflowError) as error:
                 failure = error
-            from .typeinfo import refused
+            from .checked import refused
 
             raise refused(name, code, None, values, failure) from None
 
@@ -115,64 +117,44 @@ class NumberSequence(Generic[Number]):
         def __set__(self, message: object, values: Iterable[Number]) -> None: ...
 
 
-class Int8Sequence(NumberSequence[int]):
+class Int8Sequence(NumberSequence[int], code="b"):
     """A sequence of int8."""
 
-    code = "b"
 
-
-class UInt8Sequence(NumberSequence[int]):
+class UInt8Sequence(NumberSequence[int], code="B"):
     """A sequence of uint8, or of char."""
 
-    code = "B"
 
-
-class Int16Sequence(NumberSequence[int]):
+class Int16Sequence(NumberSequence[int], code="h"):
     """A sequence of int16."""
 
-    code = "h"
 
-
-class UInt16Sequence(NumberSequence[int]):
+class UInt16Sequence(NumberSequence[int], code="H"):
     """A sequence of uint16."""
 
-    code = "H"
 
-
-class Int32Sequence(NumberSequence[int]):
+class Int32Sequence(NumberSequence[int], code="i"):
     """A sequence of int32."""
 
-    code = "i"
 
-
-class UInt32Sequence(NumberSequence[int]):
+class UInt32Sequence(NumberSequence[int], code="I"):
     """A sequence of uint32."""
 
-    code = "I"
 
-
-class Int64Sequence(NumberSequence[int]):
+class Int64Sequence(NumberSequence[int], code="q"):
     """A sequence of int64."""
 
-    code = "q"
 
-
-class UInt64Sequence(NumberSequence[int]):
+class UInt64Sequence(NumberSequence[int], code="Q"):
     """A sequence of uint64."""
 
-    code = "Q"
 
-
-class Float32Sequence(NumberSequence[float]):
+class Float32Sequence(NumberSequence[float], code="f"):
     """A sequence of float32."""
 
-    code = "f"
 
-
-class Float64Sequence(NumberSequence[float]):
+class Float64Sequence(NumberSequence[float], code="d"):
     """A sequence of float64."""
-
-    code = "d"
 
 
 def to_list(

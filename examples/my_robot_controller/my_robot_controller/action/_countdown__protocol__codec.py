@@ -36,7 +36,7 @@ def countdown_send_goal_request_codec(
     new_uuid = _idlc.maker(UUID)
     new_countdown_goal = _idlc.maker(Countdown_Goal)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bi", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
@@ -56,8 +56,11 @@ def countdown_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_countdown_goal()
         message._goal = goal
-        uuid, goal._target_count = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            goal._target_count,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -77,7 +80,7 @@ def countdown_send_goal_response_codec(
     write_head = _idlc.layout(order, "4s?iI").pack
     new_countdown_send_goal_response = _idlc.maker(kind)
     new_time = _idlc.maker(Time)
-    read_values = _idlc.layout(order, "?iI", start=4).unpack_from
+    read_accepted = _idlc.layout(order, "?iI", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         stamp = message._stamp
@@ -95,7 +98,11 @@ def countdown_send_goal_response_codec(
         message = new_countdown_send_goal_response()
         stamp = new_time()
         message._stamp = stamp
-        message._accepted, stamp._sec, stamp._nanosec = read_values(data, 4)
+        (
+            message._accepted,
+            stamp._sec,
+            stamp._nanosec,
+        ) = read_accepted(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -123,10 +130,10 @@ def countdown_send_goal_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "16Bi").pack
+    write_request_item_goal_id_uuid = _idlc.layout(order, "16Bi").pack
     write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_values_2 = _idlc.layout(order, "?iI").pack
+    write_response_item_accepted = _idlc.layout(order, "?iI").pack
     new_countdown_send_goal_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -135,14 +142,14 @@ def countdown_send_goal_event_codec(
     new_countdown_goal = _idlc.maker(Countdown_Goal)
     new_countdown_send_goal_response = _idlc.maker(Countdown_SendGoal_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_values_2 = _idlc.layout(order, "16Bi").unpack_from
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item_goal_id_uuid = _idlc.layout(order, "16Bi").unpack_from
     read_count = _idlc.layout(order, "I").unpack_from
-    read_values_3 = _idlc.layout(order, "?iI").unpack_from
+    read_response_item_accepted = _idlc.layout(order, "?iI").unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
@@ -150,8 +157,8 @@ def countdown_send_goal_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -159,22 +166,23 @@ def countdown_send_goal_event_codec(
         ]
         put = parts.append
         for request_item in request:
-            goal_id = request_item._goal_id
-            goal = request_item._goal
-            put(write_values(bytes_of_uint8_16(goal_id._uuid), goal._target_count))
+            request_item_goal_id = request_item._goal_id
+            request_item_goal = request_item._goal
+            put(write_request_item_goal_id_uuid(
+                bytes_of_uint8_16(request_item_goal_id._uuid),
+                request_item_goal._target_count,
+            ))
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_count(len(response)))
         for response_item in response:
             response_item_stamp = response_item._stamp
-            put(
-                write_values_2(
-                    truths[response_item._accepted],
-                    response_item_stamp._sec,
-                    response_item_stamp._nanosec,
-                ),
-            )
+            put(write_response_item_accepted(
+                truths[response_item._accepted],
+                response_item_stamp._sec,
+                response_item_stamp._nanosec,
+            ))
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -182,17 +190,17 @@ def countdown_send_goal_event_codec(
         message = new_countdown_send_goal_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
@@ -201,12 +209,15 @@ def countdown_send_goal_event_codec(
         message._request = request
         at = 48
         for request_item in request:
-            goal_id = new_uuid()
-            request_item._goal_id = goal_id
-            goal = new_countdown_goal()
-            request_item._goal = goal
-            uuid, goal._target_count = read_values_2(data, at)
-            goal_id._uuid = array_of_uint8_16(uuid)
+            request_item_goal_id = new_uuid()
+            request_item._goal_id = request_item_goal_id
+            request_item_goal = new_countdown_goal()
+            request_item._goal = request_item_goal
+            (
+                request_item_goal_id_uuid,
+                request_item_goal._target_count,
+            ) = read_request_item_goal_id_uuid(data, at)
+            request_item_goal_id._uuid = array_of_uint8_16(request_item_goal_id_uuid)
             at = at + 20
         (count,) = read_count(data, at)
         if count > 1:
@@ -223,7 +234,7 @@ def countdown_send_goal_event_codec(
                 response_item._accepted,
                 response_item_stamp._sec,
                 response_item_stamp._nanosec,
-            ) = read_values_3(data, at)
+            ) = read_response_item_accepted(data, at)
             at = at + 12
         return message
 
@@ -247,19 +258,24 @@ def countdown_get_result_request_codec(
     new_countdown_get_result_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16B", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
-        parts = [write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid))]
+        parts = [
+            write_head(
+                encapsulation,
+                bytes_of_uint8_16(goal_id._uuid),
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_get_result_request()
         goal_id = new_uuid()
         message._goal_id = goal_id
-        (uuid,) = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (goal_id_uuid,) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -278,7 +294,7 @@ def countdown_get_result_response_codec(
     write_head = _idlc.layout(order, "4sbi?").pack
     new_countdown_get_result_response = _idlc.maker(kind)
     new_countdown_result = _idlc.maker(Countdown_Result)
-    read_values = _idlc.layout(order, "bi?", start=4).unpack_from
+    read_status = _idlc.layout(order, "bi?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
@@ -296,7 +312,11 @@ def countdown_get_result_response_codec(
         message = new_countdown_get_result_response()
         result = new_countdown_result()
         message._result = result
-        message._status, result._final_count, result._success = read_values(data, 4)
+        (
+            message._status,
+            result._final_count,
+            result._success,
+        ) = read_status(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -324,10 +344,10 @@ def countdown_get_result_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "16B", start=4).pack
+    write_request_item = _idlc.layout(order, "16B", start=4).pack
     write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_values_at = _idlc.phases(order, "bi?")
+    write_response_item_status_at = _idlc.phases(order, "bi?")
     new_countdown_get_result_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -336,22 +356,18 @@ def countdown_get_result_event_codec(
     new_countdown_get_result_response = _idlc.maker(Countdown_GetResult_Response)
     new_countdown_result = _idlc.maker(Countdown_Result)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "16B", start=4).iter_unpack
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item = _idlc.layout(order, "16B", start=4).iter_unpack
     read_count = _idlc.layout(order, "I").unpack_from
+    read_response_item_status_at = _idlc.phases(order, "bi?")
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join(
-            [
-                write_values(bytes_of_uint8_16(request_item._goal_id._uuid))
-                for request_item in request
-            ],
-        )
+        request_block = b"".join([write_request_item(bytes_of_uint8_16(request_item._goal_id._uuid)) for request_item in request])
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
@@ -360,8 +376,8 @@ def countdown_get_result_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -371,14 +387,12 @@ def countdown_get_result_event_codec(
         ]
         put = parts.append
         for response_item in response:
-            result = response_item._result
-            put(
-                write_values_at[low & 3].pack(
-                    response_item._status,
-                    result._final_count,
-                    truths[result._success],
-                ),
-            )
+            response_item_result = response_item._result
+            put(write_response_item_status_at[low & 3].pack(
+                response_item._status,
+                response_item_result._final_count,
+                truths[response_item_result._success],
+            ))
             low = 1
         return join(parts)
 
@@ -387,29 +401,29 @@ def countdown_get_result_event_codec(
         message = new_countdown_get_result_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[Any] = []
         message._request = request
         end = 48 + 16 * count
-        for request_item_values in read_rows(data[48:end]):
+        for request_item_values in read_request_item(data[48:end]):
             request_item = new_countdown_get_result_request()
             request.append(request_item)
-            goal_id = new_uuid()
-            request_item._goal_id = goal_id
-            (uuid,) = request_item_values
-            goal_id._uuid = array_of_uint8_16(uuid)
+            request_item_goal_id = new_uuid()
+            request_item._goal_id = request_item_goal_id
+            (request_item_goal_id_uuid,) = request_item_values
+            request_item_goal_id._uuid = array_of_uint8_16(request_item_goal_id_uuid)
         (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
@@ -419,13 +433,13 @@ def countdown_get_result_event_codec(
         message._response = response
         at = end + 4
         for response_item in response:
-            result = new_countdown_result()
-            response_item._result = result
-            struct = write_values_at[at & 7]
+            response_item_result = new_countdown_result()
+            response_item._result = response_item_result
+            struct = read_response_item_status_at[at & 7]
             (
                 response_item._status,
-                result._final_count,
-                result._success,
+                response_item_result._final_count,
+                response_item_result._success,
             ) = struct.unpack_from(data, at)
             at = at + struct.size
         return message
@@ -452,7 +466,7 @@ def countdown_feedback_message_codec(
     new_uuid = _idlc.maker(UUID)
     new_countdown_feedback = _idlc.maker(Countdown_Feedback)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bi", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
@@ -472,8 +486,11 @@ def countdown_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_countdown_feedback()
         message._feedback = feedback
-        uuid, feedback._current_count = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            feedback._current_count,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)

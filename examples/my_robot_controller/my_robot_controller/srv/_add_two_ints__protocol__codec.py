@@ -37,33 +37,34 @@ def add_two_ints_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "qq", start=4).pack
+    write_request_item = _idlc.layout(order, "qq", start=4).pack
     pad8 = _idlc.PAD8
     write_count = _idlc.layout(order, "I").pack
-    write_values_2 = _idlc.layout(order, "q", start=4).pack
+    write_response_item = _idlc.layout(order, "q", start=4).pack
     new_add_two_ints_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_add_two_ints_request = _idlc.maker(AddTwoInts_Request)
     new_add_two_ints_response = _idlc.maker(AddTwoInts_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "qq", start=4).iter_unpack
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item = _idlc.layout(order, "qq", start=4).iter_unpack
     read_count = _idlc.layout(order, "I").unpack_from
-    read_rows_2 = _idlc.layout(order, "q", start=4).iter_unpack
+    read_response_item = _idlc.layout(order, "q", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join(
-            [
-                write_values(request_item._a, request_item._b)
-                for request_item in request
-            ],
-        )
+        request_block = b"".join([
+            write_request_item(
+                request_item._a,
+                request_item._b,
+            )
+            for request_item in request
+        ])
         at = 48
         if request:
             at = (at + 3 & -8) + 4 + 16 * len(request)
@@ -71,15 +72,13 @@ def add_two_ints_event_codec(
         if len(response) > 1:
             raise ValueError("too many elements")
         at = at + 4
-        response_block = b"".join(
-            [write_values_2(response_item._sum) for response_item in response],
-        )
+        response_block = b"".join([write_response_item(response_item._sum) for response_item in response])
         parts = [
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -97,17 +96,17 @@ def add_two_ints_event_codec(
         message = new_add_two_ints_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[Any] = []
@@ -116,10 +115,13 @@ def add_two_ints_event_codec(
         if count:
             at = (at + 3 & -8) + 4
         end = at + 16 * count
-        for request_item_values in read_rows(data[at:end]):
+        for request_item_values in read_request_item(data[at:end]):
             request_item = new_add_two_ints_request()
             request.append(request_item)
-            request_item._a, request_item._b = request_item_values
+            (
+                request_item._a,
+                request_item._b,
+            ) = request_item_values
         (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
@@ -129,7 +131,7 @@ def add_two_ints_event_codec(
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        for response_item_values in read_rows_2(data[at:end]):
+        for response_item_values in read_response_item(data[at:end]):
             response_item = new_add_two_ints_response()
             response.append(response_item)
             (response_item._sum,) = response_item_values

@@ -24,15 +24,20 @@ def fill_goal_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_goal = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "f", start=4).unpack_from
+    read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._level)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._level,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_goal()
-        (message._level,) = read_values(data, 4)
+        (message._level,) = read_level(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -47,15 +52,20 @@ def fill_result_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_result = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "f", start=4).unpack_from
+    read_reached = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._reached)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._reached,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_result()
-        (message._reached,) = read_values(data, 4)
+        (message._reached,) = read_reached(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -70,15 +80,20 @@ def fill_feedback_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_feedback = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "f", start=4).unpack_from
+    read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._level)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._level,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_feedback()
-        (message._level,) = read_values(data, 4)
+        (message._level,) = read_level(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -36,13 +36,17 @@ def fill_send_goal_request_codec(
     new_uuid = _idlc.maker(UUID)
     new_fill_goal = _idlc.maker(Fill_Goal)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bf", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
         parts = [
-            write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid), goal._level),
+            write_head(
+                encapsulation,
+                bytes_of_uint8_16(goal_id._uuid),
+                goal._level,
+            ),
         ]
         return join(parts)
 
@@ -52,8 +56,11 @@ def fill_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_fill_goal()
         message._goal = goal
-        uuid, goal._level = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            goal._level,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -73,7 +80,7 @@ def fill_send_goal_response_codec(
     write_head = _idlc.layout(order, "4s?iI").pack
     new_fill_send_goal_response = _idlc.maker(kind)
     new_time = _idlc.maker(Time)
-    read_values = _idlc.layout(order, "?iI", start=4).unpack_from
+    read_accepted = _idlc.layout(order, "?iI", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         stamp = message._stamp
@@ -91,7 +98,11 @@ def fill_send_goal_response_codec(
         message = new_fill_send_goal_response()
         stamp = new_time()
         message._stamp = stamp
-        message._accepted, stamp._sec, stamp._nanosec = read_values(data, 4)
+        (
+            message._accepted,
+            stamp._sec,
+            stamp._nanosec,
+        ) = read_accepted(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -119,10 +130,10 @@ def fill_send_goal_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "16Bf").pack
+    write_request_item_goal_id_uuid = _idlc.layout(order, "16Bf").pack
     write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_values_2 = _idlc.layout(order, "?iI").pack
+    write_response_item_accepted = _idlc.layout(order, "?iI").pack
     new_fill_send_goal_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -131,14 +142,14 @@ def fill_send_goal_event_codec(
     new_fill_goal = _idlc.maker(Fill_Goal)
     new_fill_send_goal_response = _idlc.maker(Fill_SendGoal_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_values_2 = _idlc.layout(order, "16Bf").unpack_from
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item_goal_id_uuid = _idlc.layout(order, "16Bf").unpack_from
     read_count = _idlc.layout(order, "I").unpack_from
-    read_values_3 = _idlc.layout(order, "?iI").unpack_from
+    read_response_item_accepted = _idlc.layout(order, "?iI").unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
@@ -146,8 +157,8 @@ def fill_send_goal_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -155,22 +166,23 @@ def fill_send_goal_event_codec(
         ]
         put = parts.append
         for request_item in request:
-            goal_id = request_item._goal_id
-            goal = request_item._goal
-            put(write_values(bytes_of_uint8_16(goal_id._uuid), goal._level))
+            request_item_goal_id = request_item._goal_id
+            request_item_goal = request_item._goal
+            put(write_request_item_goal_id_uuid(
+                bytes_of_uint8_16(request_item_goal_id._uuid),
+                request_item_goal._level,
+            ))
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_count(len(response)))
         for response_item in response:
             response_item_stamp = response_item._stamp
-            put(
-                write_values_2(
-                    truths[response_item._accepted],
-                    response_item_stamp._sec,
-                    response_item_stamp._nanosec,
-                ),
-            )
+            put(write_response_item_accepted(
+                truths[response_item._accepted],
+                response_item_stamp._sec,
+                response_item_stamp._nanosec,
+            ))
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -178,17 +190,17 @@ def fill_send_goal_event_codec(
         message = new_fill_send_goal_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
@@ -197,12 +209,15 @@ def fill_send_goal_event_codec(
         message._request = request
         at = 48
         for request_item in request:
-            goal_id = new_uuid()
-            request_item._goal_id = goal_id
-            goal = new_fill_goal()
-            request_item._goal = goal
-            uuid, goal._level = read_values_2(data, at)
-            goal_id._uuid = array_of_uint8_16(uuid)
+            request_item_goal_id = new_uuid()
+            request_item._goal_id = request_item_goal_id
+            request_item_goal = new_fill_goal()
+            request_item._goal = request_item_goal
+            (
+                request_item_goal_id_uuid,
+                request_item_goal._level,
+            ) = read_request_item_goal_id_uuid(data, at)
+            request_item_goal_id._uuid = array_of_uint8_16(request_item_goal_id_uuid)
             at = at + 20
         (count,) = read_count(data, at)
         if count > 1:
@@ -219,7 +234,7 @@ def fill_send_goal_event_codec(
                 response_item._accepted,
                 response_item_stamp._sec,
                 response_item_stamp._nanosec,
-            ) = read_values_3(data, at)
+            ) = read_response_item_accepted(data, at)
             at = at + 12
         return message
 
@@ -243,19 +258,24 @@ def fill_get_result_request_codec(
     new_fill_get_result_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16B", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
-        parts = [write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid))]
+        parts = [
+            write_head(
+                encapsulation,
+                bytes_of_uint8_16(goal_id._uuid),
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_get_result_request()
         goal_id = new_uuid()
         message._goal_id = goal_id
-        (uuid,) = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (goal_id_uuid,) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -273,18 +293,27 @@ def fill_get_result_response_codec(
     write_head = _idlc.layout(order, "4sbf").pack
     new_fill_get_result_response = _idlc.maker(kind)
     new_fill_result = _idlc.maker(Fill_Result)
-    read_values = _idlc.layout(order, "bf", start=4).unpack_from
+    read_status = _idlc.layout(order, "bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [write_head(encapsulation, message._status, result._reached)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._status,
+                result._reached,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_get_result_response()
         result = new_fill_result()
         message._result = result
-        message._status, result._reached = read_values(data, 4)
+        (
+            message._status,
+            result._reached,
+        ) = read_status(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -312,9 +341,9 @@ def fill_get_result_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "16B", start=4).pack
+    write_request_item = _idlc.layout(order, "16B", start=4).pack
     write_count = _idlc.layout(order, "I").pack
-    write_values_2 = _idlc.layout(order, "bf", start=4).pack
+    write_response_item_status = _idlc.layout(order, "bf", start=4).pack
     new_fill_get_result_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -323,23 +352,18 @@ def fill_get_result_event_codec(
     new_fill_get_result_response = _idlc.maker(Fill_GetResult_Response)
     new_fill_result = _idlc.maker(Fill_Result)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "16B", start=4).iter_unpack
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item = _idlc.layout(order, "16B", start=4).iter_unpack
     read_count = _idlc.layout(order, "I").unpack_from
-    read_values_2 = _idlc.layout(order, "bf", start=4).unpack_from
+    read_response_item_status = _idlc.layout(order, "bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join(
-            [
-                write_values(bytes_of_uint8_16(request_item._goal_id._uuid))
-                for request_item in request
-            ],
-        )
+        request_block = b"".join([write_request_item(bytes_of_uint8_16(request_item._goal_id._uuid)) for request_item in request])
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
@@ -347,8 +371,8 @@ def fill_get_result_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -358,8 +382,11 @@ def fill_get_result_event_codec(
         ]
         put = parts.append
         for response_item in response:
-            result = response_item._result
-            put(write_values_2(response_item._status, result._reached))
+            response_item_result = response_item._result
+            put(write_response_item_status(
+                response_item._status,
+                response_item_result._reached,
+            ))
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -367,29 +394,29 @@ def fill_get_result_event_codec(
         message = new_fill_get_result_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[Any] = []
         message._request = request
         end = 48 + 16 * count
-        for request_item_values in read_rows(data[48:end]):
+        for request_item_values in read_request_item(data[48:end]):
             request_item = new_fill_get_result_request()
             request.append(request_item)
-            goal_id = new_uuid()
-            request_item._goal_id = goal_id
-            (uuid,) = request_item_values
-            goal_id._uuid = array_of_uint8_16(uuid)
+            request_item_goal_id = new_uuid()
+            request_item._goal_id = request_item_goal_id
+            (request_item_goal_id_uuid,) = request_item_values
+            request_item_goal_id._uuid = array_of_uint8_16(request_item_goal_id_uuid)
         (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
@@ -399,9 +426,12 @@ def fill_get_result_event_codec(
         message._response = response
         at = end + 4
         for response_item in response:
-            result = new_fill_result()
-            response_item._result = result
-            response_item._status, result._reached = read_values_2(data, at)
+            response_item_result = new_fill_result()
+            response_item._result = response_item_result
+            (
+                response_item._status,
+                response_item_result._reached,
+            ) = read_response_item_status(data, at)
             at = at + 8
         return message
 
@@ -427,7 +457,7 @@ def fill_feedback_message_codec(
     new_uuid = _idlc.maker(UUID)
     new_fill_feedback = _idlc.maker(Fill_Feedback)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bf", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
@@ -447,8 +477,11 @@ def fill_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_fill_feedback()
         message._feedback = feedback
-        uuid, feedback._level = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            feedback._level,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)

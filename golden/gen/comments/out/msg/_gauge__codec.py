@@ -30,15 +30,15 @@ def gauge_codec(
     array = _idlc.array_of(order)
     write_count_at = _idlc.phases(order, "I")
     bytes_of_float64_9 = _arrays.array_writer(order, "float64", 9)
-    write_values_at = _idlc.phases(order, "9dc")
+    write_covariance_at = _idlc.phases(order, "9dc")
     new_gauge = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "fBI", start=4).unpack_from
+    read_rate = _idlc.layout(order, "fBI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from
     read_notes = _idlc.texts_reader(order, text)
-    read_int16 = _idlc.sequence_reader(order, "h", reading)
+    sequence_of_int16 = _idlc.sequence_reader(order, "h", reading)
     array_of_float64_9 = _arrays.array_reader(order, "float64", 9, reading)
-    read_values_2 = _idlc.layout(order, "9dc", start=4).unpack_from
+    read_covariance = _idlc.layout(order, "9dc", start=4).unpack_from
     small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -65,7 +65,7 @@ def gauge_codec(
             notes,
             write_count_at[low & 3].pack(samples_count),
             samples,
-            write_values_at[at & 7].pack(
+            write_covariance_at[at & 7].pack(
                 bytes_of_float64_9(message._covariance),
                 message._flags,
             ),
@@ -79,7 +79,11 @@ def gauge_codec(
         limit = len(data)
         view = data if limit < small else memoryview(data)
         message = new_gauge()
-        message._rate, message._level, size = read_values(data, 4)
+        (
+            message._rate,
+            message._level,
+            size,
+        ) = read_rate(data, 4)
         end = 15 + size
         if data[end]:
             raise ValueError("text without end")
@@ -92,9 +96,12 @@ def gauge_codec(
         at = end + 3 & -4
         (count,) = read_count(data, at)
         end = at + 4 + 2 * count
-        message._samples = read_int16(view[at + 4 : end])
+        message._samples = sequence_of_int16(view[at + 4 : end])
         at = (end + 3 & -8) + 4
-        covariance, message._flags = read_values_2(data, at)
+        (
+            covariance,
+            message._flags,
+        ) = read_covariance(data, at)
         message._covariance = array_of_float64_9(covariance)
         return message
 

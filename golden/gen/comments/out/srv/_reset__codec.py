@@ -24,13 +24,19 @@ def reset_request_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_reset_request = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         reason = message._reason.encode()
         reason_size = len(reason)
-        parts = [write_head[reason_size](encapsulation, reason_size + 1, reason)]
+        parts = [
+            write_head[reason_size](
+                encapsulation,
+                reason_size + 1,
+                reason,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -55,15 +61,20 @@ def reset_response_codec(
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack
     new_reset_response = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "?", start=4).unpack_from
+    read_ok = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, truths[message._ok])]
+        parts = [
+            write_head(
+                encapsulation,
+                truths[message._ok],
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_reset_response()
-        (message._ok,) = read_values(data, 4)
+        (message._ok,) = read_ok(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

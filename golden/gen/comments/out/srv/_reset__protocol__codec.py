@@ -40,21 +40,21 @@ def reset_event_codec(
     write_text_at = _idlc.text_phases(order, "I*")
     write_count_at = _idlc.phases(order, "I")
     truths = _idlc.TRUTHS
-    write_values = _idlc.layout(order, "?", start=4).pack
+    write_response_item = _idlc.layout(order, "?", start=4).pack
     new_reset_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_reset_request = _idlc.maker(Reset_Request)
     new_reset_response = _idlc.maker(Reset_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    read_rows = _idlc.layout(order, "?", start=4).iter_unpack
+    read_response_item = _idlc.layout(order, "?", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
@@ -63,8 +63,8 @@ def reset_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -72,16 +72,17 @@ def reset_event_codec(
         ]
         put = parts.append
         for request_item in request:
-            reason = request_item._reason.encode()
-            reason_size = len(reason)
-            put(write_text_at[low & 3][reason_size](reason_size + 1, reason))
-            low = reason_size + 1
+            request_item_reason = request_item._reason.encode()
+            request_item_reason_size = len(request_item_reason)
+            put(write_text_at[low & 3][request_item_reason_size](
+                request_item_reason_size + 1,
+                request_item_reason,
+            ))
+            low = request_item_reason_size + 1
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        response_block = b"".join(
-            [write_values(truths[response_item._ok]) for response_item in response],
-        )
+        response_block = b"".join([write_response_item(truths[response_item._ok]) for response_item in response])
         put(write_count_at[low & 3].pack(len(response)))
         put(response_block)
         return join(parts)
@@ -91,17 +92,17 @@ def reset_event_codec(
         message = new_reset_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 4 * count > limit:
@@ -123,7 +124,7 @@ def reset_event_codec(
         response: list[Any] = []
         message._response = response
         end = at + 4 + count
-        for response_item_values in read_rows(data[at + 4 : end]):
+        for response_item_values in read_response_item(data[at + 4 : end]):
             response_item = new_reset_response()
             response.append(response_item)
             (response_item._ok,) = response_item_values

@@ -37,69 +37,73 @@ def everything_codec(
     write_head = _idlc.Texts(order, "4s?BdI*I")
     listed = _idlc.listed
     write_count = _idlc.layout(order, "I").pack
-    write_text_at = _idlc.text_phases(order, "BdI*I")
+    write_inners_item_a_at = _idlc.text_phases(order, "BdI*I")
     bytes_of_uint8_3 = _arrays.array_writer(order, "uint8", 3)
-    write_values = _idlc.layout(order, "IH3B", start=4).pack
+    write_rows_item = _idlc.layout(order, "IH3B", start=4).pack
+    write_pair_item = _idlc.layout(order, "IH3B", start=4).pack
     pad4 = _idlc.PAD4
-    write_values_at = _idlc.phases(order, "xI")
-    write_values_2 = _idlc.layout(order, "x", start=4).pack
+    write_nothing_at = _idlc.phases(order, "xI")
+    write_nothings_item = _idlc.layout(order, "x", start=4).pack
     array_of_float64 = _idlc.sequence_writer(order, "d")
     array = _idlc.array_of(order)
     write_count_at = _idlc.phases(order, "I")
     pad8 = _idlc.PAD8
     array_of_int16 = _idlc.sequence_writer(order, "h")
-    flags_2 = _idlc.flags
+    flags_of = _idlc.flags
     octets_2 = _idlc.octets_writer(2)
-    write_values_3 = _idlc.layout(order, "2B").pack
+    write_octets = _idlc.layout(order, "2B").pack
     write_texts = _idlc.text_block(order)
     write_wides = _idlc.wide_block(order, size=2)
-    write_values_4 = _idlc.layout(order, "iI", start=4).pack
+    write_stamps_item = _idlc.layout(order, "iI", start=4).pack
     bytes_of_float32_4 = _arrays.array_writer(order, "float32", 4)
-    write_values_at_2 = _idlc.phases(order, "4fq")
+    write_weights_at = _idlc.phases(order, "4fq")
     new_everything = _idlc.maker(kind)
     new_inner = _idlc.maker(Inner)
     new_row = _idlc.maker(Row)
     new_nothing = _idlc.maker(Nothing)
     new_time = _idlc.maker(Time)
-    read_values = _idlc.layout(order, "?BdI", start=4).unpack_from
+    read_flag = _idlc.layout(order, "?BdI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
-    read_values_at = _idlc.phases(order, "BdI")
+    read_inners_item_a_at = _idlc.phases(order, "BdI")
     array_of_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
-    read_values_2 = _idlc.layout(order, "IH3B").unpack_from
-    read_rows = _idlc.layout(order, "x", start=4).iter_unpack
-    read_float64 = _idlc.sequence_reader(order, "d", reading)
-    read_int16 = _idlc.sequence_reader(order, "h", reading)
-    read_flags = _idlc.read_flags
-    read_octets = _idlc.read_octets
-    read_values_at_2 = _idlc.phases(order, "2BI")
+    read_rows_item_a = _idlc.layout(order, "IH3B").unpack_from
+    read_pair_item_a = _idlc.layout(order, "IH3B").unpack_from
+    read_nothing_at = _idlc.phases(order, "xI")
+    read_nothings_item = _idlc.layout(order, "x", start=4).iter_unpack
+    sequence_of_float64 = _idlc.sequence_reader(order, "d", reading)
+    sequence_of_int16 = _idlc.sequence_reader(order, "h", reading)
+    list_of_flags = _idlc.read_flags
+    list_of_octets = _idlc.read_octets
+    read_octets_at = _idlc.phases(order, "2BI")
     read_texts = _idlc.texts_reader(order, text)
     read_wides = _idlc.wide_texts_reader(order)
-    read_rows_2 = _idlc.layout(order, "iI", start=4).iter_unpack
+    read_stamps_item = _idlc.layout(order, "iI", start=4).iter_unpack
     array_of_float32_4 = _arrays.array_reader(order, "float32", 4, reading)
+    read_weights_at = _idlc.phases(order, "4fq")
     small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         inner = message._inner
-        c = inner._c.encode()
-        c_size = len(c)
-        d = wide_text(inner._d)
-        at = (c_size + 28 & -4) + 4
-        at = at + len(d)
+        inner_c = inner._c.encode()
+        inner_c_size = len(inner_c)
+        inner_d = wide_text(inner._d)
+        at = (inner_c_size + 28 & -4) + 4
+        at = at + len(inner_d)
         inners = listed(message._inners)
         at = at + 4
         parts = [
-            write_head[c_size](
+            write_head[inner_c_size](
                 encapsulation,
                 truths[message._flag],
                 inner._a,
                 inner._b,
-                c_size + 1,
-                c,
-                len(d) // 4,
+                inner_c_size + 1,
+                inner_c,
+                len(inner_d) // 4,
             ),
-            d,
+            inner_d,
             write_count(len(inners)),
         ]
         put = parts.append
@@ -107,15 +111,13 @@ def everything_codec(
             inners_item_c = inners_item._c.encode()
             inners_item_c_size = len(inners_item_c)
             inners_item_d = wide_text(inners_item._d)
-            put(
-                write_text_at[at & 7][inners_item_c_size](
-                    inners_item._a,
-                    inners_item._b,
-                    inners_item_c_size + 1,
-                    inners_item_c,
-                    len(inners_item_d) // 4,
-                ),
-            )
+            put(write_inners_item_a_at[at & 7][inners_item_c_size](
+                inners_item._a,
+                inners_item._b,
+                inners_item_c_size + 1,
+                inners_item_c,
+                len(inners_item_d) // 4,
+            ))
             at = ((at + 4 & -8) + inners_item_c_size + 20 & -4) + 4
             put(inners_item_d)
             at = at + len(inners_item_d)
@@ -123,12 +125,14 @@ def everything_codec(
         if len(rows) > 4:
             raise ValueError("too many elements")
         at = at + 4
-        rows_block = b"\x00\x00\x00".join(
-            [
-                write_values(rows_item._a, rows_item._b, bytes_of_uint8_3(rows_item._c))
-                for rows_item in rows
-            ],
-        )
+        rows_block = b"\x00\x00\x00".join([
+            write_rows_item(
+                rows_item._a,
+                rows_item._b,
+                bytes_of_uint8_3(rows_item._c),
+            )
+            for rows_item in rows
+        ])
         low = 0
         if rows:
             at = at + 12 * len(rows) - 3
@@ -136,12 +140,14 @@ def everything_codec(
         pair = listed(message._pair)
         if len(pair) != 2:
             raise ValueError("wrong number of elements")
-        pair_block = b"\x00\x00\x00".join(
-            [
-                write_values(pair_item._a, pair_item._b, bytes_of_uint8_3(pair_item._c))
-                for pair_item in pair
-            ],
-        )
+        pair_block = b"\x00\x00\x00".join([
+            write_pair_item(
+                pair_item._a,
+                pair_item._b,
+                bytes_of_uint8_3(pair_item._c),
+            )
+            for pair_item in pair
+        ])
         at = (at + 3 & -4) + 12 * len(pair) - 3
         put(write_count(len(rows)))
         put(rows_block)
@@ -150,9 +156,9 @@ def everything_codec(
         low = 12 * len(pair) - 3
         nothings = listed(message._nothings)
         at = (at + 4 & -4) + 4
-        nothings_block = b"".join([write_values_2() for nothings_item in nothings])
+        nothings_block = b"".join([write_nothings_item() for nothings_item in nothings])
         at = at + len(nothings)
-        put(write_values_at[low & 3].pack(len(nothings)))
+        put(write_nothing_at[low & 3].pack(len(nothings)))
         put(nothings_block)
         low = len(nothings)
         doubles = message._doubles
@@ -174,7 +180,7 @@ def everything_codec(
         at = at + 4
         at = at + 2 * shorts_count
         low = 2 * shorts_count
-        flags = flags_2(message._flags)
+        flags = flags_of(message._flags)
         at = (at + 3 & -4) + 4
         at = at + len(flags)
         put(write_count(shorts_count))
@@ -186,7 +192,7 @@ def everything_codec(
         low = low + 2
         texts = write_texts(message._texts)
         at = (at + 3 & -4) + len(texts)
-        put(write_values_3(octets_2(message._octets)))
+        put(write_octets(octets_2(message._octets)))
         put(pad4[low & 3])
         put(texts)
         low = len(texts)
@@ -194,25 +200,27 @@ def everything_codec(
         at = (at + 3 & -4) + len(wides)
         stamps = listed(message._stamps)
         at = at + 4
-        stamps_block = b"".join(
-            [
-                write_values_4(stamps_item._sec, stamps_item._nanosec)
-                for stamps_item in stamps
-            ],
-        )
+        stamps_block = b"".join([
+            write_stamps_item(
+                stamps_item._sec,
+                stamps_item._nanosec,
+            )
+            for stamps_item in stamps
+        ])
         at = at + 8 * len(stamps)
         put(pad4[low & 3])
         put(wides)
         put(write_count(len(stamps)))
         put(stamps_block)
-        put(
-            write_values_at_2[at & 7].pack(
-                bytes_of_float32_4(message._weights),
-                message._last,
-            ),
-        )
+        put(write_weights_at[at & 7].pack(
+            bytes_of_float32_4(message._weights),
+            message._last,
+        ))
         raw = join(parts)
-        if len(doubles) != doubles_count or len(shorts) != shorts_count:
+        if (
+            len(doubles) != doubles_count
+            or len(shorts) != shorts_count
+        ):
             return encode(message, join)
         return raw
 
@@ -222,7 +230,12 @@ def everything_codec(
         message = new_everything()
         inner = new_inner()
         message._inner = inner
-        message._flag, inner._a, inner._b, size = read_values(data, 4)
+        (
+            message._flag,
+            inner._a,
+            inner._b,
+            size,
+        ) = read_flag(data, 4)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")
@@ -238,8 +251,12 @@ def everything_codec(
         message._inners = inners
         end = end + 4
         for inners_item in inners:
-            struct = read_values_at[end & 7]
-            inners_item._a, inners_item._b, size = struct.unpack_from(data, end)
+            struct = read_inners_item_a_at[end & 7]
+            (
+                inners_item._a,
+                inners_item._b,
+                size,
+            ) = struct.unpack_from(data, end)
             at = end + struct.size
             end = at - 1 + size
             if data[end]:
@@ -259,7 +276,11 @@ def everything_codec(
         at = end + 4
         for rows_item in rows:
             at = at + 3 & -4
-            rows_item._a, rows_item._b, rows_item_c = read_values_2(data, at)
+            (
+                rows_item._a,
+                rows_item._b,
+                rows_item_c,
+            ) = read_rows_item_a(data, at)
             rows_item._c = array_of_uint8_3(rows_item_c)
             at = at + 9
         if at + 18 > limit:
@@ -268,18 +289,22 @@ def everything_codec(
         message._pair = pair
         for pair_item in pair:
             at = at + 3 & -4
-            pair_item._a, pair_item._b, pair_item_c = read_values_2(data, at)
+            (
+                pair_item._a,
+                pair_item._b,
+                pair_item_c,
+            ) = read_pair_item_a(data, at)
             pair_item._c = array_of_uint8_3(pair_item_c)
             at = at + 9
         nothing = new_nothing()
         message._nothing = nothing
-        struct = write_values_at[at & 7]
+        struct = read_nothing_at[at & 7]
         (count,) = struct.unpack_from(data, at)
         at = at + struct.size
         nothings: list[Any] = []
         message._nothings = nothings
         end = at + count
-        for _ in read_rows(view[at:end]):
+        for _ in read_nothings_item(view[at:end]):
             nothings_item = new_nothing()
             nothings.append(nothings_item)
         at = end + 3 & -4
@@ -288,21 +313,24 @@ def everything_codec(
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        message._doubles = read_float64(view[at:end])
+        message._doubles = sequence_of_float64(view[at:end])
         (count,) = read_count(data, end)
         if count > 3:
             raise ValueError("too many elements")
         at = end + 4
         end = at + 2 * count
-        message._shorts = read_int16(view[at:end])
+        message._shorts = sequence_of_int16(view[at:end])
         at = end + 3 & -4
         (count,) = read_count(data, at)
         end = at + 4 + count
-        message._flags = read_flags(view[at + 4 : end])
-        struct = read_values_at_2[end & 7]
-        octets, count = struct.unpack_from(data, end)
+        message._flags = list_of_flags(view[at + 4 : end])
+        struct = read_octets_at[end & 7]
+        (
+            octets,
+            count,
+        ) = struct.unpack_from(data, end)
         at = end + struct.size
-        message._octets = read_octets(octets)
+        message._octets = list_of_octets(octets)
         message._texts, end = read_texts(data, at, count)
         at = end + 3 & -4
         message._wides, end = read_wides(data, at, 2)
@@ -311,11 +339,17 @@ def everything_codec(
         message._stamps = stamps
         at = end + 4
         end = at + 8 * count
-        for stamps_item_values in read_rows_2(view[at:end]):
+        for stamps_item_values in read_stamps_item(view[at:end]):
             stamps_item = new_time()
             stamps.append(stamps_item)
-            stamps_item._sec, stamps_item._nanosec = stamps_item_values
-        weights, message._last = write_values_at_2[end & 7].unpack_from(data, end)
+            (
+                stamps_item._sec,
+                stamps_item._nanosec,
+            ) = stamps_item_values
+        (
+            weights,
+            message._last,
+        ) = read_weights_at[end & 7].unpack_from(data, end)
         message._weights = array_of_float32_4(weights)
         return message
 

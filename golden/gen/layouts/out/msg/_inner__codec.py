@@ -25,7 +25,7 @@ def inner_codec(
     wide_text = _idlc.wide_text(order)
     write_head = _idlc.Texts(order, "4sBdI*I")
     new_inner = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "BdI", start=4).unpack_from
+    read_a = _idlc.layout(order, "BdI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
@@ -50,7 +50,11 @@ def inner_codec(
     def decode(data: Any) -> Any:
         limit = len(data)
         message = new_inner()
-        message._a, message._b, size = read_values(data, 4)
+        (
+            message._a,
+            message._b,
+            size,
+        ) = read_a(data, 4)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")

@@ -24,7 +24,7 @@ def nothing_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
     new_nothing = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "x", start=4).unpack_from
+    read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         parts = [write_head(encapsulation)]
@@ -32,7 +32,7 @@ def nothing_codec(
 
     def decode(data: Any) -> Any:
         message = new_nothing()
-        read_values(data, 4)
+        read_nothing(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

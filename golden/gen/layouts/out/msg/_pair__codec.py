@@ -25,9 +25,8 @@ def pair_codec(
     write_head = _idlc.Texts(order, "4sI*", align=4)
     write_text = _idlc.Texts(order, "I*")
     new_pair = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    read_count_2 = _idlc.layout(order, "I").unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         key = message._key.encode()
@@ -35,8 +34,15 @@ def pair_codec(
         value = message._value.encode()
         value_size = len(value)
         parts = [
-            write_head[key_size](encapsulation, key_size + 1, key),
-            write_text[value_size](value_size + 1, value),
+            write_head[key_size](
+                encapsulation,
+                key_size + 1,
+                key,
+            ),
+            write_text[value_size](
+                value_size + 1,
+                value,
+            ),
         ]
         return join(parts)
 
@@ -48,7 +54,7 @@ def pair_codec(
             raise ValueError("text without end")
         message._key = text(data[8:end])
         at = end + 4 & -4
-        (size,) = read_count_2(data, at)
+        (size,) = read_count(data, at)
         end = at + 3 + size
         if data[end]:
             raise ValueError("text without end")

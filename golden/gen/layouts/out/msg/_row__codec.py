@@ -28,7 +28,7 @@ def row_codec(
     write_head = _idlc.layout(order, "4sIH3B").pack
     new_row = _idlc.maker(kind)
     array_of_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
-    read_values = _idlc.layout(order, "IH3B", start=4).unpack_from
+    read_a = _idlc.layout(order, "IH3B", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         parts = [
@@ -43,7 +43,11 @@ def row_codec(
 
     def decode(data: Any) -> Any:
         message = new_row()
-        message._a, message._b, c = read_values(data, 4)
+        (
+            message._a,
+            message._b,
+            c,
+        ) = read_a(data, 4)
         message._c = array_of_uint8_3(c)
         return message
 

@@ -32,19 +32,18 @@ def texts_codec(
     write_rows = _idlc.rows_writer(order)
     listed = _idlc.listed
     write_count_at = _idlc.phases(order, "I")
-    write_text_at = _idlc.text_phases(order, "I*", align=4)
+    write_text_4_at = _idlc.text_phases(order, "I*", align=4)
     write_text = _idlc.Texts(order, "I*")
-    write_text_2 = _idlc.Texts(order, "BI*I", align=4)
-    write_values_at = _idlc.phases(order, "d")
+    write_titled_item_level = _idlc.Texts(order, "BI*I", align=4)
+    write_titled_item_number_at = _idlc.phases(order, "d")
     new_texts = _idlc.maker(kind)
     new_pair = _idlc.maker(Pair)
     new_titled = _idlc.maker(Titled)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     strings = _idlc.strings_reader(order, reading.text)
-    read_count_2 = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    read_values = _idlc.layout(order, "BI").unpack_from
-    read_values_2 = _idlc.layout(order, "d", start=4).unpack_from
+    read_titled_item_level = _idlc.layout(order, "BI").unpack_from
+    read_titled_item_number = _idlc.layout(order, "d", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         pairs = message._pairs
@@ -52,24 +51,18 @@ def texts_codec(
         if len(pairs):
             try:
                 for pairs_item in pairs:
-                    key = pairs_item._key
-                    value = pairs_item._value
+                    pairs_item_key = pairs_item._key
+                    pairs_item_value = pairs_item._value
                     pairs_rows += (
-                        sized[len(key)],
-                        key,
-                        ended[len(key)],
-                        sized[len(value)],
-                        value,
-                        ended[len(value)],
+                        sized[len(pairs_item_key)],
+                        pairs_item_key,
+                        ended[len(pairs_item_key)],
+                        sized[len(pairs_item_value)],
+                        pairs_item_value,
+                        ended[len(pairs_item_value)],
                     )
             except IndexError:
-                pairs_rows = unsized(
-                    [
-                        each
-                        for pairs_item in pairs
-                        for each in (pairs_item._key, pairs_item._value)
-                    ],
-                )
+                pairs_rows = unsized([each for pairs_item in pairs for each in (pairs_item._key, pairs_item._value)])
         pairs_block = write_rows(pairs_rows)
         at = len(pairs_block) + 8
         low = len(pairs_block)
@@ -78,7 +71,10 @@ def texts_codec(
             raise ValueError("too many elements")
         at = (at + 3 & -4) + 4
         parts = [
-            write_head(encapsulation, len(pairs_rows) // 6),
+            write_head(
+                encapsulation,
+                len(pairs_rows) // 6,
+            ),
             pairs_block,
             write_count_at[low & 3].pack(len(few)),
         ]
@@ -87,29 +83,25 @@ def texts_codec(
         for few_item in few:
             few_item_key = few_item._key.encode()
             few_item_key_size = len(few_item_key)
-            put(
-                write_text_at[low & 3][few_item_key_size](
-                    few_item_key_size + 1,
-                    few_item_key,
-                ),
-            )
+            put(write_text_4_at[low & 3][few_item_key_size](
+                few_item_key_size + 1,
+                few_item_key,
+            ))
             at = (at + 3 & -4) + few_item_key_size + 8 & -4
             few_item_value = few_item._value.encode()
             few_item_value_size = len(few_item_value)
-            put(
-                write_text[few_item_value_size](
-                    few_item_value_size + 1,
-                    few_item_value,
-                ),
-            )
+            put(write_text[few_item_value_size](
+                few_item_value_size + 1,
+                few_item_value,
+            ))
             at = at + few_item_value_size + 5
             low = few_item_value_size + 1
         titled = listed(message._titled)
         at = (at + 3 & -4) + 4
         put(write_count_at[low & 3].pack(len(titled)))
         for titled_item in titled:
-            title = titled_item._title.encode()
-            title_size = len(title)
+            titled_item_title = titled_item._title.encode()
+            titled_item_title_size = len(titled_item_title)
             titled_item_pairs = titled_item._pairs
             titled_item_pairs_rows: list[str] = []
             if len(titled_item_pairs):
@@ -126,33 +118,25 @@ def texts_codec(
                             ended[len(titled_item_pairs_item_value)],
                         )
                 except IndexError:
-                    titled_item_pairs_rows = unsized(
-                        [
-                            each_2
-                            for titled_item_pairs_item in titled_item_pairs
-                            for each_2 in (
-                                titled_item_pairs_item._key,
-                                titled_item_pairs_item._value,
-                            )
-                        ],
-                    )
-            put(
-                write_text_2[title_size](
-                    titled_item._level,
-                    title_size + 1,
-                    title,
-                    len(titled_item_pairs_rows) // 6,
-                ),
-            )
-            at = (at + title_size + 12 & -4) + 4
+                    titled_item_pairs_rows = unsized([each for titled_item_pairs_item in titled_item_pairs for each in (titled_item_pairs_item._key, titled_item_pairs_item._value)])
+            put(write_titled_item_level[titled_item_title_size](
+                titled_item._level,
+                titled_item_title_size + 1,
+                titled_item_title,
+                len(titled_item_pairs_rows) // 6,
+            ))
+            at = (at + titled_item_title_size + 12 & -4) + 4
             titled_item_pairs_block = write_rows(titled_item_pairs_rows)
             put(titled_item_pairs_block)
             at = at + len(titled_item_pairs_block)
-            put(write_values_at[at & 7].pack(titled_item._number))
+            put(write_titled_item_number_at[at & 7].pack(titled_item._number))
             at = (at + 3 & -8) + 12
         last = message._last.encode()
         last_size = len(last)
-        put(write_text[last_size](last_size + 1, last))
+        put(write_text[last_size](
+            last_size + 1,
+            last,
+        ))
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -177,7 +161,7 @@ def texts_codec(
                 raise ValueError("text without end")
             pairs_item._value = to_str(chars[at:end])
         at = end + 4 & -4
-        (count,) = read_count_2(data, at)
+        (count,) = read_count(data, at)
         if count > 2:
             raise ValueError("too many elements")
         if at + 4 + 8 * count > limit:
@@ -187,32 +171,35 @@ def texts_codec(
         end = at + 3
         for few_item in few:
             at = end + 4 & -4
-            (size,) = read_count_2(data, at)
+            (size,) = read_count(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
             few_item._key = text(data[at + 4 : end])
             at = end + 4 & -4
-            (size,) = read_count_2(data, at)
+            (size,) = read_count(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
             few_item._value = text(data[at + 4 : end])
         at = end + 4 & -4
-        (count,) = read_count_2(data, at)
+        (count,) = read_count(data, at)
         if at + 4 + 17 * count > limit:
             raise ValueError("too short")
         titled = [new_titled() for _ in range(count)]
         message._titled = titled
         at = at + 4
         for titled_item in titled:
-            titled_item._level, size = read_values(data, at)
+            (
+                titled_item._level,
+                size,
+            ) = read_titled_item_level(data, at)
             end = at + 7 + size
             if data[end]:
                 raise ValueError("text without end")
             titled_item._title = text(data[at + 8 : end])
             at = end + 4 & -4
-            (count,) = read_count_2(data, at)
+            (count,) = read_count(data, at)
             if at + 4 + 8 * count > limit:
                 raise ValueError("too short")
             titled_item_pairs = [new_pair() for _ in range(count)]
@@ -220,21 +207,21 @@ def texts_codec(
             end = at + 3
             for titled_item_pairs_item in titled_item_pairs:
                 at = end + 4 & -4
-                (size,) = read_count_2(data, at)
+                (size,) = read_count(data, at)
                 end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
                 titled_item_pairs_item._key = text(data[at + 4 : end])
                 at = end + 4 & -4
-                (size,) = read_count_2(data, at)
+                (size,) = read_count(data, at)
                 end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
                 titled_item_pairs_item._value = text(data[at + 4 : end])
             at = (end + 4 & -8) + 4
-            (titled_item._number,) = read_values_2(data, at)
+            (titled_item._number,) = read_titled_item_number(data, at)
             at = at + 8
-        (size,) = read_count_2(data, at)
+        (size,) = read_count(data, at)
         end = at + 3 + size
         if data[end]:
             raise ValueError("text without end")

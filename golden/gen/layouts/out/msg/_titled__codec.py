@@ -29,14 +29,14 @@ def titled_codec(
     unsized = _idlc.unsized
     write_head = _idlc.Texts(order, "4sBI*I", align=4)
     write_rows = _idlc.rows_writer(order)
-    write_values_at = _idlc.phases(order, "d")
+    write_number_at = _idlc.phases(order, "d")
     new_titled = _idlc.maker(kind)
     new_pair = _idlc.maker(Pair)
-    read_values = _idlc.layout(order, "BI", start=4).unpack_from
+    read_level = _idlc.layout(order, "BI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from
     strings = _idlc.strings_reader(order, reading.text)
-    read_values_2 = _idlc.layout(order, "d", start=4).unpack_from
+    read_number = _idlc.layout(order, "d", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         title = message._title.encode()
@@ -46,24 +46,18 @@ def titled_codec(
         if len(pairs):
             try:
                 for pairs_item in pairs:
-                    key = pairs_item._key
-                    value = pairs_item._value
+                    pairs_item_key = pairs_item._key
+                    pairs_item_value = pairs_item._value
                     pairs_rows += (
-                        sized[len(key)],
-                        key,
-                        ended[len(key)],
-                        sized[len(value)],
-                        value,
-                        ended[len(value)],
+                        sized[len(pairs_item_key)],
+                        pairs_item_key,
+                        ended[len(pairs_item_key)],
+                        sized[len(pairs_item_value)],
+                        pairs_item_value,
+                        ended[len(pairs_item_value)],
                     )
             except IndexError:
-                pairs_rows = unsized(
-                    [
-                        each
-                        for pairs_item in pairs
-                        for each in (pairs_item._key, pairs_item._value)
-                    ],
-                )
+                pairs_rows = unsized([each for pairs_item in pairs for each in (pairs_item._key, pairs_item._value)])
         at = (title_size + 16 & -4) + 4
         pairs_block = write_rows(pairs_rows)
         at = at + len(pairs_block)
@@ -76,14 +70,17 @@ def titled_codec(
                 len(pairs_rows) // 6,
             ),
             pairs_block,
-            write_values_at[at & 7].pack(message._number),
+            write_number_at[at & 7].pack(message._number),
         ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         limit = len(data)
         message = new_titled()
-        message._level, size = read_values(data, 4)
+        (
+            message._level,
+            size,
+        ) = read_level(data, 4)
         end = 11 + size
         if data[end]:
             raise ValueError("text without end")
@@ -108,7 +105,7 @@ def titled_codec(
                 raise ValueError("text without end")
             pairs_item._value = to_str(chars[at:end])
         at = (end + 4 & -8) + 4
-        (message._number,) = read_values_2(data, at)
+        (message._number,) = read_number(data, at)
         return message
 
     return _idlc.Codec(encode, decode)

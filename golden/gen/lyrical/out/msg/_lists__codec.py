@@ -30,113 +30,106 @@ def lists_codec(
     listed = _idlc.listed
     write_count_at = _idlc.phases(order, "I")
     truths = _idlc.TRUTHS
-    write_text_at = _idlc.text_phases(order, "I*ic?d")
-    flags_2 = _idlc.flags
+    write_words_item_text_at = _idlc.text_phases(order, "I*ic?d")
+    write_three_item_text_at = _idlc.text_phases(order, "I*ic?d")
+    flags_of = _idlc.flags
     write_count = _idlc.layout(order, "I").pack
     octets_2 = _idlc.octets_writer(2)
-    write_values = _idlc.layout(order, "2B").pack
+    write_raw = _idlc.layout(order, "2B").pack
     pad4 = _idlc.PAD4
     write_wide = _idlc.wide_block(order, size=2)
-    write_str_2 = _idlc.text_block(order, bound=2)
+    write_str = _idlc.text_block(order, bound=2)
     bytes_of_float32_3 = _arrays.array_writer(order, "float32", 3)
     array_of_uint8 = _idlc.sequence_writer(order, "B")
     array = _idlc.array_of(order)
-    write_values_at = _idlc.phases(order, "3fI")
+    write_position_at = _idlc.phases(order, "3fI")
     write_texts_in_a_long_field_name = _idlc.text_block(order)
     new_lists = _idlc.maker(kind)
     new_words = _idlc.maker(Words)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
-    text_2 = reading.text
-    read_names = _idlc.texts_reader(order, text_2)
-    read_count_2 = _idlc.layout(order, "I").unpack_from
-    read_values_at = _idlc.phases(order, "ic?d")
-    read_flags = _idlc.read_flags
-    read_octets = _idlc.read_octets
-    read_values = _idlc.layout(order, "2B").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
+    text = reading.text
+    read_names = _idlc.texts_reader(order, text)
+    read_words_item_count_at = _idlc.phases(order, "ic?d")
+    read_three_item_count_at = _idlc.phases(order, "ic?d")
+    list_of_flags = _idlc.read_flags
+    list_of_octets = _idlc.read_octets
+    read_raw = _idlc.layout(order, "2B").unpack_from
     read_wide = _idlc.wide_texts_reader(order)
-    read_str_2 = _idlc.texts_reader(order, text_2)
+    read_str = _idlc.texts_reader(order, text)
     array_of_float32_3 = _arrays.array_reader(order, "float32", 3, reading)
-    read_values_2 = _idlc.layout(order, "3fI").unpack_from
-    read_uint8 = _idlc.sequence_reader(order, "B", reading)
-    read_texts_in_a_long_field_name = _idlc.texts_reader(order, text_2)
+    read_position = _idlc.layout(order, "3fI").unpack_from
+    sequence_of_uint8 = _idlc.sequence_reader(order, "B", reading)
+    read_texts_in_a_long_field_name = _idlc.texts_reader(order, text)
     small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         names = write_names(message._names)
         at = len(names) + 4
         low = len(names)
-        words_2 = listed(message._words)
+        words_ = listed(message._words)
         at = (at + 3 & -4) + 4
         parts = [
             write_head(encapsulation),
             names,
-            write_count_at[low & 3].pack(len(words_2)),
+            write_count_at[low & 3].pack(len(words_)),
         ]
         put = parts.append
-        for words_2_item in words_2:
-            text = words_2_item._text.encode()
-            text_size = len(text)
-            put(
-                write_text_at[at & 7][text_size](
-                    text_size + 1,
-                    text,
-                    words_2_item._count,
-                    words_2_item._raw,
-                    truths[words_2_item._list],
-                    words_2_item._d,
-                ),
-            )
-            at = ((at + text_size + 8 & -4) + 9 & -8) + 12
+        for words_item in words_:
+            words_item_text = words_item._text.encode()
+            words_item_text_size = len(words_item_text)
+            put(write_words_item_text_at[at & 7][words_item_text_size](
+                words_item_text_size + 1,
+                words_item_text,
+                words_item._count,
+                words_item._raw,
+                truths[words_item._list],
+                words_item._d,
+            ))
+            at = ((at + words_item_text_size + 8 & -4) + 9 & -8) + 12
         three = listed(message._three)
         if len(three) != 3:
             raise ValueError("wrong number of elements")
         for three_item in three:
             three_item_text = three_item._text.encode()
             three_item_text_size = len(three_item_text)
-            put(
-                write_text_at[at & 7][three_item_text_size](
-                    three_item_text_size + 1,
-                    three_item_text,
-                    three_item._count,
-                    three_item._raw,
-                    truths[three_item._list],
-                    three_item._d,
-                ),
-            )
+            put(write_three_item_text_at[at & 7][three_item_text_size](
+                three_item_text_size + 1,
+                three_item_text,
+                three_item._count,
+                three_item._raw,
+                truths[three_item._list],
+                three_item._d,
+            ))
             at = ((at + three_item_text_size + 8 & -4) + 9 & -8) + 12
-        flags = flags_2(message._flags)
+        flags = flags_of(message._flags)
         if len(flags) > 4:
             raise ValueError("too many elements")
         low = len(flags)
         low = low + 2
         wide = write_wide(message._wide)
-        str_2 = write_str_2(message._str)
+        str_ = write_str(message._str)
         put(write_count(len(flags)))
         put(flags)
-        put(write_values(octets_2(message._raw)))
+        put(write_raw(octets_2(message._raw)))
         put(pad4[low & 3])
         put(wide)
-        put(str_2)
-        low = len(str_2)
-        data_2 = message._data
-        if type(data_2) is not array:
-            data_2 = array_of_uint8(data_2)
-        data_2_count = len(data_2)
-        put(
-            write_values_at[low & 3].pack(
-                bytes_of_float32_3(message._position),
-                data_2_count,
-            ),
-        )
-        put(data_2)
-        low = data_2_count
-        texts_in_a_long_field_name = write_texts_in_a_long_field_name(
-            message._texts_in_a_long_field_name,
-        )
+        put(str_)
+        low = len(str_)
+        data_ = message._data
+        if type(data_) is not array:
+            data_ = array_of_uint8(data_)
+        data_count = len(data_)
+        put(write_position_at[low & 3].pack(
+            bytes_of_float32_3(message._position),
+            data_count,
+        ))
+        put(data_)
+        low = data_count
+        texts_in_a_long_field_name = write_texts_in_a_long_field_name(message._texts_in_a_long_field_name)
         put(pad4[low & 3])
         put(texts_in_a_long_field_name)
         raw = join(parts)
-        if len(data_2) != data_2_count:
+        if len(data_) != data_count:
             return encode(message, join)
         return raw
 
@@ -147,24 +140,24 @@ def lists_codec(
         (count,) = read_count(data, 4)
         message._names, end = read_names(data, 8, count)
         at = end + 3 & -4
-        (count,) = read_count_2(data, at)
+        (count,) = read_count(data, at)
         if at + 4 + 18 * count > limit:
             raise ValueError("too short")
-        words_2 = [new_words() for _ in range(count)]
-        message._words = words_2
+        words_ = [new_words() for _ in range(count)]
+        message._words = words_
         at = at + 4
-        for words_2_item in words_2:
-            (size,) = read_count_2(data, at)
+        for words_item in words_:
+            (size,) = read_count(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
-            words_2_item._text = text_2(data[at + 4 : end])
-            struct = read_values_at[end + 1 & 7]
+            words_item._text = text(data[at + 4 : end])
+            struct = read_words_item_count_at[end + 1 & 7]
             (
-                words_2_item._count,
-                words_2_item._raw,
-                words_2_item._list,
-                words_2_item._d,
+                words_item._count,
+                words_item._raw,
+                words_item._list,
+                words_item._d,
             ) = struct.unpack_from(data, end + 1)
             at = end + 1 + struct.size
         if at + 54 > limit:
@@ -172,12 +165,12 @@ def lists_codec(
         three = [new_words() for _ in range(3)]
         message._three = three
         for three_item in three:
-            (size,) = read_count_2(data, at)
+            (size,) = read_count(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
-            three_item._text = text_2(data[at + 4 : end])
-            struct = read_values_at[end + 1 & 7]
+            three_item._text = text(data[at + 4 : end])
+            struct = read_three_item_count_at[end + 1 & 7]
             (
                 three_item._count,
                 three_item._raw,
@@ -185,30 +178,30 @@ def lists_codec(
                 three_item._d,
             ) = struct.unpack_from(data, end + 1)
             at = end + 1 + struct.size
-        (count,) = read_count_2(data, at)
+        (count,) = read_count(data, at)
         if count > 4:
             raise ValueError("too many elements")
         end = at + 4 + count
-        message._flags = read_flags(view[at + 4 : end])
-        (raw_2,) = read_values(data, end)
-        message._raw = read_octets(raw_2)
+        message._flags = list_of_flags(view[at + 4 : end])
+        (raw_,) = read_raw(data, end)
+        message._raw = list_of_octets(raw_)
         at = end + 5 & -4
         message._wide, end = read_wide(data, at, 2)
-        (count,) = read_count_2(data, end)
+        (count,) = read_count(data, end)
         if count > 2:
             raise ValueError("too many elements")
-        message._str, end = read_str_2(data, end + 4, count)
+        message._str, end = read_str(data, end + 4, count)
         at = end + 3 & -4
-        position, count = read_values_2(data, at)
+        (
+            position,
+            count,
+        ) = read_position(data, at)
         message._position = array_of_float32_3(position)
         end = at + 16 + count
-        message._data = read_uint8(view[at + 16 : end])
+        message._data = sequence_of_uint8(view[at + 16 : end])
         at = end + 3 & -4
-        (count,) = read_count_2(data, at)
-        (
-            message._texts_in_a_long_field_name,
-            end,
-        ) = read_texts_in_a_long_field_name(data, at + 4, count)
+        (count,) = read_count(data, at)
+        message._texts_in_a_long_field_name, end = read_texts_in_a_long_field_name(data, at + 4, count)
         return message
 
     return _idlc.Codec(encode, decode, bulk=True)

@@ -25,18 +25,18 @@ def words_codec(
     truths = _idlc.TRUTHS
     write_head = _idlc.Texts(order, "4sI*ic?d")
     new_words = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
-    text_2 = reading.text
-    read_values_at = _idlc.phases(order, "ic?d")
+    read_count = _idlc.layout(order, "I").unpack_from
+    text = reading.text
+    read_count_at = _idlc.phases(order, "ic?d")
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        text = message._text.encode()
-        text_size = len(text)
+        text_ = message._text.encode()
+        text_size = len(text_)
         parts = [
             write_head[text_size](
                 encapsulation,
                 text_size + 1,
-                text,
+                text_,
                 message._count,
                 message._raw,
                 truths[message._list],
@@ -51,13 +51,13 @@ def words_codec(
         end = 7 + size
         if data[end]:
             raise ValueError("text without end")
-        message._text = text_2(data[8:end])
+        message._text = text(data[8:end])
         (
             message._count,
             message._raw,
             message._list,
             message._d,
-        ) = read_values_at[end + 1 & 7].unpack_from(data, end + 1)
+        ) = read_count_at[end + 1 & 7].unpack_from(data, end + 1)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -27,23 +27,27 @@ def run_request_codec(
     write_head = _idlc.layout(order, "4s", align=4).pack
     write_args = _idlc.text_block(order)
     truths = _idlc.TRUTHS
-    write_values = _idlc.layout(order, "?").pack
+    write_wait = _idlc.layout(order, "?").pack
     new_run_request = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
     read_args = _idlc.texts_reader(order, text)
-    read_values = _idlc.layout(order, "?").unpack_from
+    read_wait = _idlc.layout(order, "?").unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         args = write_args(message._args)
-        parts = [write_head(encapsulation), args, write_values(truths[message._wait])]
+        parts = [
+            write_head(encapsulation),
+            args,
+            write_wait(truths[message._wait]),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_run_request()
         (count,) = read_count(data, 4)
         message._args, end = read_args(data, 8, count)
-        (message._wait,) = read_values(data, end)
+        (message._wait,) = read_wait(data, end)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -61,34 +65,48 @@ def run_response_codec(
     encapsulation = _idlc.HEADERS[order]
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4siI").pack
-    write_values = _idlc.layout(order, "iI", start=4).pack
+    write_stamps_item = _idlc.layout(order, "iI", start=4).pack
     new_run_response = _idlc.maker(kind)
     new_time = _idlc.maker(Time)
-    read_values = _idlc.layout(order, "iI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "iI", start=4).iter_unpack
+    read_status = _idlc.layout(order, "iI", start=4).unpack_from
+    read_stamps_item = _idlc.layout(order, "iI", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         stamps = listed(message._stamps)
-        stamps_block = b"".join(
-            [
-                write_values(stamps_item._sec, stamps_item._nanosec)
-                for stamps_item in stamps
-            ],
-        )
-        parts = [write_head(encapsulation, message._status, len(stamps)), stamps_block]
+        stamps_block = b"".join([
+            write_stamps_item(
+                stamps_item._sec,
+                stamps_item._nanosec,
+            )
+            for stamps_item in stamps
+        ])
+        parts = [
+            write_head(
+                encapsulation,
+                message._status,
+                len(stamps),
+            ),
+            stamps_block,
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         limit = len(data)
         message = new_run_response()
-        message._status, count = read_values(data, 4)
+        (
+            message._status,
+            count,
+        ) = read_status(data, 4)
         stamps: list[Any] = []
         message._stamps = stamps
         end = 12 + 8 * count
-        for stamps_item_values in read_rows(data[12:end]):
+        for stamps_item_values in read_stamps_item(data[12:end]):
             stamps_item = new_time()
             stamps.append(stamps_item)
-            stamps_item._sec, stamps_item._nanosec = stamps_item_values
+            (
+                stamps_item._sec,
+                stamps_item._nanosec,
+            ) = stamps_item_values
         if end > limit:
             raise ValueError("too short")
         return message

@@ -38,29 +38,29 @@ def run_event_codec(
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
     pad4 = _idlc.PAD4
-    write_args = _idlc.text_block(order)
+    write_request_item_args = _idlc.text_block(order)
     truths = _idlc.TRUTHS
-    write_values = _idlc.layout(order, "?").pack
+    write_request_item_wait = _idlc.layout(order, "?").pack
     write_count_at = _idlc.phases(order, "I")
-    write_values_2 = _idlc.layout(order, "iI").pack
-    write_values_3 = _idlc.layout(order, "iI", start=4).pack
+    write_response_item_status = _idlc.layout(order, "iI").pack
+    write_response_item_stamps_item = _idlc.layout(order, "iI", start=4).pack
     new_run_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_run_request = _idlc.maker(Run_Request)
     new_run_response = _idlc.maker(Run_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    read_args = _idlc.texts_reader(order, text)
-    read_values_2 = _idlc.layout(order, "?").unpack_from
-    read_values_3 = _idlc.layout(order, "iI").unpack_from
-    read_rows = _idlc.layout(order, "iI", start=4).iter_unpack
+    read_request_item_args = _idlc.texts_reader(order, text)
+    read_request_item_wait = _idlc.layout(order, "?").unpack_from
+    read_response_item_status = _idlc.layout(order, "iI").unpack_from
+    read_response_item_stamps_item = _idlc.layout(order, "iI", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
@@ -69,8 +69,8 @@ def run_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -79,25 +79,29 @@ def run_event_codec(
         put = parts.append
         for request_item in request:
             put(pad4[low & 3])
-            args = write_args(request_item._args)
-            put(args)
-            low = len(args)
-            put(write_values(truths[request_item._wait]))
+            request_item_args = write_request_item_args(request_item._args)
+            put(request_item_args)
+            low = len(request_item_args)
+            put(write_request_item_wait(truths[request_item._wait]))
             low = low + 1
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_count_at[low & 3].pack(len(response)))
         for response_item in response:
-            stamps = listed(response_item._stamps)
-            put(write_values_2(response_item._status, len(stamps)))
-            stamps_block = b"".join(
-                [
-                    write_values_3(stamps_item._sec, stamps_item._nanosec)
-                    for stamps_item in stamps
-                ],
-            )
-            put(stamps_block)
+            response_item_stamps = listed(response_item._stamps)
+            put(write_response_item_status(
+                response_item._status,
+                len(response_item_stamps),
+            ))
+            response_item_stamps_block = b"".join([
+                write_response_item_stamps_item(
+                    response_item_stamps_item._sec,
+                    response_item_stamps_item._nanosec,
+                )
+                for response_item_stamps_item in response_item_stamps
+            ])
+            put(response_item_stamps_block)
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -105,17 +109,17 @@ def run_event_codec(
         message = new_run_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 5 * count > limit:
@@ -126,8 +130,8 @@ def run_event_codec(
         for request_item in request:
             at = end + 4 & -4
             (count,) = read_count(data, at)
-            request_item._args, end = read_args(data, at + 4, count)
-            (request_item._wait,) = read_values_2(data, end)
+            request_item._args, end = read_request_item_args(data, at + 4, count)
+            (request_item._wait,) = read_request_item_wait(data, end)
         at = end + 4 & -4
         (count,) = read_count(data, at)
         if count > 1:
@@ -138,15 +142,21 @@ def run_event_codec(
         message._response = response
         end = at + 4
         for response_item in response:
-            response_item._status, count = read_values_3(data, end)
-            stamps: list[Any] = []
-            response_item._stamps = stamps
+            (
+                response_item._status,
+                count,
+            ) = read_response_item_status(data, end)
+            response_item_stamps: list[Any] = []
+            response_item._stamps = response_item_stamps
             at = end + 8
             end = at + 8 * count
-            for stamps_item_values in read_rows(data[at:end]):
-                stamps_item = new_time()
-                stamps.append(stamps_item)
-                stamps_item._sec, stamps_item._nanosec = stamps_item_values
+            for response_item_stamps_item_values in read_response_item_stamps_item(data[at:end]):
+                response_item_stamps_item = new_time()
+                response_item_stamps.append(response_item_stamps_item)
+                (
+                    response_item_stamps_item._sec,
+                    response_item_stamps_item._nanosec,
+                ) = response_item_stamps_item_values
         if end > limit:
             raise ValueError("too short")
         return message

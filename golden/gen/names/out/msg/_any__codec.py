@@ -36,22 +36,22 @@ def any_codec(
     new_pose = _idlc.maker(Pose)
     new_point = _idlc.maker(Point)
     new_quaternion = _idlc.maker(Quaternion)
-    read_values = _idlc.layout(order, "ddddddd", start=4).unpack_from
+    read_pose_position_x = _idlc.layout(order, "ddddddd", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         pose = message._pose
-        position = pose._position
-        orientation = pose._orientation
+        pose_position = pose._position
+        pose_orientation = pose._orientation
         parts = [
             write_head(
                 encapsulation,
-                position._x,
-                position._y,
-                position._z,
-                orientation._x,
-                orientation._y,
-                orientation._z,
-                orientation._w,
+                pose_position._x,
+                pose_position._y,
+                pose_position._z,
+                pose_orientation._x,
+                pose_orientation._y,
+                pose_orientation._z,
+                pose_orientation._w,
             ),
         ]
         return join(parts)
@@ -60,19 +60,19 @@ def any_codec(
         message = new_any()
         pose = new_pose()
         message._pose = pose
-        position = new_point()
-        pose._position = position
-        orientation = new_quaternion()
-        pose._orientation = orientation
+        pose_position = new_point()
+        pose._position = pose_position
+        pose_orientation = new_quaternion()
+        pose._orientation = pose_orientation
         (
-            position._x,
-            position._y,
-            position._z,
-            orientation._x,
-            orientation._y,
-            orientation._z,
-            orientation._w,
-        ) = read_values(data, 4)
+            pose_position._x,
+            pose_position._y,
+            pose_position._z,
+            pose_orientation._x,
+            pose_orientation._y,
+            pose_orientation._z,
+            pose_orientation._w,
+        ) = read_pose_position_x(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

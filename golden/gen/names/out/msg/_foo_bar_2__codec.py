@@ -24,15 +24,20 @@ def foo_bar_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_foo_bar = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i", start=4).unpack_from
+    read_a = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._a)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._a,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_foo_bar()
-        (message._a,) = read_values(data, 4)
+        (message._a,) = read_a(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

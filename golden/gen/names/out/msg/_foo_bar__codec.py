@@ -27,18 +27,23 @@ def foo_bar_codec(
     write_head = _idlc.layout(order, "4si").pack
     new_foo_bar = _idlc.maker(kind)
     new_foo_bar_2 = _idlc.maker(FooBar)
-    read_values = _idlc.layout(order, "i", start=4).unpack_from
+    read_inner_a = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         inner = message._inner
-        parts = [write_head(encapsulation, inner._a)]
+        parts = [
+            write_head(
+                encapsulation,
+                inner._a,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_foo_bar()
         inner = new_foo_bar_2()
         message._inner = inner
-        (inner._a,) = read_values(data, 4)
+        (inner._a,) = read_inner_a(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -29,14 +29,14 @@ def hiding_codec(
     array = _idlc.array_of(order)
     write_head = _idlc.layout(order, "4sddBI").pack
     bytes_of_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_values = _idlc.layout(order, "3i", align=4).pack
+    write_from_dict = _idlc.layout(order, "3i", align=4).pack
     write_to_dict = _idlc.text_block(order)
     new_hiding = _idlc.maker(kind)
     new_point = _idlc.maker(Point)
-    read_values = _idlc.layout(order, "ddBI", start=4).unpack_from
-    read_float32 = _idlc.sequence_reader(order, "f", reading)
+    read_validate_x = _idlc.layout(order, "ddBI", start=4).unpack_from
+    sequence_of_float32 = _idlc.sequence_reader(order, "f", reading)
     array_of_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
-    read_values_2 = _idlc.layout(order, "3iI").unpack_from
+    read_from_dict = _idlc.layout(order, "3iI").unpack_from
     text = reading.text
     read_to_dict = _idlc.texts_reader(order, text)
     small = reading.small
@@ -57,7 +57,7 @@ def hiding_codec(
                 deserialize_count,
             ),
             deserialize,
-            write_values(bytes_of_int32_3(message._from_dict)),
+            write_from_dict(bytes_of_int32_3(message._from_dict)),
             to_dict,
         ]
         raw = join(parts)
@@ -71,10 +71,18 @@ def hiding_codec(
         message = new_hiding()
         validate = new_point()
         message._validate = validate
-        validate._x, validate._y, message._serialize, count = read_values(data, 4)
+        (
+            validate._x,
+            validate._y,
+            message._serialize,
+            count,
+        ) = read_validate_x(data, 4)
         end = 28 + 4 * count
-        message._deserialize = read_float32(view[28:end])
-        from_dict, count = read_values_2(data, end)
+        message._deserialize = sequence_of_float32(view[28:end])
+        (
+            from_dict,
+            count,
+        ) = read_from_dict(data, end)
         message._from_dict = array_of_int32_3(from_dict)
         message._to_dict, end = read_to_dict(data, end + 16, count)
         return message

@@ -27,52 +27,56 @@ def odd_codec(
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.Texts(order, "4siiiiiI*c?f", align=4)
-    write_str_2 = _idlc.text_block(order)
+    write_str = _idlc.text_block(order)
     listed = _idlc.listed
-    write_values_at = _idlc.phases(order, "iiiI")
-    write_values = _idlc.layout(order, "dd", start=4).pack
+    write_message_at = _idlc.phases(order, "iiiI")
+    write_item_item = _idlc.layout(order, "dd", start=4).pack
     pad8 = _idlc.PAD8
     bytes_of_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_values_at_2 = _idlc.phases(order, "dd3i")
+    write_array_x_at = _idlc.phases(order, "dd3i")
     new_odd = _idlc.maker(kind)
     new_point = _idlc.maker(Point)
-    read_values = _idlc.layout(order, "iiiiiI", start=4).unpack_from
+    read_class = _idlc.layout(order, "iiiiiI", start=4).unpack_from
     text = reading.text
-    read_values_at = _idlc.phases(order, "c?fI")
-    read_str_2 = _idlc.texts_reader(order, text)
-    read_values_2 = _idlc.layout(order, "iiiI").unpack_from
-    read_rows = _idlc.layout(order, "dd", start=4).iter_unpack
+    read_bytes_at = _idlc.phases(order, "c?fI")
+    read_str = _idlc.texts_reader(order, text)
+    read_message = _idlc.layout(order, "iiiI").unpack_from
+    read_item_item = _idlc.layout(order, "dd", start=4).iter_unpack
     array_of_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
-    read_values_3 = _idlc.layout(order, "dd3i", start=4).unpack_from
+    read_array_x = _idlc.layout(order, "dd3i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        list_2 = message._list.encode()
-        list_2_size = len(list_2)
-        at = (list_2_size + 34 & -4) + 4
-        str_2 = write_str_2(message._str)
-        at = at + len(str_2)
-        low = len(str_2)
+        list_ = message._list.encode()
+        list_size = len(list_)
+        at = (list_size + 34 & -4) + 4
+        str_ = write_str(message._str)
+        at = at + len(str_)
+        low = len(str_)
         item = listed(message._item)
         at = (at + 3 & -4) + 16
-        item_block = b"".join(
-            [write_values(item_item._x, item_item._y) for item_item in item],
-        )
+        item_block = b"".join([
+            write_item_item(
+                item_item._x,
+                item_item._y,
+            )
+            for item_item in item
+        ])
         parts = [
-            write_head[list_2_size](
+            write_head[list_size](
                 encapsulation,
                 message._class,
                 message._serialize,
                 message._self,
                 message._fields_and_field_types_,
                 message._int,
-                list_2_size + 1,
-                list_2,
+                list_size + 1,
+                list_,
                 message._bytes,
                 truths[message._bool],
                 message._float,
             ),
-            str_2,
-            write_values_at[low & 3].pack(
+            str_,
+            write_message_at[low & 3].pack(
                 message._message,
                 message._data,
                 message._at,
@@ -84,14 +88,12 @@ def odd_codec(
         put = parts.append
         if item:
             at = (at + 3 & -8) + 4 + 16 * len(item)
-        array = message._array
-        put(
-            write_values_at_2[at & 7].pack(
-                array._x,
-                array._y,
-                bytes_of_int32_3(message._order),
-            ),
-        )
+        array_ = message._array
+        put(write_array_x_at[at & 7].pack(
+            array_._x,
+            array_._y,
+            bytes_of_int32_3(message._order),
+        ))
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -103,12 +105,12 @@ def odd_codec(
             message._fields_and_field_types_,
             message._int,
             size,
-        ) = read_values(data, 4)
+        ) = read_class(data, 4)
         end = 27 + size
         if data[end]:
             raise ValueError("text without end")
         message._list = text(data[28:end])
-        struct = read_values_at[end + 1 & 7]
+        struct = read_bytes_at[end + 1 & 7]
         (
             message._bytes,
             message._bool,
@@ -116,24 +118,36 @@ def odd_codec(
             count,
         ) = struct.unpack_from(data, end + 1)
         at = end + 1 + struct.size
-        message._str, end = read_str_2(data, at, count)
+        message._str, end = read_str(data, at, count)
         at = end + 3 & -4
-        message._message, message._data, message._at, count = read_values_2(data, at)
+        (
+            message._message,
+            message._data,
+            message._at,
+            count,
+        ) = read_message(data, at)
         item: list[Any] = []
         message._item = item
         at = at + 16
         if count:
             at = (at + 3 & -8) + 4
         end = at + 16 * count
-        for item_item_values in read_rows(data[at:end]):
+        for item_item_values in read_item_item(data[at:end]):
             item_item = new_point()
             item.append(item_item)
-            item_item._x, item_item._y = item_item_values
-        array = new_point()
-        message._array = array
+            (
+                item_item._x,
+                item_item._y,
+            ) = item_item_values
+        array_ = new_point()
+        message._array = array_
         at = (end + 3 & -8) + 4
-        array._x, array._y, order_2 = read_values_3(data, at)
-        message._order = array_of_int32_3(order_2)
+        (
+            array_._x,
+            array_._y,
+            order_,
+        ) = read_array_x(data, at)
+        message._order = array_of_int32_3(order_)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -24,15 +24,24 @@ def point_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sdd").pack
     new_point = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "dd", start=4).unpack_from
+    read_x = _idlc.layout(order, "dd", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._x, message._y)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._x,
+                message._y,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_point()
-        message._x, message._y = read_values(data, 4)
+        (
+            message._x,
+            message._y,
+        ) = read_x(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

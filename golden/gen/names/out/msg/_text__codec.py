@@ -36,37 +36,35 @@ def text_codec(
     encapsulation = _idlc.HEADERS[order]
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sdddddI").pack
-    write_values = _idlc.layout(order, "ddddddd", start=4).pack
+    write_any_item = _idlc.layout(order, "ddddddd", start=4).pack
     pad8 = _idlc.PAD8
     new_text = _idlc.maker(kind)
-    new_point = _idlc.maker(geometry_msgs_Point)
-    new_point_2 = _idlc.maker(names_msgs_Point)
-    new_any = _idlc.maker(names_msgs_Any)
+    new_geometry_msgs_point = _idlc.maker(geometry_msgs_Point)
+    new_names_msgs_point = _idlc.maker(names_msgs_Point)
+    new_names_msgs_any = _idlc.maker(names_msgs_Any)
     new_pose = _idlc.maker(Pose)
     new_quaternion = _idlc.maker(Quaternion)
-    read_values = _idlc.layout(order, "dddddI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "ddddddd", start=4).iter_unpack
+    read_other_x = _idlc.layout(order, "dddddI", start=4).unpack_from
+    read_any_item = _idlc.layout(order, "ddddddd", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         other = message._other
         own = message._own
-        any_2 = listed(message._any)
-        if len(any_2) > 2:
+        any_ = listed(message._any)
+        if len(any_) > 2:
             raise ValueError("too many elements")
-        any_2_block = b"".join(
-            [
-                write_values(
-                    any_2_item._pose._position._x,
-                    any_2_item._pose._position._y,
-                    any_2_item._pose._position._z,
-                    any_2_item._pose._orientation._x,
-                    any_2_item._pose._orientation._y,
-                    any_2_item._pose._orientation._z,
-                    any_2_item._pose._orientation._w,
-                )
-                for any_2_item in any_2
-            ],
-        )
+        any_block = b"".join([
+            write_any_item(
+                any_item._pose._position._x,
+                any_item._pose._position._y,
+                any_item._pose._position._z,
+                any_item._pose._orientation._x,
+                any_item._pose._orientation._y,
+                any_item._pose._orientation._z,
+                any_item._pose._orientation._w,
+            )
+            for any_item in any_
+        ])
         parts = [
             write_head(
                 encapsulation,
@@ -75,47 +73,54 @@ def text_codec(
                 other._z,
                 own._x,
                 own._y,
-                len(any_2),
+                len(any_),
             ),
-            pad8[0] if any_2 else b"",
-            any_2_block,
+            pad8[0] if any_ else b"",
+            any_block,
         ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         limit = len(data)
         message = new_text()
-        other = new_point()
+        other = new_geometry_msgs_point()
         message._other = other
-        own = new_point_2()
+        own = new_names_msgs_point()
         message._own = own
-        other._x, other._y, other._z, own._x, own._y, count = read_values(data, 4)
+        (
+            other._x,
+            other._y,
+            other._z,
+            own._x,
+            own._y,
+            count,
+        ) = read_other_x(data, 4)
         if count > 2:
             raise ValueError("too many elements")
-        any_2: list[Any] = []
-        message._any = any_2
+        any_: list[Any] = []
+        message._any = any_
         at = 48
         if count:
             at = (at + 3 & -8) + 4
         end = at + 56 * count
-        for any_2_item_values in read_rows(data[at:end]):
-            any_2_item = new_any()
-            any_2.append(any_2_item)
-            pose = new_pose()
-            any_2_item._pose = pose
-            position = new_point()
-            pose._position = position
-            orientation = new_quaternion()
-            pose._orientation = orientation
+        for any_item_values in read_any_item(data[at:end]):
+            any_item = new_names_msgs_any()
+            any_.append(any_item)
+            any_item_pose = new_pose()
+            any_item._pose = any_item_pose
+            any_item_pose_position = new_geometry_msgs_point()
+            any_item_pose._position = any_item_pose_position
+            any_item_pose_orientation = new_quaternion()
+            any_item_pose._orientation = any_item_pose_orientation
             (
-                position._x,
-                position._y,
-                position._z,
-                orientation._x,
-                orientation._y,
-                orientation._z,
-                orientation._w,
-            ) = any_2_item_values
+                any_item_pose_position._x,
+                any_item_pose_position._y,
+                any_item_pose_position._z,
+                any_item_pose_orientation._x,
+                any_item_pose_orientation._y,
+                any_item_pose_orientation._z,
+                any_item_pose_orientation._w,
+            ) = any_item_values
         if end > limit:
             raise ValueError("too short")
         return message

@@ -37,36 +37,38 @@ def none_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "x", start=4).pack
+    write_request_item = _idlc.layout(order, "x", start=4).pack
     write_count_at = _idlc.phases(order, "I")
+    write_response_item = _idlc.layout(order, "x", start=4).pack
     new_none_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_none_request = _idlc.maker(None_Request)
     new_none_response = _idlc.maker(None_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "x", start=4).iter_unpack
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item = _idlc.layout(order, "x", start=4).iter_unpack
     read_count = _idlc.layout(order, "I").unpack_from
+    read_response_item = _idlc.layout(order, "x", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join([write_values() for request_item in request])
+        request_block = b"".join([write_request_item() for request_item in request])
         low = len(request)
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        response_block = b"".join([write_values() for response_item in response])
+        response_block = b"".join([write_response_item() for response_item in response])
         parts = [
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -82,23 +84,23 @@ def none_event_codec(
         message = new_none_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[Any] = []
         message._request = request
         end = 48 + count
-        for _ in read_rows(data[48:end]):
+        for _ in read_request_item(data[48:end]):
             request_item = new_none_request()
             request.append(request_item)
         at = end + 3 & -4
@@ -108,7 +110,7 @@ def none_event_codec(
         response: list[Any] = []
         message._response = response
         end = at + 4 + count
-        for _ in read_rows(data[at + 4 : end]):
+        for _ in read_response_item(data[at + 4 : end]):
             response_item = new_none_response()
             response.append(response_item)
         if end > limit:

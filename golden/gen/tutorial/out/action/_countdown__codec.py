@@ -24,15 +24,20 @@ def countdown_goal_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_countdown_goal = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i", start=4).unpack_from
+    read_target_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._target_count)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._target_count,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_goal()
-        (message._target_count,) = read_values(data, 4)
+        (message._target_count,) = read_target_count(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -48,17 +53,24 @@ def countdown_result_codec(
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4si?").pack
     new_countdown_result = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i?", start=4).unpack_from
+    read_final_count = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         parts = [
-            write_head(encapsulation, message._final_count, truths[message._success]),
+            write_head(
+                encapsulation,
+                message._final_count,
+                truths[message._success],
+            ),
         ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_result()
-        message._final_count, message._success = read_values(data, 4)
+        (
+            message._final_count,
+            message._success,
+        ) = read_final_count(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -73,15 +85,20 @@ def countdown_feedback_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_countdown_feedback = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i", start=4).unpack_from
+    read_current_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._current_count)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._current_count,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_feedback()
-        (message._current_count,) = read_values(data, 4)
+        (message._current_count,) = read_current_count(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -24,14 +24,18 @@ def execute_task_goal_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_goal = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         task_name = message._task_name.encode()
         task_name_size = len(task_name)
         parts = [
-            write_head[task_name_size](encapsulation, task_name_size + 1, task_name),
+            write_head[task_name_size](
+                encapsulation,
+                task_name_size + 1,
+                task_name,
+            ),
         ]
         return join(parts)
 
@@ -57,15 +61,20 @@ def execute_task_result_codec(
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack
     new_execute_task_result = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "?", start=4).unpack_from
+    read_success = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, truths[message._success])]
+        parts = [
+            write_head(
+                encapsulation,
+                truths[message._success],
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_execute_task_result()
-        (message._success,) = read_values(data, 4)
+        (message._success,) = read_success(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -80,7 +89,7 @@ def execute_task_feedback_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_feedback = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:

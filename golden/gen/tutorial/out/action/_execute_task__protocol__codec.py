@@ -36,20 +36,20 @@ def execute_task_send_goal_request_codec(
     new_uuid = _idlc.maker(UUID)
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16BI", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
-        task_name = goal._task_name.encode()
-        task_name_size = len(task_name)
+        goal_task_name = goal._task_name.encode()
+        goal_task_name_size = len(goal_task_name)
         parts = [
-            write_head[task_name_size](
+            write_head[goal_task_name_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
-                task_name_size + 1,
-                task_name,
+                goal_task_name_size + 1,
+                goal_task_name,
             ),
         ]
         return join(parts)
@@ -60,8 +60,11 @@ def execute_task_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_execute_task_goal()
         message._goal = goal
-        uuid, size = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            size,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")
@@ -85,7 +88,7 @@ def execute_task_send_goal_response_codec(
     write_head = _idlc.layout(order, "4s?iI").pack
     new_execute_task_send_goal_response = _idlc.maker(kind)
     new_time = _idlc.maker(Time)
-    read_values = _idlc.layout(order, "?iI", start=4).unpack_from
+    read_accepted = _idlc.layout(order, "?iI", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         stamp = message._stamp
@@ -103,7 +106,11 @@ def execute_task_send_goal_response_codec(
         message = new_execute_task_send_goal_response()
         stamp = new_time()
         message._stamp = stamp
-        message._accepted, stamp._sec, stamp._nanosec = read_values(data, 4)
+        (
+            message._accepted,
+            stamp._sec,
+            stamp._nanosec,
+        ) = read_accepted(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -131,10 +138,10 @@ def execute_task_send_goal_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_text_at = _idlc.text_phases(order, "16BI*")
+    write_request_item_goal_id_uuid_at = _idlc.text_phases(order, "16BI*")
     write_count_at = _idlc.phases(order, "I")
     truths = _idlc.TRUTHS
-    write_values = _idlc.layout(order, "?iI").pack
+    write_response_item_accepted = _idlc.layout(order, "?iI").pack
     new_execute_task_send_goal_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -143,15 +150,15 @@ def execute_task_send_goal_event_codec(
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
     new_execute_task_send_goal_response = _idlc.maker(ExecuteTask_SendGoal_Response)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_values_at = _idlc.phases(order, "16BI")
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item_goal_id_uuid_at = _idlc.phases(order, "16BI")
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from
-    read_values_2 = _idlc.layout(order, "?iI").unpack_from
+    read_response_item_accepted = _idlc.layout(order, "?iI").unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
@@ -160,8 +167,8 @@ def execute_task_send_goal_event_codec(
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -169,31 +176,27 @@ def execute_task_send_goal_event_codec(
         ]
         put = parts.append
         for request_item in request:
-            goal_id = request_item._goal_id
-            goal = request_item._goal
-            task_name = goal._task_name.encode()
-            task_name_size = len(task_name)
-            put(
-                write_text_at[low & 3][task_name_size](
-                    bytes_of_uint8_16(goal_id._uuid),
-                    task_name_size + 1,
-                    task_name,
-                ),
-            )
-            low = task_name_size + 1
+            request_item_goal_id = request_item._goal_id
+            request_item_goal = request_item._goal
+            request_item_goal_task_name = request_item_goal._task_name.encode()
+            request_item_goal_task_name_size = len(request_item_goal_task_name)
+            put(write_request_item_goal_id_uuid_at[low & 3][request_item_goal_task_name_size](
+                bytes_of_uint8_16(request_item_goal_id._uuid),
+                request_item_goal_task_name_size + 1,
+                request_item_goal_task_name,
+            ))
+            low = request_item_goal_task_name_size + 1
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_count_at[low & 3].pack(len(response)))
         for response_item in response:
             response_item_stamp = response_item._stamp
-            put(
-                write_values(
-                    truths[response_item._accepted],
-                    response_item_stamp._sec,
-                    response_item_stamp._nanosec,
-                ),
-            )
+            put(write_response_item_accepted(
+                truths[response_item._accepted],
+                response_item_stamp._sec,
+                response_item_stamp._nanosec,
+            ))
         return join(parts)
 
     def decode(data: Any) -> Any:
@@ -201,17 +204,17 @@ def execute_task_send_goal_event_codec(
         message = new_execute_task_send_goal_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
@@ -220,18 +223,21 @@ def execute_task_send_goal_event_codec(
         message._request = request
         end = 47
         for request_item in request:
-            goal_id = new_uuid()
-            request_item._goal_id = goal_id
-            goal = new_execute_task_goal()
-            request_item._goal = goal
-            struct = read_values_at[end + 1 & 7]
-            uuid, size = struct.unpack_from(data, end + 1)
+            request_item_goal_id = new_uuid()
+            request_item._goal_id = request_item_goal_id
+            request_item_goal = new_execute_task_goal()
+            request_item._goal = request_item_goal
+            struct = read_request_item_goal_id_uuid_at[end + 1 & 7]
+            (
+                request_item_goal_id_uuid,
+                size,
+            ) = struct.unpack_from(data, end + 1)
             at = end + 1 + struct.size
-            goal_id._uuid = array_of_uint8_16(uuid)
+            request_item_goal_id._uuid = array_of_uint8_16(request_item_goal_id_uuid)
             end = at - 1 + size
             if data[end]:
                 raise ValueError("text without end")
-            goal._task_name = text(data[at:end])
+            request_item_goal._task_name = text(data[at:end])
         at = end + 4 & -4
         (count,) = read_count(data, at)
         if count > 1:
@@ -248,7 +254,7 @@ def execute_task_send_goal_event_codec(
                 response_item._accepted,
                 response_item_stamp._sec,
                 response_item_stamp._nanosec,
-            ) = read_values_2(data, at)
+            ) = read_response_item_accepted(data, at)
             at = at + 12
         return message
 
@@ -272,19 +278,24 @@ def execute_task_get_result_request_codec(
     new_execute_task_get_result_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16B", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
-        parts = [write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid))]
+        parts = [
+            write_head(
+                encapsulation,
+                bytes_of_uint8_16(goal_id._uuid),
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_execute_task_get_result_request()
         goal_id = new_uuid()
         message._goal_id = goal_id
-        (uuid,) = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (goal_id_uuid,) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -303,18 +314,27 @@ def execute_task_get_result_response_codec(
     write_head = _idlc.layout(order, "4sb?").pack
     new_execute_task_get_result_response = _idlc.maker(kind)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
-    read_values = _idlc.layout(order, "b?", start=4).unpack_from
+    read_status = _idlc.layout(order, "b?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [write_head(encapsulation, message._status, truths[result._success])]
+        parts = [
+            write_head(
+                encapsulation,
+                message._status,
+                truths[result._success],
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_execute_task_get_result_response()
         result = new_execute_task_result()
         message._result = result
-        message._status, result._success = read_values(data, 4)
+        (
+            message._status,
+            result._success,
+        ) = read_status(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -342,10 +362,10 @@ def execute_task_get_result_event_codec(
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4sBiI16BqI").pack
-    write_values = _idlc.layout(order, "16B", start=4).pack
+    write_request_item = _idlc.layout(order, "16B", start=4).pack
     write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_values_2 = _idlc.layout(order, "b?", start=4).pack
+    write_response_item = _idlc.layout(order, "b?", start=4).pack
     new_execute_task_get_result_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -354,41 +374,34 @@ def execute_task_get_result_event_codec(
     new_execute_task_get_result_response = _idlc.maker(ExecuteTask_GetResult_Response)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_rows = _idlc.layout(order, "16B", start=4).iter_unpack
+    read_info_event_type = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_request_item = _idlc.layout(order, "16B", start=4).iter_unpack
     read_count = _idlc.layout(order, "I").unpack_from
-    read_rows_2 = _idlc.layout(order, "b?", start=4).iter_unpack
+    read_response_item = _idlc.layout(order, "b?", start=4).iter_unpack
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         info = message._info
-        stamp = info._stamp
+        info_stamp = info._stamp
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join(
-            [
-                write_values(bytes_of_uint8_16(request_item._goal_id._uuid))
-                for request_item in request
-            ],
-        )
+        request_block = b"".join([write_request_item(bytes_of_uint8_16(request_item._goal_id._uuid)) for request_item in request])
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        response_block = b"".join(
-            [
-                write_values_2(
-                    response_item._status,
-                    truths[response_item._result._success],
-                )
-                for response_item in response
-            ],
-        )
+        response_block = b"".join([
+            write_response_item(
+                response_item._status,
+                truths[response_item._result._success],
+            )
+            for response_item in response
+        ])
         parts = [
             write_head(
                 encapsulation,
                 info._event_type,
-                stamp._sec,
-                stamp._nanosec,
+                info_stamp._sec,
+                info_stamp._nanosec,
                 bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
@@ -404,29 +417,29 @@ def execute_task_get_result_event_codec(
         message = new_execute_task_get_result_event()
         info = new_service_event_info()
         message._info = info
-        stamp = new_time()
-        info._stamp = stamp
+        info_stamp = new_time()
+        info._stamp = info_stamp
         (
             info._event_type,
-            stamp._sec,
-            stamp._nanosec,
-            client_gid,
+            info_stamp._sec,
+            info_stamp._nanosec,
+            info_client_gid,
             info._sequence_number,
             count,
-        ) = read_values(data, 4)
-        info._client_gid = array_of_uint8_16(client_gid)
+        ) = read_info_event_type(data, 4)
+        info._client_gid = array_of_uint8_16(info_client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[Any] = []
         message._request = request
         end = 48 + 16 * count
-        for request_item_values in read_rows(data[48:end]):
+        for request_item_values in read_request_item(data[48:end]):
             request_item = new_execute_task_get_result_request()
             request.append(request_item)
-            goal_id = new_uuid()
-            request_item._goal_id = goal_id
-            (uuid,) = request_item_values
-            goal_id._uuid = array_of_uint8_16(uuid)
+            request_item_goal_id = new_uuid()
+            request_item._goal_id = request_item_goal_id
+            (request_item_goal_id_uuid,) = request_item_values
+            request_item_goal_id._uuid = array_of_uint8_16(request_item_goal_id_uuid)
         (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
@@ -434,12 +447,15 @@ def execute_task_get_result_event_codec(
         message._response = response
         at = end + 4
         end = at + 2 * count
-        for response_item_values in read_rows_2(data[at:end]):
+        for response_item_values in read_response_item(data[at:end]):
             response_item = new_execute_task_get_result_response()
             response.append(response_item)
-            result = new_execute_task_result()
-            response_item._result = result
-            response_item._status, result._success = response_item_values
+            response_item_result = new_execute_task_result()
+            response_item._result = response_item_result
+            (
+                response_item._status,
+                response_item_result._success,
+            ) = response_item_values
         if end > limit:
             raise ValueError("too short")
         return message
@@ -466,20 +482,20 @@ def execute_task_feedback_message_codec(
     new_uuid = _idlc.maker(UUID)
     new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16BI", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        current_status = feedback._current_status.encode()
-        current_status_size = len(current_status)
+        feedback_current_status = feedback._current_status.encode()
+        feedback_current_status_size = len(feedback_current_status)
         parts = [
-            write_head[current_status_size](
+            write_head[feedback_current_status_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
-                current_status_size + 1,
-                current_status,
+                feedback_current_status_size + 1,
+                feedback_current_status,
             ),
         ]
         return join(parts)
@@ -490,8 +506,11 @@ def execute_task_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_execute_task_feedback()
         message._feedback = feedback
-        uuid, size = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            size,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")

@@ -25,9 +25,9 @@ def robot_command_codec(
     write_head = _idlc.Texts(order, "4sI*ff", align=4)
     write_text = _idlc.Texts(order, "I*")
     new_robot_command = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    read_values = _idlc.layout(order, "ffI").unpack_from
+    read_linear_velocity_x = _idlc.layout(order, "ffI").unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         command_type = message._command_type.encode()
@@ -42,7 +42,10 @@ def robot_command_codec(
                 message._linear_velocity_x,
                 message._angular_velocity_z,
             ),
-            write_text[frame_id_size](frame_id_size + 1, frame_id),
+            write_text[frame_id_size](
+                frame_id_size + 1,
+                frame_id,
+            ),
         ]
         return join(parts)
 
@@ -58,7 +61,7 @@ def robot_command_codec(
             message._linear_velocity_x,
             message._angular_velocity_z,
             size,
-        ) = read_values(data, at)
+        ) = read_linear_velocity_x(data, at)
         end = at + 11 + size
         if data[end]:
             raise ValueError("text without end")

@@ -24,15 +24,24 @@ def add_two_ints_request_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sqq").pack
     new_add_two_ints_request = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "qq", start=4).unpack_from
+    read_a = _idlc.layout(order, "qq", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._a, message._b)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._a,
+                message._b,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_add_two_ints_request()
-        message._a, message._b = read_values(data, 4)
+        (
+            message._a,
+            message._b,
+        ) = read_a(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -47,15 +56,20 @@ def add_two_ints_response_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sq").pack
     new_add_two_ints_response = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "q", start=4).unpack_from
+    read_sum = _idlc.layout(order, "q", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._sum)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._sum,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_add_two_ints_response()
-        (message._sum,) = read_values(data, 4)
+        (message._sum,) = read_sum(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
