@@ -11,7 +11,7 @@ from idlc.check.compiler import Compiler, library_for
 from idlc.check.package.facts import home_of
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.generate.package import Generated, generated, planned, up_to_date, with_needs
+from idlc.generate.package import Generated, generated, up_to_date, with_needs
 from idlc.generate.target import (
     Target,
     borrowed,
@@ -20,6 +20,7 @@ from idlc.generate.target import (
     requested_packages,
     unread_idl,
 )
+from idlc.generate.vendoring import leftovers, planned
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.model.distros import Distro
@@ -128,7 +129,10 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
         return ()
-    with folders[0].exclusive(beside=options.vendoring == "beside" or len(folders) > 1):
+    vendored = options.vendoring == "beside" or any(
+        each.lock and each.lock.vendored for each in folders
+    )
+    with folders[0].exclusive(beside=vendored or len(folders) > 1):
         done = _compile_and_write(dict(zip(folders, packages, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
             from idlc.generate.prefix import write_setup_scripts
@@ -238,8 +242,15 @@ def _compile_and_write(
     if options.check:
         for package in packages:
             package.target.drift(package.plan, package.lock, options.again)
-    elif not all(package.target.apply(package.plan, package.lock) for package in packages):
-        return ()
+    else:
+        stale = tuple(leftovers(packages))
+        removals = [(target, plan) for target, plan in stale if plan]
+        if len(removals) < len(stale):
+            return ()
+        if not all(package.target.apply(package.plan, package.lock) for package in packages):
+            return ()
+        if not all(target.remove(plan) for target, plan in removals):
+            return ()
     targets = requested if packages else ()
     return with_needs(map(generated, packages), targets, library.distro, report, options.again)
 

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from msgspec import UNSET
 
-from idlc.check.compiler import Compiler, derived_names, stage
+from idlc.check.compiler import derived_names, stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.generate.target import Target, dependencies
 from idlc.model import derive, ir
 from idlc.model.distros import Distro
-from idlc.project import inputs, lock
-from idlc.project.inputs import accept_name
+from idlc.project import lock
 from idlc.project.library import Library
 from idlc.project.write import Plan
 from idlc.version import __version__
@@ -136,91 +135,6 @@ def _imports(model: Model) -> tuple[str, ...]:
     """Return the modules of other packages that the package's own files refer to."""
     targets = {target for own in model.own for target in derive.references(own)}
     return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))
-
-
-def planned(
-    models: Sequence[Model],
-    requested: Mapping[Target, inputs.Inputs],
-    compiler: Compiler,
-    *,
-    check: bool,
-    vendoring: lock.Vendoring,
-) -> list[Package]:
-    """Return sound models, and packages to vendor, ready to be written; empty after an error."""
-    vendor = _Vendor({model.package for model in models}, compiler, check=check)
-    packages: list[Package | None] = []
-    for model, (target, package) in zip(models, requested.items(), strict=True):
-        packages.append(
-            package_of(
-                model,
-                target,
-                package.digests,
-                compiler.library,
-                check=check,
-                vendoring=vendoring,
-                copies=_copies(model, compiler, target.report) if vendoring == "private" else (),
-                beside=vendor.add(model, target) if vendoring == "beside" else (),
-            )
-        )
-    packages += [vendor.packages[name] for name in sorted(vendor.packages)]
-    return [] if None in packages else [package for package in packages if package]
-
-
-def _copies(model: Model, compiler: Compiler, report: Report) -> list[Model]:
-    """Return models of the other packages' types that a model's generated code may import."""
-    names = set(model.interfaces)
-    if any(own.name.kind == "action" for own in model.own):
-        names |= derive.ACTION_PROTOCOL
-    used: dict[str, list[ir.Interface]] = {}
-    for name, interface in sorted(compiler.reached(names).items()):
-        used.setdefault(name.package, []).append(interface)
-    used.pop(model.package, None)
-    problems = Report()
-    copies = [compiler.model(package, own, problems) for package, own in used.items()]
-    report.extend(each for each in problems if each.severity is Severity.ERROR)
-    return copies
-
-
-class _Vendor:
-    """The packages that others depend on, whole, to be written beside them."""
-
-    def __init__(self, own: set[str], compiler: Compiler, *, check: bool) -> None:
-        self._own = own
-        self._compiler = compiler
-        self._check = check
-        self._needed: dict[str, set[str]] = {}
-        #: Each ready to be written, `None` for one that must not be.
-        self.packages: dict[str, Package | None] = {}
-
-    def add(self, model: Model, target: Target) -> list[str]:
-        """Add the packages that a model depends on, and return their names."""
-        names: set[str] = set()
-        waiting = _needed(model) - self._own
-        while waiting:
-            package = waiting.pop()
-            names.add(package)
-            if package not in self.packages:
-                self.packages[package] = self._whole(package, target)
-            waiting |= self._needed[package] - self._own - names
-        return sorted(names)
-
-    def _whole(self, package: str, target: Target) -> Package | None:
-        library, report = self._compiler.library, Report()
-        names = library.interfaces(package)
-        sources = [(name, source) for name in names if (source := library.source(name))]
-        whole = self._compiler.model(package, self._compiler.add(sources, report), report)
-        target.report.extend(each for each in report if each.severity is Severity.ERROR)
-        self._needed[package] = _needed(whole)
-        if not accept_name(package, "what is depended on", target.report) or report.had_errors:
-            return None
-        beside, digests = target.beside(package), as_inputs(names, library)
-        return package_of(whole, beside, digests, library, check=self._check)
-
-
-def _needed(model: Model) -> set[str]:
-    """Return the packages that a model's generated code may import, its own included."""
-    implied = {package for own in model.own for package in derive.IMPLICIT_PACKAGES[own.name.kind]}
-    return implied | {name.package for name in model.interfaces}
 
 
 class Generated(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -377,6 +377,12 @@ class Target:
             runtime=self.runtime,
         )
 
+    def locks_beside(self) -> dict[str, Lock]:
+        """Return the locks of the packages in the folder that this one is in, by their folders."""
+        folders = sorted(path.parent for path in self._path.parent.glob(f"*/{FILE}"))
+        locks = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
+        return {name: lock for name, lock in locks if lock}
+
     @cached_property
     def lock(self) -> Lock | None:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
@@ -449,6 +455,15 @@ class Target:
         self.lock = record
         return write.apply(changes, encode(record), self.name, self.report)
 
+    def remove(self, changes: Plan) -> bool:
+        """Remove planned files and the lock; report IDL612 and return `False` otherwise."""
+        whole = changes._replace(changes=(*changes.changes, Change(FILE, changes.record, None)))
+        journal = encode(self.lock) if self.lock else b""
+        is_done = write.apply_changes(whole, self.name, self.report, journal)
+        with suppress(OSError):  # other files stay
+            self._path.rmdir()
+        return is_done
+
     def drift(self, changes: Plan, record: Lock, again: str) -> None:
         """Report IDL616 for each file that is not what the command `again` would write."""
         hint = f"run `{again}`"
@@ -490,6 +505,13 @@ class Target:
         return ""
 
 
+_MODES: dict[Vendoring, str] = {
+    "": "without `--vendor-deps`",
+    "private": "with `--vendor-deps`",
+    "beside": "with `--vendor-deps=beside`",
+}
+
+
 def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     """Return the differences between the last run and one now; empty without any."""
     pairs = [(old.inputs, new.inputs)]
@@ -504,8 +526,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         reasons.append(f"its runtime was {old.runtime}, and is to be {new.runtime}")
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
-    if (old.vendor_deps, bool(old.vendored)) != (new.vendor_deps, bool(new.vendored)):
-        reasons.append("`--vendor-deps` was another")
+    if old.vendoring != new.vendoring:
+        reasons.append(f"it was written {_MODES[old.vendoring]}")
     for before, after in pairs:
         reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
         reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]

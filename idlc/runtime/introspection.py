@@ -23,8 +23,6 @@ from .typeinfo import ARRAY, BOUNDED_SEQUENCE, SCALAR, FieldInfo, Structure
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 
-NESTED = 1
-
 
 @cache
 def references(structure: Structure) -> frozenset[Structure]:
@@ -336,11 +334,6 @@ def c_structure(structure: Structure) -> type[ctypes.Structure]:
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def introspection_id(field: FieldInfo) -> int:
-    """Return how introspection calls the type of a field's elements."""
-    return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
-
-
 def element_type(field: FieldInfo) -> Any:
     """Return the C type of one element of a field."""
     return c_structure(field.nested) if field.nested else _ELEMENTS[field.base][1]
@@ -351,11 +344,7 @@ def _c_type(field: FieldInfo) -> Any:
         return element_type(field)
     if field.shape == ARRAY:
         return element_type(field) * field.capacity
-    return _sequence_type(field)
-
-
-def _sequence_type(field: FieldInfo) -> Any:
-    if field.base == NESTED:
+    if field.nested:
         return c.Sequence
     size = abi().strings if element_type(field) is c.String else abi().sequence
     return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
@@ -432,7 +421,7 @@ def _member(field: FieldInfo, offset: int, functional: bool) -> Any:
     """Return the member that describes a field to the middleware."""
     member = _member_type()(
         name=field.name.encode(),
-        type_id=introspection_id(field),
+        type_id=_MESSAGE if field.nested else _ELEMENTS[field.base][0],
         string_upper_bound=field.text_bound or 0,
         is_array=field.shape != SCALAR,
         array_size=field.capacity,

@@ -66,11 +66,9 @@ def _import(package: str) -> ModuleType | None:
     try:
         return import_module(f"{package}.{name}")
     except ImportError:
-        return _hidden(package, name) if package in _OF_RCL else None
-
-
-def _hidden(package: str, name: str) -> ModuleType | None:
-    """Return a module of a package that another one of the same name hides."""
+        if package not in _OF_RCL:
+            return None
+    # of a package that another one of the same name hides
     folders = [f"{entry or '.'}/{package}" for entry in sys.path]
     spec = PathFinder.find_spec(f"{package}.{name}", folders)
     if spec is None or spec.loader is None:

@@ -440,3 +440,23 @@ def test_times_as_times_of_numpy_and_arrow(msg):
     assert columns["at"]["sec"].tolist() == [seconds for seconds, _ in instants]
     stamps = time.to_columns([time(sec=5, nanosec=6).serialize()], datetimes=True)
     assert stamps.tolist() == [(5, 6)]
+
+
+# whose classes
+
+
+def test_classes_of_a_package_from_before_are_read_too(tmp_path):
+    """Its types were in the folder of its runtime."""
+    from idlc.recordings.columns import to_arrow, to_columns
+
+    generated.write_package(tmp_path, "before_msgs", {"msg/Odd.msg": FILES["msg/Odd.msg"]})
+    package = tmp_path / "before_msgs"
+    (package / "_type_data.py").rename(package / "_idlc" / "type_data.py")
+    with generated.importable(tmp_path):
+        cls = generated.class_of("before_msgs/msg/Odd")
+        buffers = [cls(1, 2, 3).serialize()] * 2
+        assert to_columns(cls, buffers)["b"].tolist() == [2, 2]
+        assert to_arrow(cls, buffers).to_pylist() == [{"a": 1, "b": 2, "c": 3}] * 2
+        error = __import__("before_msgs._idlc")._idlc.DecodeError
+        with pytest.raises(error, match=r"^\[1\]\.b: "):
+            to_columns(cls, [buffers[0], buffers[1][:6]])

@@ -32,12 +32,14 @@ if TYPE_CHECKING:
     from .conversions import Integers as Integers
     from .conversions import Join as Join
     from .conversions import Options as Options
+    from .typeinfo import type_hash as type_hash
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
-    _hint, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "conversions"))
+    _LAZY = {**dict.fromkeys(_HINTS.split(), "conversions"), "type_hash": "typeinfo"}
+    _lazy, __dir__ = lazily(__name__, _LAZY)
 
     def __getattr__(name):
-        """Return a name of annotations, or `arrays`, for a module that has these names."""
+        """Return what is imported on first use, `arrays` for modules with these names, too."""
         if name == "arrays":
             return __import__(f"{__name__}.arrays", fromlist=["Values"])
-        return _hint(name)
+        return _lazy(name)

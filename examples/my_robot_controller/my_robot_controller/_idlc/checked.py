@@ -48,12 +48,6 @@ def validate(message: Any, *, wire_only: bool = False) -> None:
     _message(message, structure_of(type(message)), "", wire_only)
 
 
-def validate_field(value: Any, field: FieldInfo) -> None:
-    """Raise ValidationError if a field, which is named by its path, cannot hold a value."""
-    check = _list if field.is_list else validate_element
-    check(value, field, field.public, wire_only=True)
-
-
 def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> None:
     for field in structure.fields:
         place = inner_path(path, field.public)
@@ -244,8 +238,9 @@ def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
         return  # the default
     if _converts(owner, field) and not isinstance(value, (str, Mapping)):
         return
+    check = _list if field.is_list else validate_element
     try:
-        validate_field(value, field)
+        check(value, field, field.public, wire_only=True)
     except ValidationError as error:
         raise error.at(error.path, FieldTypeError) from None
 

@@ -457,7 +457,7 @@ class Message(metaclass=MessageMeta):
         from .typeinfo import structure_of
 
         vendor = structure_of(type(self)).vendor
-        return vendor.reduced(self, reduction) if vendor else reduction
+        return vendor.reduced(reduction) if vendor else reduction
 
 
 if codec.CHECK_FIELDS:

@@ -231,20 +231,18 @@ def steps(structure: Structure) -> tuple[Step, ...]:
     for field, offset in placed_fields(structure):
         for step in _field_steps(field, offset):
             last = joined[-1] if joined else None
-            if isinstance(step, Run) and isinstance(last, Run) and _follows(step, last):
+            # directly after another one, in C and always in CDR
+            if (
+                isinstance(step, Run)
+                and isinstance(last, Run)
+                and step.offset == last.offset + last.size
+                and step.align <= last.align
+                and last.size % step.align == 0
+            ):
                 joined[-1] = Run(last.offset, last.size + step.size, last.align)
             else:
                 joined.append(step)
     return tuple(joined)
-
-
-def _follows(step: Run, last: Run) -> bool:
-    """Return whether a run comes directly after another one, in C and always in CDR."""
-    return (
-        step.offset == last.offset + last.size
-        and step.align <= last.align
-        and last.size % step.align == 0
-    )
 
 
 def _converter(cls: Any, structure: Structure) -> object:

@@ -196,12 +196,17 @@ def _structure_of(owner: type) -> Structure:
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
+def type_hash(kind: type) -> str:
+    """Return a generated class's type hash."""
+    return structure_of(kind).hash
+
+
 def is_copy(kind: type, other: type) -> bool:
     """Return whether two generated classes are of one type, as those of two libraries may be."""
     owner, others = (getattr(type(each), "_message", None) for each in (kind, other))
     if owner is None or others is None or owner.__name__ != others.__name__:
         return False
-    return structure_of(owner).hash == structure_of(others).hash
+    return type_hash(owner) == type_hash(others)
 
 
 def slot_types(kind: type) -> tuple[Any, ...]:
