@@ -30,10 +30,10 @@ def typed(*without: str) -> tuple[str, ...]:
         value = context.params[name]
         if isinstance(parameter, click.Argument):
             arguments += (f"./{word}" if word.startswith("-") else word for word in value)
-        elif value is True or value == getattr(parameter, "flag_value", None):
+        elif value is True:
             words.append(parameter.opts[0])
-        elif isinstance(getattr(parameter, "flag_value", None), str):
-            words.append(f"{parameter.opts[0]}={value}")
+        elif isinstance(default := getattr(parameter, "flag_value", None), str):
+            words.append(parameter.opts[0] + ("" if value == default else f"={value}"))
         else:
             for word in value if isinstance(value, tuple) else (value,):
                 words += (parameter.opts[0], word)

@@ -48,7 +48,7 @@ GIT = "git:"
 _CHECK_OUT = "`git sparse-checkout disable` checks out all files"
 
 
-class BreakingOptions(NamedTuple):
+class BreakingOptions(msgspec.Struct, frozen=True):
     """The options of `idlc breaking`; `today` is a day as YYYY-MM-DD."""
 
     paths: tuple[str, ...]
@@ -401,7 +401,7 @@ class Baseline:
             # open texts are for the version that is compared with this one
             scope = self._options.scope
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
-            options = self._options._replace(paths=paths, scope=scope)
+            options = msgspec.structs.replace(self._options, paths=paths, scope=scope)
             side = read_baseline(options, tuple(packages), report) if paths and self.name else None
             why = next(
                 (problem.message for problem in report if problem.severity is Severity.ERROR), ""
@@ -432,4 +432,4 @@ class Baseline:
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Return the changes that the settings do not allow."""
         today = datetime.datetime.now().astimezone().date().isoformat()
-        return not_allowed(changes, self._options._replace(today=today), Report())
+        return not_allowed(changes, msgspec.structs.replace(self._options, today=today), Report())

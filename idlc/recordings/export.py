@@ -15,6 +15,8 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
+import msgspec
+
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model.ir import DUMMY_FIELD
@@ -281,7 +283,7 @@ class UnknownFieldError(Exception):
 Progress = Callable[[str, int, int], None]
 
 
-class ColumnsOptions(NamedTuple):
+class ColumnsOptions(msgspec.Struct, frozen=True):
     """The arguments of `idlc columns`; several recordings are read as one."""
 
     recordings: tuple[str, ...]

@@ -116,6 +116,14 @@ class Types:
             structure = self._structures.setdefault(name, Structure(self, name))
         return structure
 
+    def find_class(self, name: str) -> Any:
+        """Return a class by the full name of its type, which need not be described here."""
+        package, kind, short = name.split("/")
+        root = self.home if package == self.package else self.around + package
+        with importing():
+            module = import_module(f"{root}.{kind}", self.home)
+            return getattr(module, public_name(short))
+
 
 class Structure:
     """A type that has fields; a service or action has one for each of its parts."""
@@ -167,11 +175,7 @@ class Structure:
 
     def find_class(self) -> Any:
         """Return the class of its messages, of the package that describes it or of another."""
-        package, kind, short = self.name.split("/")
-        root = self.types.home if self.is_own else self.types.around + package
-        with importing():
-            module = import_module(f"{root}.{kind}", self.types.home)
-            return getattr(module, public_name(short))
+        return self.types.find_class(self.name)
 
 
 _types_of = cache(Types)

@@ -19,6 +19,7 @@ from idlc.build import compile_interfaces
 from idlc.cli.main import main
 from idlc.generate.native.layouts import LAYOUTS
 from idlc.project import prefixes
+from tests.support import programs
 from tests.support.programs import ended
 
 BUILD = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'
@@ -127,6 +128,16 @@ def test_a_wheel_holds_classes_and_what_ros_installs(source, tmp_path):
         if not name.endswith("/RECORD"):
             digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=")
             assert digests[name] == f"sha256={digest.decode()}"
+
+
+def test_a_wheel_can_come_with_the_types_that_it_uses(source, tmp_path):
+    write(source, {"pyproject.toml": BUILD + "[tool.idlc]\nvendor-deps = true\n"})
+    site = tmp_path / "site"
+    programs.run(sys.executable, "-m", "zipfile", "-e", built(tmp_path), site, cwd=tmp_path)
+    assert (site / "demo_msgs/_vendor/std_msgs/msg/_header.py").exists()
+    code = f"import sys; sys.path.insert(0, {str(site)!r}); from demo_msgs.msg import Drive; "
+    code += "from demo_msgs.vendor.std_msgs.msg import Header; Drive(header=Header()).serialize()"
+    programs.run(sys.executable, "-I", "-S", "-c", code, cwd=tmp_path)
 
 
 def test_committed_classes_are_compiled_anew(source, tmp_path):

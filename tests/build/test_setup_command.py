@@ -1,5 +1,6 @@
 """What setup(**compile_interfaces(...)) installs and distributes, whatever `data_files` lists."""
 
+import os
 import sys
 import tarfile
 
@@ -107,3 +108,18 @@ def test_a_source_distribution_holds_what_data_files_lists(machine, package, tmp
         names = {name.partition("/")[2] for name in sdist.getnames()}
     assert {"msg/Drive.msg", "resource/demo", "package.xml", "setup.py"} <= names
     assert not [name for name in names if name.startswith("build")]
+
+
+def test_packages_have_to_name_what_a_package_comes_with(package, tmp_path):
+    (package / "msg/Drive.msg").write_text("std_msgs/Header header\n")
+    (package / "pyproject.toml").write_text("[tool.idlc]\nvendor-deps = true\n")
+    setup = SETUP.format(data_files="None", machine="x86_64")
+    command = [sys.executable, "setup.py", "-q", "build", "-b", tmp_path / "root"]
+    for packages, status in (("['demo', 'demo.msg', 'demo._idlc']", 1), ("find_packages()", 0)):
+        text = setup.replace("['demo']", packages)
+        (package / "setup.py").write_text(f"from setuptools import find_packages\n{text}")
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_DISTRO": "jazzy"}
+        ended, said = programs.ended(*command, cwd=package, environment=environment)
+        assert ended == status, said
+        assert ("demo._vendor.std_msgs.msg" in said) is bool(status)
+    assert len(list(tmp_path.glob("root/**/demo/_vendor/std_msgs/msg/_header.py"))) == 1

@@ -387,6 +387,11 @@ def test_changing_the_place_removes_what_was_in_the_other(interfaces, tmp_path, 
     gen(interfaces, out, "--vendor-deps=beside", "--check")
     assert main(["gen", str(interfaces), "-o", str(out), "--package", "track_msgs", "--check"]) == 1
     assert "it was written with `--vendor-deps=beside`" in capsys.readouterr().err
+    words = ["gen", str(interfaces), "-o", str(out), "--package", "track_msgs"]
+    for option in ("--vendor-deps", "--vendor-deps=beside"):
+        write(tmp_path / "none", {"idlc.lock": (out / "idlc.lock").read_text()})
+        assert main([*words[:3], str(tmp_path / "none"), *words[4:], option, "--check"]) == 1
+        assert f"{option}`" in capsys.readouterr().err
     gen(interfaces, out, "--vendor-deps")
     said = capsys.readouterr()
     assert f"`{out.parent}/std_msgs` is removed" in said.err

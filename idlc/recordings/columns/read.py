@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
 
@@ -162,4 +162,4 @@ def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
 def _runtime_of(kind: Any) -> Any:
     """Return the runtime package that a message class comes from: carried, or installed."""
     base = owner_of(kind).__base__
-    return import_module(base.__module__.rpartition(".")[0])
+    return sys.modules[base.__module__.rpartition(".")[0]]
