@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from idlc.build.setup_command import distribution_class
 from idlc.check.compiler import models_of
@@ -22,12 +23,33 @@ from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
 
-def compile_interfaces(package: str) -> dict[str, type]:
+def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  # noqa: ARG001
+    """Have setup(idlc_interfaces=True) compile the interfaces before its commands run.
+
+    setuptools finds this function by its entry point. Without idlc it warns of an unknown option,
+    and the package is built with the classes that were committed.
+    """
+    if not value:
+        return
+
+    def run_commands() -> None:
+        del distribution.run_commands
+        compiled = compile_interfaces(distribution.get_name(), type(distribution))
+        distribution.__class__ = compiled.get("distclass", type(distribution))
+        generated = getattr(distribution, "generated", ())
+        distribution.packages = sorted({*(distribution.packages or ()), *generated})
+        distribution.run_commands()
+
+    distribution.run_commands = run_commands
+
+
+def compile_interfaces(package: str, base: type | None = None) -> dict[str, type]:
     """Bring the package's classes up to date, and install what rosidl installs beside them.
 
     Returns further arguments for setup(), `setup(..., **compiled)`: with them it installs the
     interfaces, their descriptions, libraries for C++ tools and the entries in ROS 2's index. These
-    replace what `data_files` lists for the same places.
+    replace what `data_files` lists for the same places. `base` is the class of distributions to
+    extend, setuptools' own by default.
 
     Works in the folder of the setup.py that is run, and writes only classes there, and only where
     they changed. A rejected interface ends the build with a report.
@@ -38,19 +60,19 @@ def compile_interfaces(package: str) -> dict[str, type]:
     os.chdir(source)
     try:
         with without_options():
-            return {"distclass": _compiled(package)}
+            return {"distclass": _compiled(package, base)}
     finally:
         os.chdir(working_folder)
 
 
-def _compiled(package: str) -> type:
+def _compiled(package: str, base: type | None) -> type:
     """Compile the package in the working folder; return a class for setup(distclass=...)."""
     report = Report()
     settings = load_settings(Root.here(), report)
     where = scope(settings, package)
     inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
     if not inputs:
-        return distribution_class(package, {})
+        return distribution_class(package, {}, base=base)
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
     runtime, vendoring = settings.runtime, settings.vendoring
     gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
@@ -67,4 +89,4 @@ def _compiled(package: str) -> type:
     modules = (PurePosixPath(package, path) for path in (lock.outputs if lock else ()))
     folders = {module.parent for module in modules if module.suffix == ".py"}
     generated = tuple(sorted(".".join(folder.parts) for folder in folders))
-    return distribution_class(package, files, generated, libraries.build_tag)
+    return distribution_class(package, files, generated, libraries.build_tag, base)

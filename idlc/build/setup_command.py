@@ -35,7 +35,11 @@ _DataFile: TypeAlias = str | tuple[str, Iterable[str]]
 
 
 def distribution_class(
-    package: str, files: Mapping[str, bytes], packages: Iterable[str] = (), build_tag: str = ""
+    package: str,
+    files: Mapping[str, bytes],
+    packages: Iterable[str] = (),
+    build_tag: str = "",
+    base: type | None = None,
 ) -> type:
     """Return a class for setup(distclass=...) that installs files, by their paths in a prefix.
 
@@ -44,7 +48,7 @@ def distribution_class(
     setup() was given all Python `packages` that were generated. `build_tag` is for the names of
     wheels.
     """
-    base = import_module("setuptools").Distribution
+    extended: Any = base or import_module("setuptools").Distribution
     index = {f"{prefixes.INDEX}/{kind}/{package}" for kind in ("packages", "rosidl_interfaces")}
 
     def run_commands(self: Any) -> None:
@@ -68,19 +72,19 @@ def distribution_class(
             raise SystemExit(f"{package}: cannot write to `{place}`: {reason(error)}") from None
         self.data_files = installed + listed
         self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
-        base.run_commands(self)
+        extended.run_commands(self)
 
     def run_command(self: Any, command: str) -> None:
         installed = self.data_files
         if command == "egg_info" and self.sources is not None:  # lists what is in an sdist
             self.data_files = self.sources
-        base.run_command(self, command)
+        extended.run_command(self, command)
         self.data_files = installed
 
     # editable installations leave data files out, because they ask for them by this other name
-    added = {"has_data": base.has_data_files, "sources": None}
+    added = {"has_data": extended.has_data_files, "sources": None, "generated": tuple(packages)}
     methods = {"run_commands": run_commands, "run_command": run_command}
-    return type("Distribution", (base,), {**methods, **added})
+    return type("Distribution", (extended,), {**methods, **added})
 
 
 def _merged(

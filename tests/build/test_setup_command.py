@@ -1,8 +1,11 @@
 """What setup(**compile_interfaces(...)) installs and distributes, whatever `data_files` lists."""
 
+import importlib.util
 import os
 import sys
 import tarfile
+import venv
+from pathlib import Path
 
 import pytest
 
@@ -108,6 +111,54 @@ def test_a_source_distribution_holds_what_data_files_lists(machine, package, tmp
         names = {name.partition("/")[2] for name in sdist.getnames()}
     assert {"msg/Drive.msg", "resource/demo", "package.xml", "setup.py"} <= names
     assert not [name for name in names if name.startswith("build")]
+
+
+KEYWORD_SETUP = """\
+from setuptools import find_packages, setup
+
+setup(
+    name='demo',
+    version='1.0',
+    packages=find_packages(),
+    data_files=[('share/ament_index/resource_index/packages', ['resource/demo'])],
+    idlc_interfaces=True,
+)
+"""
+BUILD = ("build", "install", "--single-version-externally-managed", "--record", "record.txt")
+
+
+def built_by_keyword(python, package, prefix, **environment):
+    """Build and install a package; return what that printed."""
+    (package / "setup.py").write_text(KEYWORD_SETUP)
+    places = (f"--prefix={prefix}", f"--install-lib={prefix}/site")
+    return programs.run_with(python, "setup.py", *BUILD, *places, cwd=package, **environment)
+
+
+def test_a_keyword_compiles_and_installs_classes_that_are_new(package, tmp_path):
+    (package / "msg/Drive.msg").write_text("float32 speed\n")
+    built_by_keyword(sys.executable, package, tmp_path / "prefix", ROS_DISTRO="jazzy")
+    assert (tmp_path / "prefix/site/demo/msg/_drive.py").is_file()
+    assert (tmp_path / "prefix/share/demo/msg/Drive.json").is_file()
+
+
+def test_a_build_without_idlc_installs_what_was_committed(package, tmp_path):
+    (package / "demo/msg").mkdir()
+    (package / "demo/msg/__init__.py").write_text("# as it was committed\n")
+    environment = tmp_path / "venv"
+    venv.create(environment)
+    setuptools = Path(importlib.util.find_spec("setuptools").origin).parents[1]
+    borrowed = tmp_path / "borrowed"
+    borrowed.mkdir()
+    for pattern in ("setuptools*", "pkg_resources", "_distutils_hack"):
+        for path in setuptools.glob(pattern):
+            (borrowed / path.name).symlink_to(path)
+    python, prefix = environment / "bin/python", tmp_path / "prefix"
+    said = built_by_keyword(python, package, prefix, PYTHONPATH=str(borrowed))
+    assert "idlc_interfaces" in said
+    classes = prefix / "site/demo/msg/__init__.py"
+    assert classes.read_text() == "# as it was committed\n"
+    assert (prefix / INDEX / "packages/demo").is_file()
+    assert not (prefix / "share/demo").exists()
 
 
 def test_packages_have_to_name_what_a_package_comes_with(package, tmp_path):

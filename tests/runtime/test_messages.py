@@ -28,7 +28,8 @@ FILES = {
         "int32 check_fields\nint32 int 4\nstring list\nint32 type\nint32 id\nint32 print\n"
         "int32 match\nint32 property\nbyte bytes\nint32 range\nint32 len\nint32[] str\n"
         "int32 codec\nint32 message\nint32 data\nint32 at\nint32 encode\nstring text\n"
-        "string put\nint32[] view\nPoint[] item\nPoint array\nint32 idlc\n"
+        "string put\nint32[] view\nPoint[] item\nPoint array\nint32 idlc\nint32 locals\n"
+        "int32 object\nint32 options\nint32 isinstance\n"
     ),
     "msg/Any.msg": "Point point\n",
     "msg/Text.msg": "Any any\nMessage[] messages\n",
@@ -352,6 +353,14 @@ def test_a_wrong_value_is_named_when_written_and_when_validated(fields, words):
         with pytest.raises(ValueError, match=re.escape(words)) as caught:
             action()
         assert type(caught.value).__name__ == "ValidationError"
+
+
+def test_fields_may_have_the_names_that_a_constructor_uses():
+    kind = get("msg/Odd")
+    with pytest.raises(TypeError, match="unexpected keyword argument 'z'"):
+        kind(z=1)
+    assert kind(locals=1, object=2, options=3) == kind(locals=1, object=2, options=3)
+    assert kind(locals=1) != kind()
 
 
 def test_the_first_field_is_checked_at_once():

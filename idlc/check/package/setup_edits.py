@@ -10,7 +10,6 @@ import re
 import tokenize
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
-from textwrap import indent
 from typing import TypeGuard
 
 import msgspec
@@ -198,17 +197,9 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
     return spread if items and spread not in refused else None
 
 
+#: The argument of setup() for which idlc compiles interfaces, and the function that did so before.
+KEYWORD = "idlc_interfaces"
 COMPILE = "compile_interfaces"
-RESULT = "compiled"
-_BLOCK = f"""\
-try:
-    from idlc.build import {COMPILE}
-except ImportError:
-    {RESULT} = {{{{}}}}  # what was compiled last is installed, without libraries for C++ tools
-else:
-    {RESULT} = {COMPILE}({{name}})
-
-"""
 
 
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
@@ -221,54 +212,25 @@ def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
         span_of(setup.source, index[0].node),
         f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
         "installs no library for its types",
-        hint=f"pass `**{COMPILE}('{package}')` of `idlc.build` to setup()"
-        + ("; --fix does" if edits else ""),
+        hint=f"pass `{KEYWORD}=True` to setup()" + ("; --fix does" if edits else ""),
     )
     yield msgspec.structs.replace(problem, edits=edits)
 
 
 def installs(setup: Setup) -> bool:
-    """Return whether a setup.py uses the result of compiling the interfaces."""
+    """Return whether a setup.py has idlc install what it compiles."""
+    asked = setup.arguments.get(KEYWORD)
+    if asked is not None:
+        return not isinstance(asked, ast.Constant) or bool(asked.value)
     dropped = {id(node.value) for node in setup.nodes if _is_plain(node)}
     return any(_is_compile(node) and id(node) not in dropped for node in setup.nodes)
 
 
 def edits_for(setup: Setup) -> tuple[Edit, ...]:
     """Return the edits after which a setup.py installs libraries; none if it is too unusual."""
-    names = {node.id for node in setup.nodes if isinstance(node, ast.Name)}
-    if setup.call is None or RESULT in names or installs(setup):
+    if setup.call is None or KEYWORD in setup.arguments or installs(setup):
         return ()
-    taken = {keyword.arg for keyword in setup.call.keywords} & {"distclass", None}
-    passing = () if taken else argument(setup, f"**{RESULT}")
-    compiling = _compiling(setup) if passing else ()
-    return (*compiling, *passing) if compiling else ()
-
-
-def _compiling(setup: Setup) -> tuple[Edit, ...]:
-    """Return the edits that keep the result of compiling, or that compile in the first place."""
-    source = setup.source
-    plain = [node for node in setup.nodes if _is_plain(node)]
-    if not plain:
-        name = setup.arguments.get("name")
-        first = setup.first_use("packages", "data_files")
-        if first is None or not isinstance(name, (ast.Name, ast.Constant)):
-            return ()
-        at = start_of(source, first)
-        margin = indent_of(source, at)
-        if first.col_offset != len(margin):
-            return ()  # behind a semicolon
-        at -= len(margin)
-        blank = not at or re.search(r"(\r\n?|\n)[ \t]*(\r\n?|\n)\Z", source.text[:at])
-        block = _BLOCK.format(name=ast.unparse(name))
-        return (insertion(source, at, ("" if blank else "\n") + indent(block, margin)),)
-    blocks = [node for node in setup.nodes if isinstance(node, ast.Try) and plain[0] in node.orelse]
-    if len(plain) != 1 or len(blocks) != 1 or len(blocks[0].handlers) != 1:
-        return ()
-    (otherwise,) = blocks[0].handlers
-    if len(otherwise.body) != 1 or not isinstance(otherwise.body[0], ast.Pass):
-        return ()
-    nothing = Edit(Span(source, *range_of(source, otherwise.body[0])), f"{RESULT} = {{}}")
-    return nothing, insertion(source, start_of(source, plain[0]), f"{RESULT} = ")
+    return argument(setup, f"{KEYWORD}=True")
 
 
 def _is_compile(node: ast.AST) -> bool:

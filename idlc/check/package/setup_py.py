@@ -340,32 +340,6 @@ class Setup:
             node = listed.elts[0]
         return span_of(self.source, node) if node else Span(self.source, 0, 0)
 
-    def first_use(self, *arguments: str) -> ast.stmt | None:
-        """Return the first statement that computes arguments, in the block with setup().
-
-        It follows the value of `name`; `None` if setup() is not a statement of its own.
-        """
-        statement = self._parents.get(id(self.call))
-        block = getattr(self._parents.get(id(statement)), "body", [])
-        if not isinstance(statement, ast.Expr) or statement not in block:
-            return None
-        names = {node.id for argument in arguments for node in self._names_in(argument)}
-        own = {node.id for node in self._names_in("name")}
-        for earlier in reversed(block[: block.index(statement)]):
-            stored = {node.id for node in ast.walk(earlier) if isinstance(node, ast.Name)}
-            bound = any(isinstance(earlier, kind) for kind in (ast.Assign, ast.AnnAssign))
-            if bound and stored & own and not stored & (names - own):
-                break
-            if stored & (names - own):
-                statement = earlier
-        return statement
-
-    def _names_in(self, argument: str) -> Iterator[ast.Name]:
-        node = self.arguments.get(argument)
-        for part in ast.walk(node) if node else ():
-            if isinstance(part, ast.Name) and part.id in self._bound:
-                yield part
-
     @cached_property
     def data_files(self) -> tuple[DataFiles, ...] | None:
         """The entries of data_files; `None` if they are computed."""
