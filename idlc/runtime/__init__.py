@@ -32,6 +32,15 @@ if TYPE_CHECKING:
     from .conversions import Integers as Integers
     from .conversions import Join as Join
     from .conversions import Options as Options
+    from .protocol import ActionImpl as ActionImpl
+    from .protocol import FeedbackMessage as FeedbackMessage
+    from .protocol import GetResult as GetResult
+    from .protocol import GetResultRequest as GetResultRequest
+    from .protocol import GetResultResponse as GetResultResponse
+    from .protocol import SendGoal as SendGoal
+    from .protocol import SendGoalRequest as SendGoalRequest
+    from .protocol import SendGoalResponse as SendGoalResponse
+    from .protocol import ServiceEvent as ServiceEvent
     from .typeinfo import type_hash as type_hash
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"

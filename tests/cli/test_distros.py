@@ -294,7 +294,7 @@ def test_generated_code_is_the_same_before_lyrical_and_from_then_on(capsys):
         found[distro] = {path.relative_to(f"out/{distro}"): path.read_bytes() for path in files}
     assert len(found["humble"]) > 10
     differing = {name for name in found["jazzy"] if found["jazzy"][name] != found["lyrical"][name]}
-    assert differing == {Path("demo/msg/_a.py"), Path("demo/srv/_s__protocol.py")}
+    assert differing == {Path("demo/msg/_a.py"), Path("demo/srv/_s.py")}
     for distro, files in found.items():
         assert files == found["lyrical" if BY_NAME[distro].converts_values else "jazzy"]
 

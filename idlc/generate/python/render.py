@@ -175,7 +175,7 @@ _json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
 class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     """A module of classes or of codecs; `imports` are lines.
 
-    `protocol` is the module of what ROS 2 adds to the service or action.
+    `converts` says that classes convert values as Lyrical's do.
     """
 
     origin: Text
@@ -185,9 +185,8 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     imports: tuple[Code, ...] = ()
     messages: tuple[MessageView, ...] = ()
     codecs: tuple[CodecView, ...] = ()
-    services: tuple[GroupView, ...] = ()
-    action: GroupView | None = None
-    protocol: Code = Code("")
+    group: GroupView | None = None
+    converts: bool = False
 
 
 class Module(NamedTuple):
@@ -205,17 +204,6 @@ PRAGMAS = (
 HIDING_PRAGMAS = (Code("# pyright: reportIncompatibleMethodOverride=false"),)
 
 
-class _ModulePart(NamedTuple):
-    """The structures of an interface that one module of classes defines."""
-
-    interface: ir.Interface
-    structures: tuple[ir.Message, ...]
-    references: References
-    module: python_names.ModuleName
-    is_added: bool
-    converts: bool
-
-
 def module_views(
     interface: ir.Interface,
     messages: plan.Messages,
@@ -230,54 +218,47 @@ def module_views(
     """
     homes = Homes(interface, names, surroundings)
     written = derive.sections(interface)
-    added = derive.messages(interface)[len(written) :]
-    for structures, module in ((written, homes.classes), (added, homes.protocol)):
-        if structures:
-            references = References(interface, structures, messages, homes)
-            is_added = structures is added
-            part = _ModulePart(interface, structures, references, module, is_added, converts)
-            yield _classes(part, homes)
-            yield _codecs(part, messages)
-
-
-def _classes(part: _ModulePart, homes: Homes) -> Module:
-    interface, references = part.interface, part.references
-    name = interface.name
-    purposes = fields.purposes(interface)
-    is_action = isinstance(interface, ir.Action)
-    file = f"{name.kind}/{name.name}.{name.kind}"
+    view = _classes(interface, written, References(interface, written, messages, homes), converts)
+    yield Module(interface.name.kind, f"{interface.name.kind}/{homes.classes}.py", view)
+    sent = written + derive.composites(interface)
+    references = References(interface, sent, messages, homes)
+    codecs = tuple(codec(structure, references, messages) for structure in sent)
     view = ModuleView(
-        origin=Text(f"{name}.{name.kind}"),
-        pragmas=(
-            *(PRAGMAS if references.others and not homes.surroundings.vendors else ()),
-            *(HIDING_PRAGMAS if any(map(_hides_methods, part.structures)) else ()),
-        ),
-        title=Text(f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}."),
-        runtime=Code(homes.surroundings.runtime),
-        imports=_code(_imports(references, part.structures)),
-        messages=tuple(
-            classes.message(structure, references, purposes, file, converts=part.converts)
-            for structure in part.structures
-        ),
-        # a service's own class is its author's; those of an action's services are not
-        services=classes.services(interface, purposes) if part.is_added == is_action else (),
-        action=classes.action(interface) if isinstance(interface, ir.Action) else None,
-        protocol=Code(homes.protocol),
-    )
-    return Module("protocol" if part.is_added else name.kind, f"{name.kind}/{part.module}.py", view)
-
-
-def _codecs(part: _ModulePart, messages: plan.Messages) -> Module:
-    name = part.interface.name
-    codecs = tuple(codec(structure, part.references, messages) for structure in part.structures)
-    view = ModuleView(
-        origin=Text(f"{name}.{name.kind}"),
+        origin=Text(f"{interface.name}.{interface.name.kind}"),
         pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
-        title=Text(f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}."),
-        runtime=Code(part.references.surroundings.runtime),
+        title=Text(f"The codecs of {interface.name}."),
+        runtime=Code(surroundings.runtime),
         codecs=codecs,
     )
-    return Module("codec", f"{name.kind}/{python_names.codec_module(part.module)}.py", view)
+    path = f"{interface.name.kind}/{python_names.codec_module(homes.classes)}.py"
+    yield Module("codec", path, view)
+
+
+def _classes(
+    interface: ir.Interface,
+    structures: tuple[ir.Message, ...],
+    references: References,
+    converts: bool,
+) -> ModuleView:
+    name = interface.name
+    purposes = fields.purposes(interface)
+    file = f"{name.kind}/{name.name}.{name.kind}"
+    return ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
+        pragmas=(
+            *(PRAGMAS if references.others and not references.surroundings.vendors else ()),
+            *(HIDING_PRAGMAS if any(map(_hides_methods, structures)) else ()),
+        ),
+        title=Text(f"The classes of {name}."),
+        runtime=Code(references.surroundings.runtime),
+        imports=_code(_imports(references, structures)),
+        messages=tuple(
+            classes.message(structure, references, purposes, file, converts=converts)
+            for structure in structures
+        ),
+        group=None if isinstance(interface, ir.Message) else classes.group(interface),
+        converts=converts,
+    )
 
 
 def _hides_methods(structure: ir.Message) -> bool:
@@ -299,12 +280,6 @@ def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iter
     yield from inside
     if outside:
         yield from ("", "with _idlc.importing():", *outside)
-    implied = references.modules()
-    if implied:
-        yield from ("", "TYPE_CHECKING = False", "if TYPE_CHECKING:")
-        yield from (f"    import {module} as {name}" for module, name in implied)
-        yield "else:"
-        yield from (f'    {name} = _idlc.Package("{module}")' for module, name in implied)
 
 
 PACKAGE = Path(__file__).parents[2]

@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from .cdr import NATIVE, order_of
 from .names import DecodeError, importing, public_name, slot_name, wire_name
@@ -88,6 +88,10 @@ class FieldInfo:
         self.public = public_name(self.name)
         self.is_list = self.shape != SCALAR
         self.is_numeric = self.primitive is not None and self.primitive.code not in "?c"
+
+
+#: Makes the value of a field of a message, from the bytes of numbers.
+Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
@@ -272,12 +276,16 @@ def counted(count: int, what: str) -> str:
 
 
 def read_carefully(
-    kind: type, data: bytes, maker: Callable[[Any], Callable[[], Any]]
+    kind: type,
+    data: Any,
+    maker: Callable[[Any], Callable[[], Any]],
+    numbers: Numbers | None = None,
 ) -> Any:
     """Return the message in `data`; raise DecodeError naming the field and the byte.
 
     It takes what middlewares take although it is not right: text that is not UTF-8, text without
-    its terminating zero. `maker` returns the function that makes empty messages of a class.
+    its terminating zero. `maker` returns the function that makes empty messages of a class,
+    `numbers` makes the value of a numeric array or sequence of its bytes.
     """
     structure = structure_of(kind)
 
@@ -285,7 +293,7 @@ def read_carefully(
         # what a constructor makes may be larger than the buffer
         return maker(kind if other is structure else other.find_class())()
 
-    return CarefulReader(data, order_of(data), make).message(structure, "")
+    return CarefulReader(data, order_of(data), make, numbers).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:
@@ -302,11 +310,16 @@ class CarefulReader:
     """
 
     def __init__(
-        self, data: bytes, order: str, make: Callable[[Structure], Any]
+        self,
+        data: Any,
+        order: str,
+        make: Callable[[Structure], Any],
+        numbers: Numbers | None = None,
     ) -> None:
         self.data = data
         self.order = order
         self.make = make
+        self.numbers = numbers or self.copied
         self.at = 4
 
     def message(self, structure: Structure, path: str) -> Any:
@@ -316,11 +329,11 @@ class CarefulReader:
             self.take(1, 1, path or structure.name)
         for field in structure.fields:
             place = inner_path(path, field.public)
-            setattr(message, field.slot, self.field(field, place))
+            setattr(message, field.slot, self.field(field, place, message))
         return message
 
-    def field(self, field: FieldInfo, path: str) -> Any:
-        """Read a field."""
+    def field(self, field: FieldInfo, path: str, message: Any) -> Any:
+        """Read a field of a message."""
         if not field.is_list:
             return self.element(field, path)
         count = field.size
@@ -331,16 +344,15 @@ class CarefulReader:
                 raise DecodeError(problem, path, self.at - 4)
         self.enough(count * least_element(field), path, f"{count} elements")
         if field.is_numeric and field.primitive is not None:
-            return self.numbers(field, count, path)
+            size = field.primitive.size
+            raw = self.take(count * size, size, path) if count else b""
+            return self.numbers(message, field, raw)
         return [self.element(field, f"{path}[{index}]") for index in range(count)]
 
-    def numbers(self, field: FieldInfo, count: int, path: str) -> Any:
-        """Read an array of numbers."""
+    def copied(self, _message: Any, field: FieldInfo, raw: bytes) -> Any:
+        """Return an array of numbers."""
         assert field.primitive is not None
-        size = field.primitive.size
-        result = array(field.primitive.code)
-        if count:
-            result.frombytes(self.take(count * size, size, path))
+        result = array(field.primitive.code, raw)
         if self.order != NATIVE:
             result.byteswap()
         if field.is_sequence:
@@ -361,12 +373,14 @@ class CarefulReader:
             return self.wide(self.count(path, "units"), path)
         size = self.count(path, "bytes of text")
         raw = self.take(size, 1, path, f"{size} bytes of text")
-        return raw.removesuffix(b"\0").decode("utf-8", "replace")
+        return bytes(raw).removesuffix(b"\0").decode("utf-8", "replace")
 
     def wide(self, count: int, path: str) -> str:
         """Read a wstring, whose units must be UTF-16."""
         at = self.at
-        units = array("I", self.take(4 * count, 4, path, f"{count} units of text"))
+        units = array(
+            "I", bytes(self.take(4 * count, 4, path, f"{count} units of text"))
+        )
         if self.order != NATIVE:
             units.byteswap()
         for index, unit in enumerate(units):
@@ -381,7 +395,7 @@ class CarefulReader:
         raw = self.take(4, 4, path, f"the number of {what}")
         return int.from_bytes(raw, "little" if self.order == "<" else "big")
 
-    def take(self, size: int, align: int, path: str, what: str = "") -> bytes:
+    def take(self, size: int, align: int, path: str, what: str = "") -> Any:
         """Return the bytes of the next value."""
         self.at += (4 - self.at) % align
         self.enough(size, path, what or counted(size, "byte"))
