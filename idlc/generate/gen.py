@@ -29,7 +29,7 @@ from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
-from idlc.project.lock import Vendoring, load_lock
+from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
@@ -44,7 +44,7 @@ class GenOptions(NamedTuple):
     """The arguments of `idlc gen`, which writes to `out`, into the prefix `ament`, or both.
 
     Types of `topics` of recordings are written; none means all. `again` is the command for hints
-    that writes the files which `check` compares.
+    that writes the files which `check` compares. Without `runtime`, each package keeps its own.
     """
 
     paths: tuple[str, ...]
@@ -52,6 +52,7 @@ class GenOptions(NamedTuple):
     out: str = ""
     topics: tuple[str, ...] = ()
     check: bool = False
+    runtime: Runtime | None = None
     vendoring: Vendoring = ""
     force: bool = False
     ament: str = ""
@@ -63,6 +64,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
     return options._replace(
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
+        runtime=options.runtime or settings.runtime,
         vendoring=options.vendoring or settings.vendoring,
     )
 
@@ -153,7 +155,12 @@ def _targets(
     """Return the folder that each package is written to."""
     if not options.ament:
         return folder_targets(
-            packages, options.out, options.scope.root, report, force=options.force
+            packages,
+            options.out,
+            options.scope.root,
+            report,
+            force=options.force,
+            runtime=options.runtime,
         )
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
@@ -165,7 +172,14 @@ def _targets(
     distros = [distro.name for distro in options.scope.distros]
     overlays = [
         Overlay(
-            prefix, name, home, options.scope.root, report, force=options.force, distros=distros
+            prefix,
+            name,
+            home,
+            options.scope.root,
+            report,
+            force=options.force,
+            runtime=options.runtime,
+            distros=distros,
         )
         for name, home in homes
     ]

@@ -15,7 +15,7 @@ from idlc.generate.native.inspect import inspect
 from idlc.generate.target import Target
 from idlc.project import prefixes, write
 from idlc.project.library import Library
-from idlc.project.lock import Tree, Vendoring
+from idlc.project.lock import Runtime, Tree, Vendoring
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
 from idlc.project.root import Root
 from idlc.project.write import Change, Plan
@@ -138,9 +138,10 @@ class Overlay(Target):
         report: Report,
         *,
         force: bool = False,
+        runtime: Runtime | None = None,
         distros: Sequence[str] = (),
     ) -> None:
-        super().__init__(name, package, root, report, force=force)
+        super().__init__(name, package, root, report, force=force, runtime=runtime)
         self._distros = distros
         declared = root.manifest(home) if home else None
         #: The content of its package.xml; `None` if there is none to be copied.
@@ -177,6 +178,7 @@ class Overlay(Target):
             self._root,
             self.report,
             force=self._force,
+            runtime=self.runtime,
             distros=self._distros,
         )
 

@@ -24,6 +24,7 @@ from idlc.project.lock import (
     FILE,
     Lock,
     Obstacle,
+    Runtime,
     Tree,
     Vendoring,
     digest,
@@ -180,7 +181,13 @@ def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
 
 
 def folder_targets(
-    packages: Sequence[inputs.Inputs], out: str, root: Root, report: Report, *, force: bool
+    packages: Sequence[inputs.Inputs],
+    out: str,
+    root: Root,
+    report: Report,
+    *,
+    force: bool,
+    runtime: Runtime | None,
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
@@ -191,7 +198,7 @@ def folder_targets(
         package = packages[0].package
         beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
         folder = f"{out}/{package}" if beside_others else out
-        targets = [Target(folder, package, root, report, force=force)]
+        targets = [Target(folder, package, root, report, force=force, runtime=runtime)]
     elif is_file(top / FILE):
         message = f"`{out}` holds one package, and these are {len(packages)}"
         hint = "choose a folder for all of them with -o, each gets one of its name there"
@@ -199,8 +206,10 @@ def folder_targets(
         return ()
     else:
         base = out.rstrip("/") or out
-        names = [each.package for each in packages]
-        targets = [Target(f"{base}/{name}", name, root, report, force=force) for name in names]
+        targets = [
+            Target(f"{base}/{name}", name, root, report, force=force, runtime=runtime)
+            for name in (each.package for each in packages)
+        ]
     return tuple(targets) if all(target.usable() for target in targets) else ()
 
 
@@ -334,7 +343,14 @@ class Target:
     modules = ""
 
     def __init__(
-        self, name: str, package: str, root: Root, report: Report, *, force: bool = False
+        self,
+        name: str,
+        package: str,
+        root: Root,
+        report: Report,
+        *,
+        force: bool = False,
+        runtime: Runtime | None = None,
     ) -> None:
         self.name = name
         self.package = package
@@ -342,11 +358,19 @@ class Target:
         self.path = root.absolute(name)
         self.report = report
         self._force = force
+        self._runtime = runtime
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
-        return Target(name, package, self._root, self.report, force=self._force)
+        return Target(
+            name,
+            package,
+            self._root,
+            self.report,
+            force=self._force,
+            runtime=self.runtime,
+        )
 
     def locks_beside(self) -> dict[str, Lock]:
         """Return the locks of the packages in the folder that this one is in, by their folders."""
@@ -359,6 +383,11 @@ class Target:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
         report = Report() if self._force else self.report
         return load_lock(self.path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
+
+    @property
+    def runtime(self) -> Runtime:
+        """How the package has its runtime: as was chosen, or as in the last run."""
+        return self._runtime or (self.lock.runtime if self.lock else "carried")
 
     def usable(self) -> bool:
         """Return whether this is or can become a folder; reports IDL612."""
@@ -375,7 +404,9 @@ class Target:
         self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return whether compiling the inputs would change nothing."""
-        is_unchanged = unchanged(self.path, self.lock, self.package, inputs, library, vendoring)
+        is_unchanged = (self.lock is None or self.lock.runtime == self.runtime) and unchanged(
+            self.path, self.lock, self.package, inputs, library, vendoring
+        )
         if is_unchanged:
             write.sweep(self.path)
         return is_unchanged
@@ -491,6 +522,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         reasons.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
     if old.converts_values != new.converts_values:
         reasons.append("it was written for another distribution of ROS 2")
+    if old.runtime != new.runtime:
+        reasons.append(f"its runtime was {old.runtime}, and is to be {new.runtime}")
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
     if old.vendoring != new.vendoring:

@@ -39,7 +39,15 @@ def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False
 
 
 def recorded(outputs: dict[str, str]) -> bytes:
-    record = lock.Lock(idlc="0", package="p", inputs={}, dependencies={}, types={}, outputs=outputs)
+    record = lock.Lock(
+        format=lock.FORMAT,
+        idlc="0",
+        package="p",
+        inputs={},
+        dependencies={},
+        types={},
+        outputs=outputs,
+    )
     return lock.encode(record)
 
 
