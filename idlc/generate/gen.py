@@ -25,6 +25,7 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.model.distros import Distro
 from idlc.project import inputs, lock, settings
+from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
@@ -129,10 +130,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
         return ()
-    vendored = options.vendoring == "beside" or any(
-        each.lock and each.lock.vendored for each in folders
-    )
-    with folders[0].exclusive(beside=vendored or len(folders) > 1):
+    with exclusive(folders[0].path):
         done = _compile_and_write(dict(zip(folders, packages, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
             from idlc.generate.prefix import write_setup_scripts
