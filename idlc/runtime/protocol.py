@@ -370,9 +370,10 @@ def _equal(self: Any, other: Any) -> Any:
     owner = owner_of(type(self))
     if not isinstance(other, owner):
         return equal(self, other)
-    return all(
-        same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
-    )
+    for slot in owner.__slots__:
+        if not same(getattr(self, slot), getattr(other, slot)):
+            return False
+    return True
 
 
 def _plain(field: FieldInfo) -> type:
@@ -395,10 +396,16 @@ def _spell(field: FieldInfo, boolean: str = "bool", listed: str = "{}[<={}]") ->
 
 def field_codecs(kind: type) -> codec.Codecs:
     """Return codecs that read and write a message field by field, as the type data has them."""
-    from .typeinfo import read_carefully, structure_of
+    from functools import cache
+
+    from .typeinfo import CarefulReader, structure_of
 
     owner = owner_of(kind)
     structure = structure_of(owner)
+
+    @cache
+    def maker_of(other: Structure) -> Any:
+        return codec.maker(owner if other is structure else other.find_class())
 
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
         def numbers(message: Any, field: Any, raw: Any) -> Any:
@@ -417,7 +424,10 @@ def field_codecs(kind: type) -> codec.Codecs:
         def decode(data: Any) -> Any:
             if not reading.copy:
                 data = memoryview(data)
-            return read_carefully(owner, data, codec.maker, numbers)
+            reader = CarefulReader(
+                data, order, lambda other: maker_of(other)(), numbers
+            )
+            return reader.message(structure, "")
 
         return codec.Codec(encode, decode, bulk=True)
 
