@@ -15,9 +15,18 @@ from struct import pack
 from types import FunctionType
 
 from . import codec
-from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
+from .cdr import (
+    HEADERS,
+    TRUTHS,
+    counter,
+    flags,
+    listed,
+    octets,
+    order_of,
+    wide_text,
+)
 from .message import Message, OnDemand, Service, define, equal, same
-from .names import importing, owner_of, public_name, wire_name
+from .names import owner_of, public_name, wire_name
 from .sequences import ListOf, sequence_reader, sequence_writer
 
 TYPE_CHECKING = False
@@ -64,16 +73,18 @@ class ActionImpl:
     GoalStatusMessage = OnDemand("protocol", "import_goal_status")
 
 
-def import_cancel_goal(_impl: type) -> Any:
+def import_cancel_goal(impl: type) -> Any:
     """Return the service that cancels goals of any action."""
-    with importing():
-        return __import__("action_msgs.srv", fromlist=["srv"]).CancelGoal
+    from .typeinfo import types_of
+
+    return types_of(impl).find_class("action_msgs/srv/CancelGoal")
 
 
-def import_goal_status(_impl: type) -> Any:
+def import_goal_status(impl: type) -> Any:
     """Return the message in which an action server publishes the states of goals."""
-    with importing():
-        return __import__("action_msgs.msg", fromlist=["msg"]).GoalStatusArray
+    from .typeinfo import types_of
+
+    return types_of(impl).find_class("action_msgs/msg/GoalStatusArray")
 
 
 # What the composed messages are made of: their fields as type checkers see them, constructors
@@ -370,10 +381,9 @@ def _equal(self: Any, other: Any) -> Any:
     owner = owner_of(type(self))
     if not isinstance(other, owner):
         return equal(self, other)
-    for slot in owner.__slots__:
-        if not same(getattr(self, slot), getattr(other, slot)):
-            return False
-    return True
+    return all(
+        same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
+    )
 
 
 def _plain(field: FieldInfo) -> type:
@@ -425,7 +435,7 @@ def field_codecs(kind: type) -> codec.Codecs:
             if not reading.copy:
                 data = memoryview(data)
             reader = CarefulReader(
-                data, order, lambda other: maker_of(other)(), numbers
+                data, order_of(data), lambda other: maker_of(other)(), numbers
             )
             return reader.message(structure, "")
 

@@ -182,7 +182,17 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-_types_of = cache(Types)
+_types_in = cache(Types)
+
+
+def types_of(kind: type) -> Types:
+    """Return what the package of a generated class says of types."""
+    home, _, _ = kind.__module__.rsplit(".", 2)
+    try:
+        data = import_module(f"{home}._type_data")
+    except ModuleNotFoundError:
+        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
+    return _types_in(data)
 
 
 def structure_of(kind: type) -> Structure:
@@ -195,12 +205,8 @@ def structure_of(kind: type) -> Structure:
 
 @cache
 def _structure_of(owner: type) -> Structure:
-    home, kind, _ = owner.__module__.rsplit(".", 2)
-    try:
-        data = import_module(f"{home}._type_data")
-    except ModuleNotFoundError:
-        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    types = _types_of(data)
+    types = types_of(owner)
+    kind = owner.__module__.rsplit(".", 2)[1]
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
