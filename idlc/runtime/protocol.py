@@ -15,7 +15,16 @@ from struct import pack
 from types import FunctionType
 
 from . import codec
-from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
+from .cdr import (
+    HEADERS,
+    TRUTHS,
+    counter,
+    flags,
+    listed,
+    octets,
+    order_of,
+    wide_text,
+)
 from .message import Message, OnDemand, Service, define, equal, same
 from .names import owner_of, public_name, wire_name
 from .sequences import ListOf, sequence_reader, sequence_writer
@@ -397,10 +406,16 @@ def _spell(field: FieldInfo, boolean: str = "bool", listed: str = "{}[<={}]") ->
 
 def field_codecs(kind: type) -> codec.Codecs:
     """Return codecs that read and write a message field by field, as the type data has them."""
-    from .typeinfo import read_carefully, structure_of
+    from functools import cache
+
+    from .typeinfo import CarefulReader, structure_of
 
     owner = owner_of(kind)
     structure = structure_of(owner)
+
+    @cache
+    def maker_of(other: Structure) -> Any:
+        return codec.maker(owner if other is structure else other.find_class())
 
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
         def numbers(message: Any, field: Any, raw: Any) -> Any:
@@ -419,7 +434,10 @@ def field_codecs(kind: type) -> codec.Codecs:
         def decode(data: Any) -> Any:
             if not reading.copy:
                 data = memoryview(data)
-            return read_carefully(owner, data, codec.maker, numbers)
+            reader = CarefulReader(
+                data, order_of(data), lambda other: maker_of(other)(), numbers
+            )
+            return reader.message(structure, "")
 
         return codec.Codec(encode, decode, bulk=True)
 

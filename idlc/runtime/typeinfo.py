@@ -282,16 +282,12 @@ def counted(count: int, what: str) -> str:
 
 
 def read_carefully(
-    kind: type,
-    data: Any,
-    maker: Callable[[Any], Callable[[], Any]],
-    numbers: Numbers | None = None,
+    kind: type, data: bytes, maker: Callable[[Any], Callable[[], Any]]
 ) -> Any:
     """Return the message in `data`; raise DecodeError naming the field and the byte.
 
     It takes what middlewares take although it is not right: text that is not UTF-8, text without
-    its terminating zero. `maker` returns the function that makes empty messages of a class,
-    `numbers` makes the value of a numeric array or sequence of its bytes.
+    its terminating zero. `maker` returns the function that makes empty messages of a class.
     """
     structure = structure_of(kind)
 
@@ -299,7 +295,7 @@ def read_carefully(
         # what a constructor makes may be larger than the buffer
         return maker(kind if other is structure else other.find_class())()
 
-    return CarefulReader(data, order_of(data), make, numbers).message(structure, "")
+    return CarefulReader(data, order_of(data), make).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:
@@ -312,7 +308,7 @@ def least_element(field: FieldInfo) -> int:
 class CarefulReader:
     """Goes over a buffer and never further than it has bytes for.
 
-    `make` returns what takes the values of a structure.
+    `make` returns what takes the values of a structure, `numbers` what a field holds of numbers.
     """
 
     def __init__(
