@@ -31,8 +31,7 @@ class Fill_Goal(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not float:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.level = level
 
@@ -46,10 +45,7 @@ class Fill_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class Fill_Result(_idlc.Message):  # noqa
-    """The result of the action comments_msgs/action/Fill.
-
-    Defined in action/Fill.action
-    """
+    """The result of the action comments_msgs/action/Fill, defined in action/Fill.action."""
 
     __match_args__ = ("reached",)
     _fields_and_field_types = {
@@ -66,8 +62,7 @@ class Fill_Result(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or reached.__class__ is not float:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.reached = reached
 
@@ -81,10 +76,7 @@ class Fill_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class Fill_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action comments_msgs/action/Fill.
-
-    Defined in action/Fill.action
-    """
+    """The feedback of the action comments_msgs/action/Fill, defined in action/Fill.action."""
 
     __match_args__ = ("level",)
     _fields_and_field_types = {
@@ -101,8 +93,7 @@ class Fill_Feedback(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not float:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.level = level
 

@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of comments_msgs/action/Fill."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def fill_goal_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
@@ -45,11 +38,7 @@ def fill_goal_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_result_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
@@ -73,11 +62,7 @@ def fill_result_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_feedback_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
@@ -101,11 +86,7 @@ def fill_feedback_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_send_goal_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._fill import Fill_Goal
@@ -150,11 +131,7 @@ def fill_send_goal_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_get_result_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_GetResult_Response in one byte order."""
     from ._fill import Fill_Result
 
@@ -188,11 +165,7 @@ def fill_get_result_response_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_feedback_message_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._fill import Fill_Feedback

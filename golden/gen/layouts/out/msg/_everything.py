@@ -20,10 +20,7 @@ with _idlc.importing():
 
 @_idlc.define
 class Everything(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Everything.
-
-    Defined in msg/Everything.msg:1
-    """
+    """layouts_msgs/msg/Everything, defined in msg/Everything.msg:1."""
 
     __match_args__ = (
         "flag",
@@ -117,8 +114,7 @@ class Everything(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or flag.__class__ is not bool:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.flag = flag
         if inner is None:

@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class Inner(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Inner.
-
-    Defined in msg/Inner.msg:1
-    """
+    """layouts_msgs/msg/Inner, defined in msg/Inner.msg:1."""
 
     __match_args__ = (
         "a",
@@ -46,8 +43,7 @@ class Inner(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.a = a
         self.b = b

@@ -19,8 +19,7 @@ class Nothing(_idlc.Message):  # noqa
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
 
     def __eq__(self, other: object) -> bool:

@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class Pair(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Pair.
-
-    Defined in msg/Pair.msg:1
-    """
+    """layouts_msgs/msg/Pair, defined in msg/Pair.msg:1."""
 
     __match_args__ = (
         "key",
@@ -36,8 +33,7 @@ class Pair(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or key.__class__ is not str:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.key = key
         self.value = value

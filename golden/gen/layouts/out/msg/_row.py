@@ -10,10 +10,7 @@ from .._idlc import arrays as _arrays
 
 @_idlc.define
 class Row(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Row.
-
-    Defined in msg/Row.msg:1
-    """
+    """layouts_msgs/msg/Row, defined in msg/Row.msg:1."""
 
     __match_args__ = (
         "a",
@@ -42,8 +39,7 @@ class Row(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.a = a
         self.b = b

@@ -11,10 +11,7 @@ from ._titled import Titled
 
 @_idlc.define
 class Texts(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Texts.
-
-    Defined in msg/Texts.msg:1
-    """
+    """layouts_msgs/msg/Texts, defined in msg/Texts.msg:1."""
 
     __match_args__ = (
         "pairs",
@@ -50,8 +47,7 @@ class Texts(_idlc.Message):  # noqa
             pairs = []
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or pairs.__class__ is not list:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.pairs = pairs
         if few is None:

@@ -10,10 +10,7 @@ from ._pair import Pair
 
 @_idlc.define
 class Titled(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Titled.
-
-    Defined in msg/Titled.msg:1
-    """
+    """layouts_msgs/msg/Titled, defined in msg/Titled.msg:1."""
 
     __match_args__ = (
         "level",
@@ -47,8 +44,7 @@ class Titled(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.level = level
         self.title = title

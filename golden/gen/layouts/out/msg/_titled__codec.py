@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def titled_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def titled_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Titled in one byte order."""
     from ._pair import Pair
 

@@ -14,10 +14,7 @@ from ._words import Words
 
 @_idlc.define
 class Lists(_idlc.Message):  # noqa
-    """lyrical_msgs/msg/Lists.
-
-    Defined in msg/Lists.msg:1
-    """
+    """lyrical_msgs/msg/Lists, defined in msg/Lists.msg:1."""
 
     __match_args__ = (
         "names",
@@ -88,8 +85,7 @@ class Lists(_idlc.Message):  # noqa
             names = self.NAMES__DEFAULT
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or names.__class__ is not _builtins.list:
-            _done = _idlc.construct(self, options, _builtins.locals())
-            if _done:
+            if _idlc.construct(self, options, _builtins.locals()):
                 return
         self.names = names
         if words is None:

@@ -11,10 +11,7 @@ from .. import _idlc
 
 @_idlc.define
 class Words(_idlc.Message):  # noqa
-    """lyrical_msgs/msg/Words.
-
-    Defined in msg/Words.msg:1
-    """
+    """lyrical_msgs/msg/Words, defined in msg/Words.msg:1."""
 
     __match_args__ = (
         "text",
@@ -59,8 +56,7 @@ class Words(_idlc.Message):  # noqa
             text = "none"
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or text.__class__ is not _builtins.str:
-            _done = _idlc.construct(self, options, _builtins.locals())
-            if _done:
+            if _idlc.construct(self, options, _builtins.locals()):
                 return
         self.text = text
         if count is None:

@@ -16,10 +16,7 @@ TYPE_CHECKING = False  # to import it would take longer than this module does
 
 @_idlc.define
 class Run_Request(_idlc.Message):  # noqa
-    """The request of the service lyrical_msgs/srv/Run.
-
-    Defined in srv/Run.srv:1
-    """
+    """The request of the service lyrical_msgs/srv/Run, defined in srv/Run.srv:1."""
 
     __match_args__ = (
         "args",
@@ -45,8 +42,7 @@ class Run_Request(_idlc.Message):  # noqa
             args = []
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or args.__class__ is not list:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.args = args
         if wait is None:
@@ -65,10 +61,7 @@ class Run_Request(_idlc.Message):  # noqa
 
 @_idlc.define
 class Run_Response(_idlc.Message):  # noqa
-    """The response of the service lyrical_msgs/srv/Run.
-
-    Defined in srv/Run.srv
-    """
+    """The response of the service lyrical_msgs/srv/Run, defined in srv/Run.srv."""
 
     __match_args__ = (
         "status",
@@ -96,8 +89,7 @@ class Run_Response(_idlc.Message):  # noqa
             status = -1
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or status.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.status = status
         if stamps is None:

@@ -14,10 +14,7 @@ with _idlc.importing():
 
 @_idlc.define
 class Any(_idlc.Message):  # noqa
-    """names_msgs/msg/Any.
-
-    Defined in msg/Any.msg:1
-    """
+    """names_msgs/msg/Any, defined in msg/Any.msg:1."""
 
     __match_args__ = ("pose",)
     _fields_and_field_types = {
@@ -36,8 +33,7 @@ class Any(_idlc.Message):  # noqa
             pose = Pose()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or pose.__class__ is not Pose:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.pose = pose
 

@@ -10,10 +10,7 @@ from ._foo_bar_2 import FooBar
 
 @_idlc.define
 class FOOBar(_idlc.Message):  # noqa
-    """names_msgs/msg/FOOBar.
-
-    Defined in msg/FOOBar.msg:1
-    """
+    """names_msgs/msg/FOOBar, defined in msg/FOOBar.msg:1."""
 
     __match_args__ = ("inner",)
     _fields_and_field_types = {
@@ -32,8 +29,7 @@ class FOOBar(_idlc.Message):  # noqa
             inner = FooBar()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or inner.__class__ is not FooBar:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.inner = inner
 

@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class FooBar(_idlc.Message):  # noqa
-    """names_msgs/msg/FooBar.
-
-    Defined in msg/FooBar.msg:1
-    """
+    """names_msgs/msg/FooBar, defined in msg/FooBar.msg:1."""
 
     __match_args__ = ("a",)
     _fields_and_field_types = {
@@ -29,8 +26,7 @@ class FooBar(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.a = a
 

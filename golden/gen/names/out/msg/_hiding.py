@@ -63,8 +63,7 @@ class Hiding(_idlc.Message):  # noqa
             validate = Point()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or validate.__class__ is not Point:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.validate = validate
         self.serialize = serialize

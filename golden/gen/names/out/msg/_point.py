@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class Point(_idlc.Message):  # noqa
-    """names_msgs/msg/Point.
-
-    Defined in msg/Point.msg:1
-    """
+    """names_msgs/msg/Point, defined in msg/Point.msg:1."""
 
     __match_args__ = (
         "x",
@@ -36,8 +33,7 @@ class Point(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or x.__class__ is not float:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.x = x
         self.y = y

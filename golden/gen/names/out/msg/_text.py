@@ -16,10 +16,7 @@ with _idlc.importing():
 
 @_idlc.define
 class Text(_idlc.Message):  # noqa
-    """names_msgs/msg/Text.
-
-    Defined in msg/Text.msg:1
-    """
+    """names_msgs/msg/Text, defined in msg/Text.msg:1."""
 
     __match_args__ = (
         "other",
@@ -50,8 +47,7 @@ class Text(_idlc.Message):  # noqa
             other = geometry_msgs_Point()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or other.__class__ is not geometry_msgs_Point:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.other = other
         if own is None:

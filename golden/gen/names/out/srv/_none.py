@@ -21,8 +21,7 @@ class None_Request(_idlc.Message):  # noqa
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
 
     def __eq__(self, other: object) -> bool:
@@ -43,8 +42,7 @@ class None_Response(_idlc.Message):  # noqa
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
 
     def __eq__(self, other: object) -> bool:

@@ -31,8 +31,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or target_count.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.target_count = target_count
 
@@ -46,10 +45,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class Countdown_Result(_idlc.Message):  # noqa
-    """The result of the action tutorial_msgs/action/Countdown.
-
-    Defined in action/Countdown.action
-    """
+    """The result of the action tutorial_msgs/action/Countdown, defined in action/Countdown.action."""
 
     __match_args__ = (
         "final_count",
@@ -73,8 +69,7 @@ class Countdown_Result(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or final_count.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.final_count = final_count
         self.success = success
@@ -91,10 +86,7 @@ class Countdown_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class Countdown_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action tutorial_msgs/action/Countdown.
-
-    Defined in action/Countdown.action
-    """
+    """The feedback of the action tutorial_msgs/action/Countdown, defined in action/Countdown.action."""
 
     __match_args__ = ("current_count",)
     _fields_and_field_types = {
@@ -111,8 +103,7 @@ class Countdown_Feedback(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or current_count.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.current_count = current_count
 

@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of tutorial_msgs/action/Countdown."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def countdown_goal_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
@@ -45,11 +38,7 @@ def countdown_goal_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_result_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
@@ -78,11 +67,7 @@ def countdown_result_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_feedback_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
@@ -106,11 +91,7 @@ def countdown_feedback_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_send_goal_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._countdown import Countdown_Goal
@@ -155,11 +136,7 @@ def countdown_send_goal_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_get_result_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Response in one byte order."""
     from ._countdown import Countdown_Result
 
@@ -196,11 +173,7 @@ def countdown_get_result_response_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_feedback_message_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._countdown import Countdown_Feedback

@@ -11,10 +11,7 @@ TYPE_CHECKING = False  # to import it would take longer than this module does
 
 @_idlc.define
 class ExecuteTask_Goal(_idlc.Message):  # noqa
-    """The goal of the action tutorial_msgs/action/ExecuteTask.
-
-    Defined in action/ExecuteTask.action:1
-    """
+    """The goal of the action tutorial_msgs/action/ExecuteTask, defined in action/ExecuteTask.action:1."""
 
     __match_args__ = ("task_name",)
     _fields_and_field_types = {
@@ -31,8 +28,7 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or task_name.__class__ is not str:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.task_name = task_name
 
@@ -46,10 +42,7 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class ExecuteTask_Result(_idlc.Message):  # noqa
-    """The result of the action tutorial_msgs/action/ExecuteTask.
-
-    Defined in action/ExecuteTask.action
-    """
+    """The result of the action tutorial_msgs/action/ExecuteTask, defined in action/ExecuteTask.action."""
 
     __match_args__ = ("success",)
     _fields_and_field_types = {
@@ -66,8 +59,7 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or success.__class__ is not bool:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.success = success
 
@@ -81,10 +73,7 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class ExecuteTask_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action tutorial_msgs/action/ExecuteTask.
-
-    Defined in action/ExecuteTask.action
-    """
+    """The feedback of the action tutorial_msgs/action/ExecuteTask, defined in action/ExecuteTask.action."""
 
     __match_args__ = ("current_status",)
     _fields_and_field_types = {
@@ -101,8 +90,7 @@ class ExecuteTask_Feedback(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or current_status.__class__ is not str:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.current_status = current_status
 

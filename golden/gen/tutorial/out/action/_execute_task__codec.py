@@ -17,11 +17,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def execute_task_goal_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
@@ -53,11 +49,7 @@ def execute_task_goal_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_result_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
@@ -82,11 +74,7 @@ def execute_task_result_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_feedback_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
@@ -118,11 +106,7 @@ def execute_task_feedback_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_send_goal_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._execute_task import ExecuteTask_Goal
@@ -175,11 +159,7 @@ def execute_task_send_goal_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_get_result_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Response in one byte order."""
     from ._execute_task import ExecuteTask_Result
 
@@ -214,11 +194,7 @@ def execute_task_get_result_response_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_feedback_message_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._execute_task import ExecuteTask_Feedback

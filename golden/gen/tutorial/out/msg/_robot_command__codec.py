@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def robot_command_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def robot_command_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads RobotCommand in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*ff", align=4)

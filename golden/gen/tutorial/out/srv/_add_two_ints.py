@@ -38,8 +38,7 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or a.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.a = a
         self.b = b
@@ -56,10 +55,7 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
 
 @_idlc.define
 class AddTwoInts_Response(_idlc.Message):  # noqa
-    """The response of the service tutorial_msgs/srv/AddTwoInts.
-
-    Defined in srv/AddTwoInts.srv
-    """
+    """The response of the service tutorial_msgs/srv/AddTwoInts, defined in srv/AddTwoInts.srv."""
 
     __match_args__ = ("sum",)
     _fields_and_field_types = {
@@ -76,8 +72,7 @@ class AddTwoInts_Response(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or sum.__class__ is not int:
-            _done = _idlc.construct(self, options, locals())
-            if _done:
+            if _idlc.construct(self, options, locals()):
                 return
         self.sum = sum
 
