@@ -31,7 +31,8 @@ class Fill_Goal(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not float:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.level = level
 
@@ -62,7 +63,8 @@ class Fill_Result(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or reached.__class__ is not float:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.reached = reached
 
@@ -93,7 +95,8 @@ class Fill_Feedback(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or level.__class__ is not float:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.level = level
 

@@ -22,13 +22,12 @@ def fill_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Code
     read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_goal()
@@ -46,13 +45,12 @@ def fill_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Co
     read_reached = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._reached,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_result()
@@ -70,13 +68,12 @@ def fill_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
     read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_feedback()
@@ -106,14 +103,13 @@ def fill_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 goal._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_send_goal_request()
@@ -143,14 +139,13 @@ def fill_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 result._reached,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_get_result_response()
@@ -185,14 +180,13 @@ def fill_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 feedback._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_feedback_message()

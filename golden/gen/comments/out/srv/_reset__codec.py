@@ -26,14 +26,13 @@ def reset_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
     def encode(message: Any, join: _idlc.Join) -> Any:
         reason = message._reason.encode()
         reason_size = len(reason)
-        parts = [
+        return join([
             write_head[reason_size](
                 encapsulation,
                 reason_size + 1,
                 reason,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_reset_request()
@@ -56,13 +55,12 @@ def reset_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc
     read_ok = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 truths[message._ok],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_reset_response()

@@ -30,7 +30,7 @@ def inner_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         c = message._c.encode()
         c_size = len(c)
         d = wide_text(message._d)
-        parts = [
+        return join([
             write_head[c_size](
                 encapsulation,
                 message._a,
@@ -40,8 +40,7 @@ def inner_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 len(d) // 4,
             ),
             d,
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

@@ -19,7 +19,8 @@ class Nothing(_idlc.Message):  # noqa
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
 
     def __eq__(self, other: object) -> bool:

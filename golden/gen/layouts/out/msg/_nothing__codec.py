@@ -20,8 +20,7 @@ def nothing_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation)]
-        return join(parts)
+        return join([write_head(encapsulation)])
 
     def decode(data: Any) -> Any:
         message = new_nothing()

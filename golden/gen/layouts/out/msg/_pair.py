@@ -33,7 +33,8 @@ class Pair(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or key.__class__ is not str:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.key = key
         self.value = value

@@ -29,7 +29,7 @@ def pair_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         key_size = len(key)
         value = message._value.encode()
         value_size = len(value)
-        parts = [
+        return join([
             write_head[key_size](
                 encapsulation,
                 key_size + 1,
@@ -39,8 +39,7 @@ def pair_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 value_size + 1,
                 value,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_pair()

@@ -24,15 +24,14 @@ def row_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_a = _idlc.layout(order, "IH3B", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._a,
                 message._b,
                 bytes_of_uint8_3(message._c),
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_row()

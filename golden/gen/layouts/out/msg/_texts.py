@@ -47,7 +47,8 @@ class Texts(_idlc.Message):  # noqa
             pairs = []
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or pairs.__class__ is not list:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.pairs = pairs
         if few is None:

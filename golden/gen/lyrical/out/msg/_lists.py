@@ -85,7 +85,8 @@ class Lists(_idlc.Message):  # noqa
             names = self.NAMES__DEFAULT
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or names.__class__ is not _builtins.list:
-            if _idlc.construct(self, options, _builtins.locals()):
+            _done = _idlc.construct(self, options, _builtins.locals())
+            if _done:
                 return
         self.names = names
         if words is None:

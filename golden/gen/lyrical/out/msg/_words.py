@@ -56,7 +56,8 @@ class Words(_idlc.Message):  # noqa
             text = "none"
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or text.__class__ is not _builtins.str:
-            if _idlc.construct(self, options, _builtins.locals()):
+            _done = _idlc.construct(self, options, _builtins.locals())
+            if _done:
                 return
         self.text = text
         if count is None:

@@ -28,7 +28,7 @@ def words_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     def encode(message: Any, join: _idlc.Join) -> Any:
         text_ = message._text.encode()
         text_size = len(text_)
-        parts = [
+        return join([
             write_head[text_size](
                 encapsulation,
                 text_size + 1,
@@ -38,8 +38,7 @@ def words_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 truths[message._list],
                 message._d,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_words()

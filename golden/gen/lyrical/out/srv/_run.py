@@ -42,7 +42,8 @@ class Run_Request(_idlc.Message):  # noqa
             args = []
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or args.__class__ is not list:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.args = args
         if wait is None:
@@ -89,7 +90,8 @@ class Run_Response(_idlc.Message):  # noqa
             status = -1
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or status.__class__ is not int:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.status = status
         if stamps is None:

@@ -29,12 +29,11 @@ def run_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Co
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         args = write_args(message._args)
-        parts = [
+        return join([
             write_head(encapsulation),
             args,
             write_wait(truths[message._wait]),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_run_request()
@@ -69,15 +68,14 @@ def run_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.C
             )
             for stamps_item in stamps
         ])
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 len(stamps),
             ),
             stamps_block,
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

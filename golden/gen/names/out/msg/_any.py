@@ -33,7 +33,8 @@ class Any(_idlc.Message):  # noqa
             pose = Pose()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or pose.__class__ is not Pose:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.pose = pose
 

@@ -35,7 +35,7 @@ def any_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         pose = message._pose
         pose_position = pose._position
         pose_orientation = pose._orientation
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 pose_position._x,
@@ -46,8 +46,7 @@ def any_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 pose_orientation._z,
                 pose_orientation._w,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_any()

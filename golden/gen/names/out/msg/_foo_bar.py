@@ -29,7 +29,8 @@ class FOOBar(_idlc.Message):  # noqa
             inner = FooBar()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or inner.__class__ is not FooBar:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.inner = inner
 

@@ -20,13 +20,12 @@ def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_a = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._a,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_foo_bar()

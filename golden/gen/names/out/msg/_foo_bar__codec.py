@@ -24,13 +24,12 @@ def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         inner = message._inner
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 inner._a,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_foo_bar()

@@ -63,7 +63,8 @@ class Hiding(_idlc.Message):  # noqa
             validate = Point()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or validate.__class__ is not Point:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.validate = validate
         self.serialize = serialize

@@ -127,7 +127,8 @@ class Odd(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or class_.__class__ is not _builtins.int:
-            if _idlc.construct(_self, options, _builtins.locals()):
+            _done = _idlc.construct(_self, options, _builtins.locals())
+            if _done:
                 return
         _self.class_ = class_
         _self.serialize = serialize

@@ -33,7 +33,8 @@ class Point(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or x.__class__ is not float:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.x = x
         self.y = y

@@ -20,14 +20,13 @@ def point_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_x = _idlc.layout(order, "dd", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._x,
                 message._y,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_point()

@@ -47,7 +47,8 @@ class Text(_idlc.Message):  # noqa
             other = geometry_msgs_Point()
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or other.__class__ is not geometry_msgs_Point:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.other = other
         if own is None:

@@ -58,7 +58,7 @@ def text_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
             )
             for any_item in any_
         ])
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 other._x,
@@ -70,8 +70,7 @@ def text_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
             ),
             pad8[0] if any_ else b"",
             any_block,
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

@@ -21,7 +21,8 @@ class None_Request(_idlc.Message):  # noqa
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
 
     def __eq__(self, other: object) -> bool:
@@ -42,7 +43,8 @@ class None_Response(_idlc.Message):  # noqa
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if options:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
 
     def __eq__(self, other: object) -> bool:

@@ -31,7 +31,8 @@ class Countdown_Goal(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or target_count.__class__ is not int:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.target_count = target_count
 
@@ -69,7 +70,8 @@ class Countdown_Result(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or final_count.__class__ is not int:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.final_count = final_count
         self.success = success
@@ -103,7 +105,8 @@ class Countdown_Feedback(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or current_count.__class__ is not int:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.current_count = current_count
 

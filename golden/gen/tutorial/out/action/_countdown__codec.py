@@ -22,13 +22,12 @@ def countdown_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc
     read_target_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._target_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_goal()
@@ -47,14 +46,13 @@ def countdown_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _id
     read_final_count = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._final_count,
                 truths[message._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_result()
@@ -75,13 +73,12 @@ def countdown_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _
     read_current_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._current_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_feedback()
@@ -111,14 +108,13 @@ def countdown_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Read
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 goal._target_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_send_goal_request()
@@ -149,15 +145,14 @@ def countdown_get_result_response_codec(kind: Any, order: str, reading: _idlc.Re
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 result._final_count,
                 truths[result._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_get_result_response()
@@ -193,14 +188,13 @@ def countdown_feedback_message_codec(kind: Any, order: str, reading: _idlc.Readi
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 feedback._current_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_feedback_message()

@@ -28,7 +28,8 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or task_name.__class__ is not str:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.task_name = task_name
 
@@ -59,7 +60,8 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or success.__class__ is not bool:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.success = success
 
@@ -90,7 +92,8 @@ class ExecuteTask_Feedback(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or current_status.__class__ is not str:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.current_status = current_status
 

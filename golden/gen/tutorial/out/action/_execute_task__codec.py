@@ -28,14 +28,13 @@ def execute_task_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _i
     def encode(message: Any, join: _idlc.Join) -> Any:
         task_name = message._task_name.encode()
         task_name_size = len(task_name)
-        parts = [
+        return join([
             write_head[task_name_size](
                 encapsulation,
                 task_name_size + 1,
                 task_name,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_goal()
@@ -58,13 +57,12 @@ def execute_task_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> 
     read_success = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 truths[message._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_result()
@@ -85,14 +83,13 @@ def execute_task_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -
     def encode(message: Any, join: _idlc.Join) -> Any:
         current_status = message._current_status.encode()
         current_status_size = len(current_status)
-        parts = [
+        return join([
             write_head[current_status_size](
                 encapsulation,
                 current_status_size + 1,
                 current_status,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_feedback()
@@ -129,15 +126,14 @@ def execute_task_send_goal_request_codec(kind: Any, order: str, reading: _idlc.R
         goal = message._goal
         goal_task_name = goal._task_name.encode()
         goal_task_name_size = len(goal_task_name)
-        parts = [
+        return join([
             write_head[goal_task_name_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 goal_task_name_size + 1,
                 goal_task_name,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_send_goal_request()
@@ -172,14 +168,13 @@ def execute_task_get_result_response_codec(kind: Any, order: str, reading: _idlc
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 truths[result._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_get_result_response()
@@ -217,15 +212,14 @@ def execute_task_feedback_message_codec(kind: Any, order: str, reading: _idlc.Re
         feedback = message._feedback
         feedback_current_status = feedback._current_status.encode()
         feedback_current_status_size = len(feedback_current_status)
-        parts = [
+        return join([
             write_head[feedback_current_status_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 feedback_current_status_size + 1,
                 feedback_current_status,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_feedback_message()

@@ -55,7 +55,8 @@ class RobotCommand(_idlc.Message):  # noqa
     ) -> None:
         # tools of ROS 2 try any value in place of a message, and need a TypeError
         if options or command_type.__class__ is not str:
-            if _idlc.construct(self, options, locals()):
+            _done = _idlc.construct(self, options, locals())
+            if _done:
                 return
         self.command_type = command_type
         self.linear_velocity_x = linear_velocity_x

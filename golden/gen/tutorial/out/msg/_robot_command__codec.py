@@ -30,7 +30,7 @@ def robot_command_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
         command_type_size = len(command_type)
         frame_id = message._frame_id.encode()
         frame_id_size = len(frame_id)
-        parts = [
+        return join([
             write_head[command_type_size](
                 encapsulation,
                 command_type_size + 1,
@@ -42,8 +42,7 @@ def robot_command_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
                 frame_id_size + 1,
                 frame_id,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_robot_command()

@@ -20,14 +20,13 @@ def add_two_ints_request_codec(kind: Any, order: str, reading: _idlc.Reading) ->
     read_a = _idlc.layout(order, "qq", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._a,
                 message._b,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_add_two_ints_request()
@@ -48,13 +47,12 @@ def add_two_ints_response_codec(kind: Any, order: str, reading: _idlc.Reading) -
     read_sum = _idlc.layout(order, "q", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._sum,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_add_two_ints_response()
