@@ -197,7 +197,7 @@ def test_memory_is_bounded_by_the_buffer():
     ("name", "raw", "path", "offset", "words"),
     [
         ("std_msgs/msg/String", "00010000 ffffffff 00", "data", 8, "4294967295 bytes of text"),
-        ("std_msgs/msg/String", "00010000 05000000 6150", "data", 8, "5 bytes of text"),
+        ("std_msgs/msg/String", "00010000 05000000 6162", "data", 8, "5 bytes of text"),
         ("std_msgs/msg/String", "00010000 0500", "data", 4, "number of bytes of text"),
         ("std_msgs/msg/String", "0001", "", 0, "encapsulation header needs 4 bytes"),
         ("std_msgs/msg/String", "", "", 0, "encapsulation header needs 4 bytes"),
@@ -230,7 +230,7 @@ def test_an_error_names_the_field_and_the_byte(name, raw, path, offset, words):
         ("00010000 00000000", ""),
         ("00010000 01000000 00", ""),
         ("00010000 02000000 6100", "a"),
-        ("00010000 02000000 6150", "ab"),
+        ("00010000 02000000 6162", "ab"),
         ("00010000 04000000 61006200", "a\0b"),
         ("00010000 03000000 61ff00", "a\ufffd"),
         ("00010000 04000000 eda08000", "\ufffd\ufffd\ufffd"),
