@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from array import array
-from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_void_p
+from ctypes import PYFUNCTYPE, c_bool, c_size_t, c_void_p
 from functools import cache
 from struct import Struct
 from typing import Any, NamedTuple
@@ -35,11 +35,10 @@ _COUNT = Struct("=I")
 def _runtime() -> tuple[Any, Any, Any]:
     """Return the functions that assign a string, and a wide one, and that give zeroed memory."""
     library = c.load_library("librosidl_runtime_c.so")
-    assign = PYFUNCTYPE(c_bool, c_void_p, c_char_p, c_size_t)
-    assign_wide = PYFUNCTYPE(c_bool, c_void_p, c_void_p, c_size_t)
+    assign = PYFUNCTYPE(c_bool, c_void_p, c_void_p, c_size_t)
     return (
         assign(("rosidl_runtime_c__String__assignn", library)),
-        assign_wide(("rosidl_runtime_c__U16String__assignn", library)),
+        assign(("rosidl_runtime_c__U16String__assignn", library)),
         PYFUNCTYPE(c_void_p, c_size_t, c_size_t, c_void_p)(allocator().zero_allocate),
     )
 
@@ -60,16 +59,13 @@ class Text(NamedTuple):
 
 
 class Repeat(NamedTuple):
-    """Elements of `stride` bytes: some number of them, or those of a sequence.
-
-    `align` is not 0 if they are nothing but numbers without gaps.
-    """
+    """Elements of `stride` bytes, one after the other."""
 
     offset: int
     steps: tuple[Step, ...]
     stride: int
-    number: int | None
-    align: int
+    number: int | None  #: none of a sequence, which has its own
+    align: int  #: not 0 if elements are nothing but numbers without gaps
 
 
 #: One piece of a structure that lies somewhere else in CDR.
@@ -242,8 +238,8 @@ def _converter(cls: Any, structure: Structure) -> object:
     return type("Converter", (), methods)()
 
 
-def message(cls: Any, structure: Structure) -> c.MessageSupport:
-    """Return what rclpy needs to publish and take messages of a class."""
+def message(cls: Any, structure: Structure) -> tuple[int, ...]:
+    """Return the addresses that rclpy reads from a message class, in their order."""
     size = ctypes.sizeof(c_structure(structure))
     content = introspection.content(structure)
     try:
@@ -257,26 +253,12 @@ def message(cls: Any, structure: Structure) -> c.MessageSupport:
             "with colcon"
         ) from error
     names = ("create", "destroy", "convert_from_py", "convert_to_py")
-    return c.MessageSupport(handle, *map(addresses.__getitem__, names))
-
-
-#: `rosidl_typesupport_introspection_c__ServiceMembers`.
-_ServiceMembers = c.structure(
-    "ServiceMembers",
-    namespace=c_char_p,
-    name=c_char_p,
-    request=c_void_p,
-    response=c_void_p,
-    event=c_void_p,
-)
+    return *map(addresses.__getitem__, names), handle
 
 
 def service(name: str, *handles: int) -> tuple[int, int]:
     """Return identifier and data of a service's type support, from its messages' handles."""
-    package, kind, short = name.split("/")
-    members = [
-        c.MessageTypeSupport.from_address(handle).data if handle else None
-        for handle in handles
-    ]
-    data = _ServiceMembers(f"{package}__{kind}".encode(), short.encode(), *members)
-    return introspection.library()[0], c.pointer(data)
+    members = [c.MessageTypeSupport.from_address(handle).data for handle in handles]
+    names = c.namespace_and_name(name, "__")
+    data = c.ServiceMembers(*names, (c_void_p * 3)(*members))
+    return c.identifier(introspection.IDENTIFIER), c.pointer(data)
