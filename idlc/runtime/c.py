@@ -147,16 +147,19 @@ def resolver(answers: dict[bytes, int]) -> int:
     return address(prototype(operator.getitem))
 
 
+#: What to do where ROS 2 is not found.
+ADVICE = (
+    "install ROS 2's rclpy and a middleware (for example `pip install ros-jazzy-rclpy "
+    "ros-jazzy-rmw-fastrtps-cpp`), or source your ROS 2 installation first"
+)
+
+
 def load_library(name: str) -> ctypes.CDLL:
     """Return a shared library of ROS 2; raises ImportError that says what to do."""
     try:
         return ctypes.CDLL(name)
     except OSError as error:
-        raise ImportError(
-            f"{name} cannot be loaded ({error}): install ROS 2's rclpy and a middleware "
-            "(for example `pip install ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp`), "
-            "or source your ROS 2 installation first"
-        ) from error
+        raise ImportError(f"{name} cannot be loaded ({error}): {ADVICE}") from error
 
 
 @cache

@@ -118,7 +118,7 @@ def fast_cdr() -> tuple[int, int]:
     new_cdr(cdr, buffer, _LITTLE_ENDIAN, plain)
     indices = set()
     for text in (b"\1\2\3", b"\4\5"):
-        append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))
+        append(here, text, len(text))
         position = position_of(here)
         words = c.WORDS[here >> 3 : (here >> 3) + _WORDS].tolist()
         indices.add(_find(words, begin, (position, begin, begin + size)))

@@ -197,14 +197,13 @@ def _offsets(
     fields = _MESSAGES[message]
     identifier, data, function = reader.words(handle, 3)
     reader.demand_text(identifier, IDENTIFIER.encode())
-    reader.read(function, 1)
     namespace, name, count, size, *rest = reader.words(data, members // 8 + 3)
     reader.demand_text(namespace, b"rcl_interfaces__msg")
     reader.demand_text(name, message.encode())
     _demand(count & 0xFFFF_FFFF, len(fields), "the number of members")
     *key, rows, init, fini = rest
     _demand(any(key), False, "whether there is a key")
-    for code in (init, fini):
+    for code in (function, init, fini):
         reader.read(code, 1)
     table = reader.read(rows, member * len(fields))
     parts = [table[at : at + member] for at in range(0, len(table), member)]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from ctypes import PYFUNCTYPE, c_bool, c_void_p, py_object
 from functools import cache, partial
 from importlib import import_module
@@ -93,11 +93,7 @@ def _implementation() -> ModuleType:
     try:
         utilities = import_module("rclpy.utilities")
     except ImportError as error:
-        raise ImportError(
-            "type support needs rclpy: install it (for example `pip install "
-            "ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp`), or source your ROS 2 "
-            "installation first"
-        ) from error
+        raise ImportError(f"type support needs rclpy: {c.ADVICE}") from error
     middleware = utilities.get_rmw_implementation_identifier()
     if middleware in _UNSUPPORTED:
         raise ImportError(
@@ -120,9 +116,7 @@ def _handle(cls: Any) -> int:
     return c.capsule_pointer(getattr(meta, _SUPPORT))
 
 
-def _supply(
-    cls: Any, layout: Any, make: Callable[[Structure], tuple[int, ...]]
-) -> None:
+def _supply(cls: Any, layout: Any, make: Callable[[Structure], Iterable[int]]) -> None:
     """Give `type(cls)` the capsules of an extension, else of the addresses that `make` returns."""
     structure, names = structure_of(cls), _CAPSULES[layout]
     package, kind, short = structure.name.split("/")
