@@ -89,6 +89,14 @@ def feedback_message(action: ir.Action) -> ir.Message:
     )
 
 
+def composites(interface: ir.Interface) -> tuple[ir.Message, ...]:
+    """Return the structures in which an action's goals, results and feedback are sent."""
+    if not isinstance(interface, ir.Action):
+        return ()
+    send, get = send_goal(interface), get_result(interface)
+    return (send.request, get.response, feedback_message(interface))
+
+
 def services(interface: ir.Interface) -> tuple[ir.Service, ...]:
     """Return the services that an interface is or holds, in dependency order."""
     match interface:

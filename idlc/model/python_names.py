@@ -67,11 +67,6 @@ def codec_module(module: str) -> ModuleName:
     return ModuleName(f"{module}__codec")
 
 
-def protocol_module(module: str) -> ModuleName:
-    """Return the module of the types that ROS 2 adds to the service or action of a module."""
-    return ModuleName(f"{module}__protocol")
-
-
 def class_(name: ir.TypeName) -> ClassName:
     """Return the class of a structure, service or action."""
     return ClassName(public_name(name.name))

@@ -294,7 +294,7 @@ def test_generated_code_is_the_same_before_lyrical_and_from_then_on(capsys):
         found[distro] = {path.relative_to(f"out/{distro}"): path.read_bytes() for path in files}
     assert len(found["humble"]) > 10
     differing = {name for name in found["jazzy"] if found["jazzy"][name] != found["lyrical"][name]}
-    assert differing == {Path("demo/msg/_a.py"), Path("demo/srv/_s__protocol.py")}
+    assert differing == {Path("demo/msg/_a.py"), Path("demo/srv/_s.py")}
     for distro, files in found.items():
         assert files == found["lyrical" if BY_NAME[distro].converts_values else "jazzy"]
 
@@ -331,7 +331,7 @@ def test_services_for_humble_which_has_no_events(capsys):
     for words in (["check", "demo"], ["gen", "demo", "-o", "out/demo", "--vendor-deps"]):
         assert main([*words, "--distro", "humble"]) == 0, capsys.readouterr().err
     capsys.readouterr()
-    assert Path("out/service_msgs/msg/_service_event_info.py").is_file()
+    assert Path("out/demo/_vendor/service_msgs/msg/_service_event_info.py").is_file()
     for text in ("---\n", "service_msgs/ServiceEventInfo b\n---\n"):
         write({"demo/srv/S.srv": text, "demo/msg/M.msg": "service_msgs/ServiceEventInfo a\n"})
         found = said(capsys, "check", "demo", "--distro", "humble,jazzy")

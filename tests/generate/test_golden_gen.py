@@ -147,9 +147,9 @@ import dataclasses
 from array import array
 
 import numpy as np
-from comments_msgs.action import Fill
+from comments_msgs.action import Fill, Fill_Feedback, Fill_FeedbackMessage, Fill_SendGoal_Request
 from comments_msgs.msg import Gauge
-from comments_msgs.srv import Reset
+from comments_msgs.srv import Reset, Reset_Event
 from layouts_msgs.msg import Everything, Inner
 from lyrical_msgs.msg import Lists, Words
 from names_msgs.msg import Hiding, Odd, Point
@@ -211,10 +211,21 @@ request: Reset.Request = Reset.Request(reason="why")
 goal: Fill.Goal = Fill.Goal(1.0)
 assert_type(request.reason, str)
 assert_type(Fill.Impl.SendGoalService.Request().goal.level, float)
+assert_type(Fill.Impl.SendGoalService.Request(goal=goal).goal, Fill.Goal)
+assert_type(Fill.Impl.SendGoalService.Event().response[0].accepted, bool)
+assert_type(Fill.Impl.GetResultService.Response(status=4).result, Fill.Result)
+assert_type(Fill.Impl.GetResultService.Event().response[0].result, Fill.Result)
+assert_type(Fill_FeedbackMessage().feedback, Fill_Feedback)
+assert_type(Reset.Event(request=[request]).request[0].reason, str)
+event: Reset.Event = Reset_Event(response=[Reset.Response()])
+sent: Fill.Impl.SendGoalService.Request = Fill_SendGoal_Request(goal=goal)
+if isinstance(sent, Fill_SendGoal_Request):
+    assert_type(sent.deserialize(sent.serialize()).goal, Fill.Goal)
 names = [field.name for field in dataclasses.fields(gauge)]
 '''
 
 MISTAKES = """
+from comments_msgs.action import Fill, Fill_FeedbackMessage
 from comments_msgs.msg import Gauge
 from lyrical_msgs.msg import Lists, Words
 
@@ -227,10 +238,14 @@ Gauge(unknown=1)
 Words(text=1)
 Lists(names=(1,))
 Lists().names = [1]
+Fill_FeedbackMessage(feedback=1)
+Fill_FeedbackMessage().feedback = Fill.Goal()
+Fill.Impl.GetResultService.Response(goal_id=None)
+Fill.Impl.SendGoalService.Response(accepted="yes")
 """
 
 
-MISTAKEN = set(range(5, 14))
+MISTAKEN = set(range(6, 19))
 
 
 @pytest.fixture(scope="module")

@@ -53,9 +53,9 @@ def packages(tmp_path_factory):
             "action.Foo.Goal(3).serialize()",
             {"action._foo", "action._foo__codec"},
         ),
-        ("action.Foo.Impl.FeedbackMessage", {"action._foo", "action._foo__protocol"}),
-        ("action.Foo_SendGoal", {"action._foo", "action._foo__protocol"}),
-        ("srv.Foo_Event", {"msg._foo", "srv._foo", "srv._foo__protocol"}),
+        ("action.Foo.Impl.FeedbackMessage", {"action._foo"}),
+        ("action.Foo_SendGoal", {"action._foo"}),
+        ("srv.Foo_Event", {"msg._foo", "srv._foo"}),
     ],
 )
 def test_what_is_not_asked_for_is_not_imported(packages, use, modules):

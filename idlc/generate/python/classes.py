@@ -9,7 +9,7 @@ import msgspec
 from idlc.generate.python import fields, literals
 from idlc.generate.python.fields import Docstring, FieldView, Naming
 from idlc.generate.python.imports import References
-from idlc.model import derive, ir, python_names
+from idlc.model import ir, python_names
 from idlc.project.templates import Code, Text
 
 
@@ -89,19 +89,8 @@ def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
             yield ConstantView(Code(fields.default_name(field)), *fields.default(field))
 
 
-def services(interface: ir.Interface, purposes: Purposes) -> tuple[GroupView, ...]:
-    """Return the views of a service, or of the services that an action consists of."""
-    return tuple(
-        GroupView(
-            name=Code(python_names.class_(service.name)),
-            purpose=Text(purposes.get(service.name, f"The service {service.name}.")),
-            stem=Code(service.name.name),
-        )
-        for service in derive.services(interface)
-    )
-
-
-def action(interface: ir.Action) -> GroupView:
-    """Return the view of an action."""
+def group(interface: ir.Service | ir.Action) -> GroupView:
+    """Return the view of a service or action."""
     name = interface.name
-    return GroupView(Code(python_names.class_(name)), Text(f"The action {name}."), Code(name.name))
+    purpose = f"The {'action' if isinstance(interface, ir.Action) else 'service'} {name}."
+    return GroupView(Code(python_names.class_(name)), Text(purpose), Code(name.name))

@@ -9,7 +9,7 @@ import msgspec
 
 from idlc.generate.python import literals
 from idlc.generate.python.imports import References
-from idlc.model import derive, ir, python_names
+from idlc.model import ir, python_names
 from idlc.model.ir import spell
 from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES
@@ -37,8 +37,7 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
 
 
 def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
-    """Return what the messages of a service or action are for, and an action's services."""
-    name = interface.name.name
+    """Return what the messages of an interface are for."""
     match interface:
         case ir.Message():
             return {interface.name: f"{interface.name}."}
@@ -46,33 +45,13 @@ def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
             return {
                 interface.request.name: f"The request of the service {interface.name}.",
                 interface.response.name: f"The response of the service {interface.name}.",
-                **_event(interface, f"a call of {name}"),
             }
         case ir.Action():
-            send, get = derive.services(interface)
-            goal = f"a {name} goal"
-            words = {
-                send.name: f"Starts {goal}",
-                send.request.name: f"Sent by a client to start {goal}",
-                send.response.name: f"Tells a client whether {goal} was accepted, and when",
-                get.name: f"Waits for the result of {goal}",
-                get.request.name: f"Sent by a client to wait for the result of {goal}",
-                get.response.name: f"Tells a client how {goal} ended, and its result",
-                derive.feedback_message(interface).name: f"Published while {goal} is executed",
-            }
             return {
                 interface.goal.name: f"The goal of the action {interface.name}.",
                 interface.result.name: f"The result of the action {interface.name}.",
                 interface.feedback.name: f"The feedback of the action {interface.name}.",
-                **{type_name: f"{text}. Added by ROS 2." for type_name, text in words.items()},
-                **_event(send, f"a call that starts {goal}"),
-                **_event(get, "a call that waits for a result"),
             }
-
-
-def _event(service: ir.Service, call: str) -> dict[ir.TypeName, str]:
-    text = f"Published about {call}, where services are introspected. Added by ROS 2."
-    return {derive.event(service).name: text}
 
 
 def _hidden(structure: ir.Message) -> list[str]:
@@ -234,8 +213,7 @@ def view(
         docstring=attribute(field, file),
         numbers=shape.numbers,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
-        is_array=(is_list and isinstance(ir.element_of(field.type), ir.Primitive))
-        or not references.knows(ir.element_of(field.type)),
+        is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
     )
 
 
@@ -245,8 +223,6 @@ def usual_class(field: ir.Field, references: References, naming: Naming) -> Code
         return Code("")
     if isinstance(field.type, (ir.Array, ir.Sequence)):
         return Code(f"{naming.builtins}list")
-    if not references.knows(field.type):
-        return Code("")
     return Code(_builtin(_element(field.type, references), naming))
 
 
@@ -295,7 +271,7 @@ def _element(element: ir.Element, references: References) -> str:
         case ir.String():
             return "str"
         case ir.Ref(target):
-            return references.annotation(target)
+            return references.name(target)
         case ir.Unknown():
             raise ValueError("an unknown type cannot be emitted")
 

@@ -86,23 +86,18 @@ class Homes:
         self.modules = modules
         self.surroundings = surroundings
         self.classes = modules[interface.name]
-        self.protocol = python_names.protocol_module(self.classes)
-        self.sections = {message.name for message in derive.sections(interface)}
-        self.derived = {message.name for message in derive.messages(interface)} - self.sections
+        self.structures = {message.name for message in derive.messages(interface)}
 
     def of(self, structure: ir.TypeName) -> python_names.ModuleName:
         """Return the module that defines a structure's class."""
-        if structure in self.sections:
-            return self.classes
-        return self.protocol if structure in self.derived else self.modules[structure]
+        return self.classes if structure in self.structures else self.modules[structure]
 
 
 class References:
     """The names of all classes that a module mentions.
 
-    `own` are the structures that it defines, `others` are in fields and of other packages.
-    `direct` are imported with the module; `implied` are others in fields that ROS 2 adds, imported
-    when they are used, so that each part of a protocol needs only its own types.
+    `own` are the structures that it defines or writes, `direct` those that their fields name,
+    of which `others` are of other packages.
     """
 
     def __init__(
@@ -117,11 +112,9 @@ class References:
         self.package = interface.name.package
         self.kind = interface.name.kind
         self.own = {message.name for message in structures}
-        named = {name for message in structures for name in message.references} - self.own
-        self.others = {name for name in named if name.package != self.package}
-        is_added = bool(self.own & homes.derived) and not self.surroundings.vendors
-        self.implied = self.others if is_added else set()
-        self.direct = named - self.implied
+        named = {name for message in structures for name in message.references}
+        self.direct = named - self.own
+        self.others = {name for name in self.direct if name.package != self.package}
         groups = {interface.name, *(service.name for service in derive.services(interface))}
         self._names = self._named(self.own | groups, _closure(self.own, messages))
 
@@ -146,21 +139,6 @@ class References:
     def name(self, type_: ir.TypeName) -> python_names.ClassName:
         """Return the class's name in this module."""
         return self._names[type_]
-
-    def annotation(self, type_: ir.TypeName) -> str:
-        """Return the class as annotations and constructors name it."""
-        if type_ in self.implied:
-            return f"{_module(type_)}.{python_names.class_(type_)}"
-        return self.name(type_)
-
-    def knows(self, element: ir.Element) -> bool:
-        """Return whether the class of an element is imported with the module."""
-        return not (isinstance(element, ir.Ref) and element.target in self.implied)
-
-    def modules(self) -> list[tuple[str, str]]:
-        """Return the modules of implied types, with their names in this module."""
-        pairs = {(self.surroundings.module(type_), _module(type_)) for type_ in self.implied}
-        return sorted(pairs)
 
     def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
         """Return import statements of what comes with this package, and of what may be missing.
@@ -199,10 +177,6 @@ def _nearness(statement: tuple[str, set[str]]) -> tuple[int, str]:
     return len(module.lstrip(".")) - len(module), module
 
 
-def _module(type_: ir.TypeName) -> str:
-    return f"_{type_.package}_{type_.kind}"
-
-
 def _closure(own: set[ir.TypeName], messages: plan.Messages) -> set[ir.TypeName]:
     closure: set[ir.TypeName] = set()
     waiting = list(own)
@@ -218,10 +192,11 @@ TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "A
 
 
 class NameView(msgspec.Struct, frozen=True):
-    """A class, and the module that it is in."""
+    """A class, and the module that it is in; `value` has it where no statement defines it."""
 
     name: Code
     module: Code
+    value: Code
 
 
 class PackageView(msgspec.Struct, frozen=True):
@@ -233,17 +208,30 @@ class PackageView(msgspec.Struct, frozen=True):
     names: tuple[NameView, ...]
 
 
-def exported(interface: ir.Interface, modules: python_names.Modules) -> dict[str, str]:
-    """Return the names that an interface's modules offer, with their modules."""
-    homes = Homes(interface, modules)
-    names: dict[str, str] = {
-        python_names.class_(message.name): homes.of(message.name)
-        for message in derive.messages(interface)
-    }
-    for service in derive.services(interface):
-        names[python_names.class_(service.name)] = homes.protocol
-    names[python_names.class_(interface.name)] = homes.classes
-    return names
+def exported(interface: ir.Interface) -> dict[str, str]:
+    """Return the names that the module of an interface offers.
+
+    Those that ROS 2 adds come with the attributes that have them, others with nothing.
+    """
+    group = python_names.class_(interface.name)
+    values: dict[ir.TypeName, str] = {}
+    if isinstance(interface, ir.Service):
+        values = _parts(interface, group)
+    elif isinstance(interface, ir.Action):
+        send, get = derive.services(interface)
+        values = {
+            **_parts(send, f"{group}.Impl.SendGoalService"),
+            **_parts(get, f"{group}.Impl.GetResultService"),
+            derive.feedback_message(interface).name: f"{group}.Impl.FeedbackMessage",
+        }
+    written = [interface.name, *(section.name for section in derive.sections(interface))]
+    values |= dict.fromkeys(written, "")
+    return {python_names.class_(name): value for name, value in values.items()}
+
+
+def _parts(service: ir.Service, value: str) -> dict[ir.TypeName, str]:
+    parts = zip(derive.messages(service), ("Request", "Response", "Event"), strict=True)
+    return {service.name: value} | {part.name: f"{value}.{name}" for part, name in parts}
 
 
 def package(
@@ -253,20 +241,19 @@ def package(
     surroundings: Surroundings = ALONE,
 ) -> PackageView:
     """Return the view of one kind's package."""
-    homes: dict[str, str] = {}
-    for interface in model.own:
-        if interface.name.kind == kind:
-            homes |= exported(interface, modules)
-    by_module: dict[str, list[str]] = defaultdict(list)
-    for name, module in homes.items():
-        by_module[module].append(name)
+    names: list[NameView] = []
+    imports: list[str] = []
+    for module, interface in sorted(
+        ((modules[own.name], own) for own in model.own if own.name.kind == kind),
+        key=lambda pair: natural(pair[0]),
+    ):
+        values = exported(interface)
+        own = [name for name, value in values.items() if not value]
+        imports += statements(f".{module}", own, 4)
+        names += [NameView(Code(name), Code(module), Code(value)) for name, value in values.items()]
     return PackageView(
         title=Text(f"{TITLES[kind]} of {model.package}, imported when they are asked for."),
         runtime=Code(surroundings.runtime),
-        imports=tuple(
-            Code(line)
-            for module in sorted(by_module, key=natural)
-            for line in statements(f".{module}", by_module[module], 4)
-        ),
-        names=tuple(NameView(Code(name), Code(homes[name])) for name in sorted(homes, key=natural)),
+        imports=tuple(map(Code, imports)),
+        names=tuple(sorted(names, key=lambda view: natural(view.name))),
     )

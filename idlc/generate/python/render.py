@@ -28,6 +28,8 @@ from idlc.model.describe import IndividualDict
 from idlc.model.names import snake_case
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
+from idlc.runtime import PROTOCOL
+from idlc.version import RUNTIME, __version__
 from idlc.wire import plan
 
 
@@ -151,19 +153,20 @@ def type_data_source(model: link.Model, surroundings: Surroundings = ALONE) -> s
     return f"{head}\nJSON = (\n{lines})\n"
 
 
-def _parts(tables: TypesDict, around: str) -> Iterator[str]:
-    """Yield pieces that joined are the JSON text."""
-    yield f'{{"package":{_json(tables["package"])}'
+def _parts(tables: TypesDict, around: str) -> list[str]:
+    """Return pieces that joined are the JSON text, one for each entry."""
+    parts: list[str] = []
+    mark = f'{{"package":{_json(tables["package"])}'
     if around:
-        yield f',"around":{_json(around)}'
+        mark += f',"around":{_json(around)}'
     for key in ("descriptions", "hashes", "sources"):
-        mark = f',"{key}":{{'
+        mark += f',"{key}":{{'
         entries: dict[str, Any] = tables[key]
         for name, value in entries.items():
-            yield f"{mark}{_json(name)}:{_json(value)}"
+            parts.append(f"{mark}{_json(name)}:{_json(value)}")
             mark = ","
-        yield "}" if entries else mark + "}"
-    yield "}"
+        mark = "}" if entries else f"{mark}}}"
+    return [*parts[:-1], f"{parts[-1]}{mark}}}"]
 
 
 _json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
@@ -172,7 +175,7 @@ _json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
 class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     """A module of classes or of codecs; `imports` are lines.
 
-    `protocol` is the module of what ROS 2 adds to the service or action.
+    `converts` says that classes convert values as Lyrical's do.
     """
 
     origin: Text
@@ -182,9 +185,8 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     imports: tuple[Code, ...] = ()
     messages: tuple[MessageView, ...] = ()
     codecs: tuple[CodecView, ...] = ()
-    services: tuple[GroupView, ...] = ()
-    action: GroupView | None = None
-    protocol: Code = Code("")
+    group: GroupView | None = None
+    converts: bool = False
 
 
 class Module(NamedTuple):
@@ -202,17 +204,6 @@ PRAGMAS = (
 HIDING_PRAGMAS = (Code("# pyright: reportIncompatibleMethodOverride=false"),)
 
 
-class _ModulePart(NamedTuple):
-    """The structures of an interface that one module of classes defines."""
-
-    interface: ir.Interface
-    structures: tuple[ir.Message, ...]
-    references: References
-    module: python_names.ModuleName
-    is_added: bool
-    converts: bool
-
-
 def module_views(
     interface: ir.Interface,
     messages: plan.Messages,
@@ -227,54 +218,47 @@ def module_views(
     """
     homes = Homes(interface, names, surroundings)
     written = derive.sections(interface)
-    added = derive.messages(interface)[len(written) :]
-    for structures, module in ((written, homes.classes), (added, homes.protocol)):
-        if structures:
-            references = References(interface, structures, messages, homes)
-            is_added = structures is added
-            part = _ModulePart(interface, structures, references, module, is_added, converts)
-            yield _classes(part, homes)
-            yield _codecs(part, messages)
-
-
-def _classes(part: _ModulePart, homes: Homes) -> Module:
-    interface, references = part.interface, part.references
-    name = interface.name
-    purposes = fields.purposes(interface)
-    is_action = isinstance(interface, ir.Action)
-    file = f"{name.kind}/{name.name}.{name.kind}"
+    view = _classes(interface, written, References(interface, written, messages, homes), converts)
+    yield Module(interface.name.kind, f"{interface.name.kind}/{homes.classes}.py", view)
+    sent = written + derive.composites(interface)
+    references = References(interface, sent, messages, homes)
+    codecs = tuple(codec(structure, references, messages) for structure in sent)
     view = ModuleView(
-        origin=Text(f"{name}.{name.kind}"),
-        pragmas=(
-            *(PRAGMAS if references.others and not homes.surroundings.vendors else ()),
-            *(HIDING_PRAGMAS if any(map(_hides_methods, part.structures)) else ()),
-        ),
-        title=Text(f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}."),
-        runtime=Code(homes.surroundings.runtime),
-        imports=_code(_imports(references, part.structures)),
-        messages=tuple(
-            classes.message(structure, references, purposes, file, converts=part.converts)
-            for structure in part.structures
-        ),
-        # a service's own class is its author's; those of an action's services are not
-        services=classes.services(interface, purposes) if part.is_added == is_action else (),
-        action=classes.action(interface) if isinstance(interface, ir.Action) else None,
-        protocol=Code(homes.protocol),
-    )
-    return Module("protocol" if part.is_added else name.kind, f"{name.kind}/{part.module}.py", view)
-
-
-def _codecs(part: _ModulePart, messages: plan.Messages) -> Module:
-    name = part.interface.name
-    codecs = tuple(codec(structure, part.references, messages) for structure in part.structures)
-    view = ModuleView(
-        origin=Text(f"{name}.{name.kind}"),
+        origin=Text(f"{interface.name}.{interface.name.kind}"),
         pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
-        title=Text(f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}."),
-        runtime=Code(part.references.surroundings.runtime),
+        title=Text(f"The codecs of {interface.name}."),
+        runtime=Code(surroundings.runtime),
         codecs=codecs,
     )
-    return Module("codec", f"{name.kind}/{python_names.codec_module(part.module)}.py", view)
+    path = f"{interface.name.kind}/{python_names.codec_module(homes.classes)}.py"
+    yield Module("codec", path, view)
+
+
+def _classes(
+    interface: ir.Interface,
+    structures: tuple[ir.Message, ...],
+    references: References,
+    converts: bool,
+) -> ModuleView:
+    name = interface.name
+    purposes = fields.purposes(interface)
+    file = f"{name.kind}/{name.name}.{name.kind}"
+    return ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
+        pragmas=(
+            *(PRAGMAS if references.others and not references.surroundings.vendors else ()),
+            *(HIDING_PRAGMAS if any(map(_hides_methods, structures)) else ()),
+        ),
+        title=Text(f"The classes of {name}."),
+        runtime=Code(references.surroundings.runtime),
+        imports=_code(_imports(references, structures)),
+        messages=tuple(
+            classes.message(structure, references, purposes, file, converts=converts)
+            for structure in structures
+        ),
+        group=None if isinstance(interface, ir.Message) else classes.group(interface),
+        converts=converts,
+    )
 
 
 def _hides_methods(structure: ir.Message) -> bool:
@@ -296,12 +280,6 @@ def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iter
     yield from inside
     if outside:
         yield from ("", "with _idlc.importing():", *outside)
-    implied = references.modules()
-    if implied:
-        yield from ("", "TYPE_CHECKING = False", "if TYPE_CHECKING:")
-        yield from (f"    import {module} as {name}" for module, name in implied)
-        yield "else:"
-        yield from (f'    {name} = _idlc.Package("{module}")' for module, name in implied)
 
 
 PACKAGE = Path(__file__).parents[2]
@@ -314,7 +292,7 @@ def template(name: str) -> jinja2.Template:
 
 
 @cache
-def runtime_files() -> tuple[RenderedFile, ...]:
+def carried_runtime() -> tuple[RenderedFile, ...]:
     """Return the support package, a verbatim copy of idlc.runtime."""
     runtime = PACKAGE / "runtime"
     return tuple(
@@ -323,6 +301,15 @@ def runtime_files() -> tuple[RenderedFile, ...]:
         )
         for path in sorted(runtime.rglob("*.py"))
     )
+
+
+def installed_runtime(package: str) -> tuple[RenderedFile]:
+    """Return the module that takes the runtime from the distribution idlc-runtime."""
+    required, version = Code(RUNTIME), Code(__version__)
+    text = template("message/runtime.py.jinja").render(
+        package=Code(package), required=required, version=version, protocol=PROTOCOL
+    )
+    return (RenderedFile("_idlc.py", text),)
 
 
 def module_files(
@@ -340,10 +327,13 @@ def module_files(
 
 
 def render_package(
-    model: link.Model, surroundings: Surroundings = ALONE
+    model: link.Model,
+    surroundings: Surroundings = ALONE,
+    runtime: Iterable[RenderedFile] | None = None,
 ) -> tuple[RenderedFile, ...]:
     """Return all files of a generated package but its lock, sorted by path.
 
+    `runtime` are the files of its `_idlc`, by default a copy of the runtime.
     The model must be without errors: no `Unknown` type, no missing one.
     """
     files = [
@@ -351,7 +341,7 @@ def render_package(
         # a package without it would lose to any other of its name, wherever that stands on the path
         RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'),
         RenderedFile("py.typed", ""),
-        *runtime_files(),
+        *(carried_runtime() if runtime is None else runtime),
     ]
     return tuple(sorted(files, key=lambda file: file.path))
 

@@ -99,8 +99,12 @@ class Codec:
 def codecs_of(kind: type) -> Codecs:
     """Return the codecs of a generated class, which keeps them as `_codec_`."""
     owner = owner_of(kind)
-    module = __import__(f"{owner.__init__.__module__}__codec", fromlist=["CODECS"])
-    make = module.CODECS[owner.__name__]
+    module = __import__(f"{owner.__module__}__codec", fromlist=["CODECS"])
+    return keep_codecs(owner, module.CODECS[owner.__name__])
+
+
+def keep_codecs(owner: Any, make: Callable[[Any, str, Reading], Codec]) -> Codecs:
+    """Return the codecs that `make` makes, each once; the class keeps them as `_codec_`."""
     cached: dict[tuple[str, Reading], Codec] = {}
 
     def codecs(order: str, reading: Reading = COPYING) -> Codec:

@@ -13,8 +13,6 @@ from array import array
 
 from . import codec
 from .names import (
-    MissingPackageError,
-    importing,
     owner_of,
     public_name,
     slot_name,
@@ -229,10 +227,7 @@ def metaclass_of(
     base: type[InterfaceMeta], name: str, namespace: dict[str, Any]
 ) -> Any:
     """Return a metaclass for one interface, in the module of its class like rosidl's."""
-    module = namespace["__module__"].removesuffix("__protocol")
-    if module != namespace["__module__"]:
-        namespace["__module__"] = module
-        namespace.pop("__firstlineno__", None)  # that is another file's
+    module = namespace["__module__"]
     metaclass = type(f"Metaclass_{name}", (base,), {"__module__": module})
     setattr(sys.modules.get(module), metaclass.__name__, metaclass)
     return metaclass
@@ -530,81 +525,25 @@ def _equal(self: Any, other: Any) -> Any:
 # services and actions
 
 
-class Package:
-    """A module of another package, imported on first access to one of its classes."""
-
-    def __init__(self, module: str) -> None:
-        self._module = module
-
-    def __getattr__(self, name: str) -> Any:
-        """Return a class; what begins with an underscore is none."""
-        if name[0] == "_":
-            raise AttributeError(f"{self._module} has no class {name!r}")
-        with importing():
-            return getattr(__import__(self._module, fromlist=[name]), name)
-
-
-class Imported:
-    """A class attribute: a class of another package, imported on first access."""
-
-    def __init__(self, module: str, name: str) -> None:
-        self._package = Package(module)
-        self._name = name
-
-    def __get__(self, instance: object, owner: type | None = None) -> Any:
-        """Return the class; without the package, the attribute is missing."""
-        try:
-            return getattr(self._package, self._name)
-        except MissingPackageError as error:
-            raise AttributeError(str(error)) from error
-
-
-def _protocol(module: str) -> Any:
-    """Return the module of what ROS 2 adds to the service or action of a module."""
-    return __import__(f"{module}__protocol", fromlist=["__name__"])
-
-
-def _event(service: Any) -> Any:
-    name = f"{wire_name(service.__name__)}_Event"
-    service.Event = getattr(_protocol(service.__module__), name)
-    return service.Event
-
-
-def _impl(action: Any) -> Any:
-    name = f"{wire_name(action.__name__)}_Impl"
-    action.Impl = getattr(_protocol(action.__module__), name)
-    return action.Impl
-
-
-def complete(protocol: str) -> None:
-    """Copy the names of the module `protocol` into the module where rosidl has all classes.
-
-    Pickles look for classes there, and evaluated annotations for the names in them.
-    """
-    names = vars(sys.modules[protocol.removesuffix("__protocol")])
-    for name, value in vars(sys.modules[protocol]).items():
-        names.setdefault(name, value)
-
-
-def _protocol_getter(module: str) -> Any:
-    """Return a module's `__getattr__`, which finds what ROS 2 adds."""
+def _getter(group: Any, prefix: str) -> Callable[[str], Any]:
+    """Return a module's `__getattr__`, which finds what ROS 2 adds to a service or action."""
+    module = group.__module__
 
     def get(name: str) -> Any:
-        if name[0] != "_" and hasattr(_protocol(module), name):
-            return getattr(_protocol(module), name)
+        if name.startswith(prefix):
+            getattr(group, group._added)
+            if name in vars(sys.modules[module]):
+                return vars(sys.modules[module])[name]
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
     return get
 
 
 class _GroupMeta(InterfaceMeta):
-    """Gives each service and action a metaclass of its own, for its type support.
-
-    What ROS 2 adds is in a module of its own, imported when somebody asks for it.
-    """
+    """Gives each service and action a metaclass of its own, for its type support."""
 
     _interface: ClassVar[Any] = None
-    #: The attribute that stands for it, in a class that is not itself part of it.
+    #: The attribute that stands for what ROS 2 adds, in a class that is not itself part of it.
     _added: ClassVar[str]
 
     def __new__(
@@ -615,9 +554,9 @@ class _GroupMeta(InterfaceMeta):
         metaclass = metaclass_of(cls, name, namespace)
         created: Any = type.__new__(metaclass, name, bases, namespace)
         metaclass._interface = created
-        if cls._added not in namespace:
+        if cls._added not in namespace and len(created.__mro__) == 3:
             module: Any = sys.modules[created.__module__]
-            module.__getattr__ = _protocol_getter(created.__module__)
+            module.__getattr__ = _getter(created, f"{wire_name(name)}_")
         return created
 
     def __call__(cls, *_values: object, **_named: object) -> Any:
@@ -655,12 +594,17 @@ class ActionMeta(_GroupMeta):
 class Service(metaclass=ServiceMeta):
     """The base of services: `Request`, `Response` and `Event` are their messages."""
 
+    #: True if fields make lists of the values that they are given, as from Lyrical on.
+    _converts_ = False
+
     if not TYPE_CHECKING:
-        Event = OnDemand("message", "_event")
+        Event = OnDemand("protocol", "event_of")
 
 
 class Action(metaclass=ActionMeta):
     """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
 
+    _converts_ = False
+
     if not TYPE_CHECKING:
-        Impl = OnDemand("message", "_impl")
+        Impl = OnDemand("protocol", "impl_of")

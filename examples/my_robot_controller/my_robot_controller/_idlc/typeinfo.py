@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from .cdr import NATIVE, order_of
 from .names import DecodeError, importing, public_name, slot_name, wire_name
@@ -88,6 +88,10 @@ class FieldInfo:
         self.public = public_name(self.name)
         self.is_list = self.shape != SCALAR
         self.is_numeric = self.primitive is not None and self.primitive.code not in "?c"
+
+
+#: Makes the value of a field of a message, from the bytes of numbers.
+Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
@@ -178,7 +182,17 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-_types_of = cache(Types)
+_types_in = cache(Types)
+
+
+def types_of(kind: type) -> Types:
+    """Return what the package of a generated class says of types."""
+    home, _, _ = kind.__module__.rsplit(".", 2)
+    try:
+        data = import_module(f"{home}._type_data")
+    except ModuleNotFoundError:
+        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
+    return _types_in(data)
 
 
 def structure_of(kind: type) -> Structure:
@@ -191,12 +205,8 @@ def structure_of(kind: type) -> Structure:
 
 @cache
 def _structure_of(owner: type) -> Structure:
-    home, kind, _ = owner.__module__.rsplit(".", 2)
-    try:
-        data = import_module(f"{home}._type_data")
-    except ModuleNotFoundError:
-        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    types = _types_of(data)
+    types = types_of(owner)
+    kind = owner.__module__.rsplit(".", 2)[1]
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
@@ -298,15 +308,20 @@ def least_element(field: FieldInfo) -> int:
 class CarefulReader:
     """Goes over a buffer and never further than it has bytes for.
 
-    `make` returns what takes the values of a structure.
+    `make` returns what takes the values of a structure, `numbers` what a field holds of numbers.
     """
 
     def __init__(
-        self, data: bytes, order: str, make: Callable[[Structure], Any]
+        self,
+        data: Any,
+        order: str,
+        make: Callable[[Structure], Any],
+        numbers: Numbers | None = None,
     ) -> None:
         self.data = data
         self.order = order
         self.make = make
+        self.numbers = numbers or self.copied
         self.at = 4
 
     def message(self, structure: Structure, path: str) -> Any:
@@ -316,11 +331,11 @@ class CarefulReader:
             self.take(1, 1, path or structure.name)
         for field in structure.fields:
             place = inner_path(path, field.public)
-            setattr(message, field.slot, self.field(field, place))
+            setattr(message, field.slot, self.field(field, place, message))
         return message
 
-    def field(self, field: FieldInfo, path: str) -> Any:
-        """Read a field."""
+    def field(self, field: FieldInfo, path: str, message: Any) -> Any:
+        """Read a field of a message."""
         if not field.is_list:
             return self.element(field, path)
         count = field.size
@@ -331,16 +346,15 @@ class CarefulReader:
                 raise DecodeError(problem, path, self.at - 4)
         self.enough(count * least_element(field), path, f"{count} elements")
         if field.is_numeric and field.primitive is not None:
-            return self.numbers(field, count, path)
+            size = field.primitive.size
+            raw = self.take(count * size, size, path) if count else b""
+            return self.numbers(message, field, raw)
         return [self.element(field, f"{path}[{index}]") for index in range(count)]
 
-    def numbers(self, field: FieldInfo, count: int, path: str) -> Any:
-        """Read an array of numbers."""
+    def copied(self, _message: Any, field: FieldInfo, raw: bytes) -> Any:
+        """Return an array of numbers."""
         assert field.primitive is not None
-        size = field.primitive.size
-        result = array(field.primitive.code)
-        if count:
-            result.frombytes(self.take(count * size, size, path))
+        result = array(field.primitive.code, raw)
         if self.order != NATIVE:
             result.byteswap()
         if field.is_sequence:
@@ -361,12 +375,14 @@ class CarefulReader:
             return self.wide(self.count(path, "units"), path)
         size = self.count(path, "bytes of text")
         raw = self.take(size, 1, path, f"{size} bytes of text")
-        return raw.removesuffix(b"\0").decode("utf-8", "replace")
+        return bytes(raw).removesuffix(b"\0").decode("utf-8", "replace")
 
     def wide(self, count: int, path: str) -> str:
         """Read a wstring, whose units must be UTF-16."""
         at = self.at
-        units = array("I", self.take(4 * count, 4, path, f"{count} units of text"))
+        units = array(
+            "I", bytes(self.take(4 * count, 4, path, f"{count} units of text"))
+        )
         if self.order != NATIVE:
             units.byteswap()
         for index, unit in enumerate(units):
@@ -381,7 +397,7 @@ class CarefulReader:
         raw = self.take(4, 4, path, f"the number of {what}")
         return int.from_bytes(raw, "little" if self.order == "<" else "big")
 
-    def take(self, size: int, align: int, path: str, what: str = "") -> bytes:
+    def take(self, size: int, align: int, path: str, what: str = "") -> Any:
         """Return the bytes of the next value."""
         self.at += (4 - self.at) % align
         self.enough(size, path, what or counted(size, "byte"))

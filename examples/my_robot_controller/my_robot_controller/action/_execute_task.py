@@ -120,7 +120,18 @@ class ExecuteTask(_idlc.Action):  # noqa
     Goal: _idlc.TypeAlias = ExecuteTask_Goal
     Result: _idlc.TypeAlias = ExecuteTask_Result
     Feedback: _idlc.TypeAlias = ExecuteTask_Feedback
+
     if TYPE_CHECKING:
-        from ._execute_task__protocol import (
-            ExecuteTask_Impl as Impl,
-        )
+
+        class Impl(_idlc.ActionImpl):
+            class SendGoalService(_idlc.SendGoal):
+                class Request(_idlc.SendGoalRequest[ExecuteTask_Goal]): ...
+
+                class Event(_idlc.ServiceEvent[Request, _idlc.SendGoalResponse]): ...
+
+            class GetResultService(_idlc.GetResult):
+                class Response(_idlc.GetResultResponse[ExecuteTask_Result]): ...
+
+                class Event(_idlc.ServiceEvent[_idlc.GetResultRequest, Response]): ...
+
+            class FeedbackMessage(_idlc.FeedbackMessage[ExecuteTask_Feedback]): ...

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
         AddTwoInts_Request,
         AddTwoInts_Response,
     )
-    from ._add_two_ints__protocol import AddTwoInts_Event
+
+    AddTwoInts_Event = AddTwoInts.Event
 
 __all__ = [
     "AddTwoInts",
@@ -24,7 +25,7 @@ __all__ = [
 
 _MODULES = {
     "AddTwoInts": "_add_two_ints",
-    "AddTwoInts_Event": "_add_two_ints__protocol",
+    "AddTwoInts_Event": "_add_two_ints",
     "AddTwoInts_Request": "_add_two_ints",
     "AddTwoInts_Response": "_add_two_ints",
 }

@@ -14,17 +14,16 @@ if TYPE_CHECKING:
         Fill_Goal,
         Fill_Result,
     )
-    from ._fill__protocol import (
-        Fill_FeedbackMessage,
-        Fill_GetResult,
-        Fill_GetResult_Event,
-        Fill_GetResult_Request,
-        Fill_GetResult_Response,
-        Fill_SendGoal,
-        Fill_SendGoal_Event,
-        Fill_SendGoal_Request,
-        Fill_SendGoal_Response,
-    )
+
+    Fill_FeedbackMessage = Fill.Impl.FeedbackMessage
+    Fill_GetResult = Fill.Impl.GetResultService
+    Fill_GetResult_Event = Fill.Impl.GetResultService.Event
+    Fill_GetResult_Request = Fill.Impl.GetResultService.Request
+    Fill_GetResult_Response = Fill.Impl.GetResultService.Response
+    Fill_SendGoal = Fill.Impl.SendGoalService
+    Fill_SendGoal_Event = Fill.Impl.SendGoalService.Event
+    Fill_SendGoal_Request = Fill.Impl.SendGoalService.Request
+    Fill_SendGoal_Response = Fill.Impl.SendGoalService.Response
 
 __all__ = [
     "Fill",
@@ -45,17 +44,17 @@ __all__ = [
 _MODULES = {
     "Fill": "_fill",
     "Fill_Feedback": "_fill",
-    "Fill_FeedbackMessage": "_fill__protocol",
-    "Fill_GetResult": "_fill__protocol",
-    "Fill_GetResult_Event": "_fill__protocol",
-    "Fill_GetResult_Request": "_fill__protocol",
-    "Fill_GetResult_Response": "_fill__protocol",
+    "Fill_FeedbackMessage": "_fill",
+    "Fill_GetResult": "_fill",
+    "Fill_GetResult_Event": "_fill",
+    "Fill_GetResult_Request": "_fill",
+    "Fill_GetResult_Response": "_fill",
     "Fill_Goal": "_fill",
     "Fill_Result": "_fill",
-    "Fill_SendGoal": "_fill__protocol",
-    "Fill_SendGoal_Event": "_fill__protocol",
-    "Fill_SendGoal_Request": "_fill__protocol",
-    "Fill_SendGoal_Response": "_fill__protocol",
+    "Fill_SendGoal": "_fill",
+    "Fill_SendGoal_Event": "_fill",
+    "Fill_SendGoal_Request": "_fill",
+    "Fill_SendGoal_Response": "_fill",
 }
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)

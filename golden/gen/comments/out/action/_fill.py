@@ -120,7 +120,18 @@ class Fill(_idlc.Action):  # noqa
     Goal: _idlc.TypeAlias = Fill_Goal
     Result: _idlc.TypeAlias = Fill_Result
     Feedback: _idlc.TypeAlias = Fill_Feedback
+
     if TYPE_CHECKING:
-        from ._fill__protocol import (
-            Fill_Impl as Impl,
-        )
+
+        class Impl(_idlc.ActionImpl):
+            class SendGoalService(_idlc.SendGoal):
+                class Request(_idlc.SendGoalRequest[Fill_Goal]): ...
+
+                class Event(_idlc.ServiceEvent[Request, _idlc.SendGoalResponse]): ...
+
+            class GetResultService(_idlc.GetResult):
+                class Response(_idlc.GetResultResponse[Fill_Result]): ...
+
+                class Event(_idlc.ServiceEvent[_idlc.GetResultRequest, Response]): ...
+
+            class FeedbackMessage(_idlc.FeedbackMessage[Fill_Feedback]): ...

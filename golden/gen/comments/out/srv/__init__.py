@@ -13,7 +13,8 @@ if TYPE_CHECKING:
         Reset_Request,
         Reset_Response,
     )
-    from ._reset__protocol import Reset_Event
+
+    Reset_Event = Reset.Event
 
 __all__ = [
     "Reset",
@@ -24,7 +25,7 @@ __all__ = [
 
 _MODULES = {
     "Reset": "_reset",
-    "Reset_Event": "_reset__protocol",
+    "Reset_Event": "_reset",
     "Reset_Request": "_reset",
     "Reset_Response": "_reset",
 }

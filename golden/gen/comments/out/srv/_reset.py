@@ -84,7 +84,7 @@ class Reset(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = Reset_Request
     Response: _idlc.TypeAlias = Reset_Response
+
     if TYPE_CHECKING:
-        from ._reset__protocol import (
-            Reset_Event as Event,
-        )
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
         Run_Request,
         Run_Response,
     )
-    from ._run__protocol import Run_Event
+
+    Run_Event = Run.Event
 
 __all__ = [
     "Run",
@@ -24,7 +25,7 @@ __all__ = [
 
 _MODULES = {
     "Run": "_run",
-    "Run_Event": "_run__protocol",
+    "Run_Event": "_run",
     "Run_Request": "_run",
     "Run_Response": "_run",
 }

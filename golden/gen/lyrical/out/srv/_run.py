@@ -119,7 +119,8 @@ class Run(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = Run_Request
     Response: _idlc.TypeAlias = Run_Response
+    _converts_ = True
+
     if TYPE_CHECKING:
-        from ._run__protocol import (
-            Run_Event as Event,
-        )
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
         None_Request,
         None_Response,
     )
-    from ._none__protocol import None_Event
+
+    None_Event = None_.Event
 
 __all__ = [
     "None_",
@@ -24,7 +25,7 @@ __all__ = [
 
 _MODULES = {
     "None_": "_none",
-    "None_Event": "_none__protocol",
+    "None_Event": "_none",
     "None_Request": "_none",
     "None_Response": "_none",
 }

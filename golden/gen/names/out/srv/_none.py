@@ -58,7 +58,7 @@ class None_(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = None_Request
     Response: _idlc.TypeAlias = None_Response
+
     if TYPE_CHECKING:
-        from ._none__protocol import (
-            None_Event as Event,
-        )
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...

@@ -14,34 +14,31 @@ if TYPE_CHECKING:
         Countdown_Goal,
         Countdown_Result,
     )
-    from ._countdown__protocol import (
-        Countdown_FeedbackMessage,
-        Countdown_GetResult,
-        Countdown_GetResult_Event,
-        Countdown_GetResult_Request,
-        Countdown_GetResult_Response,
-        Countdown_SendGoal,
-        Countdown_SendGoal_Event,
-        Countdown_SendGoal_Request,
-        Countdown_SendGoal_Response,
-    )
     from ._execute_task import (
         ExecuteTask,
         ExecuteTask_Feedback,
         ExecuteTask_Goal,
         ExecuteTask_Result,
     )
-    from ._execute_task__protocol import (
-        ExecuteTask_FeedbackMessage,
-        ExecuteTask_GetResult,
-        ExecuteTask_GetResult_Event,
-        ExecuteTask_GetResult_Request,
-        ExecuteTask_GetResult_Response,
-        ExecuteTask_SendGoal,
-        ExecuteTask_SendGoal_Event,
-        ExecuteTask_SendGoal_Request,
-        ExecuteTask_SendGoal_Response,
-    )
+
+    Countdown_FeedbackMessage = Countdown.Impl.FeedbackMessage
+    Countdown_GetResult = Countdown.Impl.GetResultService
+    Countdown_GetResult_Event = Countdown.Impl.GetResultService.Event
+    Countdown_GetResult_Request = Countdown.Impl.GetResultService.Request
+    Countdown_GetResult_Response = Countdown.Impl.GetResultService.Response
+    Countdown_SendGoal = Countdown.Impl.SendGoalService
+    Countdown_SendGoal_Event = Countdown.Impl.SendGoalService.Event
+    Countdown_SendGoal_Request = Countdown.Impl.SendGoalService.Request
+    Countdown_SendGoal_Response = Countdown.Impl.SendGoalService.Response
+    ExecuteTask_FeedbackMessage = ExecuteTask.Impl.FeedbackMessage
+    ExecuteTask_GetResult = ExecuteTask.Impl.GetResultService
+    ExecuteTask_GetResult_Event = ExecuteTask.Impl.GetResultService.Event
+    ExecuteTask_GetResult_Request = ExecuteTask.Impl.GetResultService.Request
+    ExecuteTask_GetResult_Response = ExecuteTask.Impl.GetResultService.Response
+    ExecuteTask_SendGoal = ExecuteTask.Impl.SendGoalService
+    ExecuteTask_SendGoal_Event = ExecuteTask.Impl.SendGoalService.Event
+    ExecuteTask_SendGoal_Request = ExecuteTask.Impl.SendGoalService.Request
+    ExecuteTask_SendGoal_Response = ExecuteTask.Impl.SendGoalService.Response
 
 __all__ = [
     "Countdown",
@@ -75,30 +72,30 @@ __all__ = [
 _MODULES = {
     "Countdown": "_countdown",
     "Countdown_Feedback": "_countdown",
-    "Countdown_FeedbackMessage": "_countdown__protocol",
-    "Countdown_GetResult": "_countdown__protocol",
-    "Countdown_GetResult_Event": "_countdown__protocol",
-    "Countdown_GetResult_Request": "_countdown__protocol",
-    "Countdown_GetResult_Response": "_countdown__protocol",
+    "Countdown_FeedbackMessage": "_countdown",
+    "Countdown_GetResult": "_countdown",
+    "Countdown_GetResult_Event": "_countdown",
+    "Countdown_GetResult_Request": "_countdown",
+    "Countdown_GetResult_Response": "_countdown",
     "Countdown_Goal": "_countdown",
     "Countdown_Result": "_countdown",
-    "Countdown_SendGoal": "_countdown__protocol",
-    "Countdown_SendGoal_Event": "_countdown__protocol",
-    "Countdown_SendGoal_Request": "_countdown__protocol",
-    "Countdown_SendGoal_Response": "_countdown__protocol",
+    "Countdown_SendGoal": "_countdown",
+    "Countdown_SendGoal_Event": "_countdown",
+    "Countdown_SendGoal_Request": "_countdown",
+    "Countdown_SendGoal_Response": "_countdown",
     "ExecuteTask": "_execute_task",
     "ExecuteTask_Feedback": "_execute_task",
-    "ExecuteTask_FeedbackMessage": "_execute_task__protocol",
-    "ExecuteTask_GetResult": "_execute_task__protocol",
-    "ExecuteTask_GetResult_Event": "_execute_task__protocol",
-    "ExecuteTask_GetResult_Request": "_execute_task__protocol",
-    "ExecuteTask_GetResult_Response": "_execute_task__protocol",
+    "ExecuteTask_FeedbackMessage": "_execute_task",
+    "ExecuteTask_GetResult": "_execute_task",
+    "ExecuteTask_GetResult_Event": "_execute_task",
+    "ExecuteTask_GetResult_Request": "_execute_task",
+    "ExecuteTask_GetResult_Response": "_execute_task",
     "ExecuteTask_Goal": "_execute_task",
     "ExecuteTask_Result": "_execute_task",
-    "ExecuteTask_SendGoal": "_execute_task__protocol",
-    "ExecuteTask_SendGoal_Event": "_execute_task__protocol",
-    "ExecuteTask_SendGoal_Request": "_execute_task__protocol",
-    "ExecuteTask_SendGoal_Response": "_execute_task__protocol",
+    "ExecuteTask_SendGoal": "_execute_task",
+    "ExecuteTask_SendGoal_Event": "_execute_task",
+    "ExecuteTask_SendGoal_Request": "_execute_task",
+    "ExecuteTask_SendGoal_Response": "_execute_task",
 }
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)

@@ -130,7 +130,18 @@ class Countdown(_idlc.Action):  # noqa
     Goal: _idlc.TypeAlias = Countdown_Goal
     Result: _idlc.TypeAlias = Countdown_Result
     Feedback: _idlc.TypeAlias = Countdown_Feedback
+
     if TYPE_CHECKING:
-        from ._countdown__protocol import (
-            Countdown_Impl as Impl,
-        )
+
+        class Impl(_idlc.ActionImpl):
+            class SendGoalService(_idlc.SendGoal):
+                class Request(_idlc.SendGoalRequest[Countdown_Goal]): ...
+
+                class Event(_idlc.ServiceEvent[Request, _idlc.SendGoalResponse]): ...
+
+            class GetResultService(_idlc.GetResult):
+                class Response(_idlc.GetResultResponse[Countdown_Result]): ...
+
+                class Event(_idlc.ServiceEvent[_idlc.GetResultRequest, Response]): ...
+
+            class FeedbackMessage(_idlc.FeedbackMessage[Countdown_Feedback]): ...

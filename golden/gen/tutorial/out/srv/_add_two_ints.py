@@ -94,7 +94,7 @@ class AddTwoInts(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = AddTwoInts_Request
     Response: _idlc.TypeAlias = AddTwoInts_Response
+
     if TYPE_CHECKING:
-        from ._add_two_ints__protocol import (
-            AddTwoInts_Event as Event,
-        )
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...
