@@ -56,7 +56,7 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help install demo test test-long test-bare test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
-    lock site release-check clean
+    lock site release-check runtime-wheel clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -141,6 +141,9 @@ site: $(SITE_ENV)/installed ## write the documentation site into build/site
 
 release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
 	$(RELEASE_ENV)/bin/python -m maintenance.release check $(ARGS)
+
+runtime-wheel: $(TEST_ENV)/installed ## build idlc-runtime, what --runtime installed imports, into dist/
+	$(TEST_ENV)/bin/python -m build --outdir dist maintenance/runtime
 
 lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)

@@ -74,7 +74,8 @@ def _compiled(package: str, base: type | None) -> type:
     if not inputs:
         return distribution_class(package, {}, base=base)
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
-    gen(GenOptions((".",), where, home, vendoring=settings.vendoring), report)
+    runtime, vendoring = settings.runtime, settings.vendoring
+    gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)

@@ -67,7 +67,9 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
         return None
     _refuse_code(name, root, report)
     generated = Report()
-    gen(GenOptions((".",), where, str(classes), vendoring=config.vendoring), generated)
+    runtime, vendoring = config.runtime, config.vendoring
+    request = GenOptions((".",), where, str(classes), runtime=runtime, vendoring=vendoring)
+    gen(request, generated)
     # the environment of a build need not be able to import the package
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
     report.extend(each for each in generated if each.code != unimportable)

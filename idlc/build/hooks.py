@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from idlc.check.package.manifest import names_runtime
 from idlc.cli import output
 from idlc.cli.exit_status import status_of
 from idlc.diagnostics import codes
@@ -24,6 +25,7 @@ from idlc.project.files import reason
 from idlc.project.prefixes import Distribution
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings
+from idlc.version import RUNTIME
 
 if TYPE_CHECKING:
     from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
@@ -126,15 +128,19 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     from idlc.build import manifest
     from idlc.build.manifest import complete_table
 
-    load_settings(Root.here(), report)  # which reports what is no TOML
+    config = load_settings(Root.here(), report)
     if not Path(MANIFEST).is_file():
         message = f"there is no {MANIFEST} beside pyproject.toml"
         hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"
         report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
     if report.had_errors:
         return None
-    declared = manifest.project(report)
+    declared = manifest.project(config.runtime, report)
     project = complete_table(declared, report) if declared else {}
+    if config.runtime == "installed" and not names_runtime(project.get("dependencies", ())):
+        message = "the classes import `idlc_runtime`, which [project] does not require"
+        hint = f'add "{RUNTIME}" to `dependencies`'
+        report.add(codes.UNDECLARED_IMPORT.of(settings.SETTINGS_FILE, message, hint=hint))
     return None if report.had_errors else (declared["name"], project)
 
 

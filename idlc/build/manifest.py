@@ -11,9 +11,11 @@ from typing import Any
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.model.names import why_not_package
+from idlc.project.lock import Runtime
 from idlc.project.package_xml import Statement, declared_name, read_statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE
+from idlc.version import RUNTIME
 
 #: The packages on PyPI that every generated package needs. The packages of ROS 2 that it imports
 #: are not among them: ROS 2 installs them, and anybody could register `std-msgs` there.
@@ -25,7 +27,7 @@ _URLS = {"website": "Homepage", "repository": "Repository", "bugtracker": "Issue
 _READMES = ("README.md", "README.rst", "README.txt")
 
 
-def project(report: Report) -> dict[str, Any]:
+def project(runtime: Runtime | None, report: Report) -> dict[str, Any]:
     """Return the table by the working folder's package.xml; empty after a problem."""
     root = Root.here()
     name = declared_name(root.base / MANIFEST, root, report)
@@ -49,7 +51,7 @@ def project(report: Report) -> dict[str, Any]:
         "authors": _people(statements, "author"),
         "maintainers": _people(statements, "maintainer"),
         "urls": _urls(statements),
-        "dependencies": list(DEPENDENCIES),
+        "dependencies": [*DEPENDENCIES, *((RUNTIME,) if runtime == "installed" else ())],
     }
     return {key: value for key, value in table.items() if value}
 

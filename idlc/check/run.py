@@ -65,7 +65,7 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         edits = [change for problem in problems for change in problem.edits]
         if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
             break
-        from idlc.project.atomic import edit
+        from idlc.project.write import edit
 
         done = edit(edits, options.scope.root, report, keep_layout)
         fixed += done

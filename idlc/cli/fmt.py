@@ -38,9 +38,9 @@ def fmt(
     Files with syntax errors are reported and left alone.
     """
     from idlc.check.compiler import stage
-    from idlc.project.atomic import rewrite
     from idlc.project.files import read_source
     from idlc.project.find import find
+    from idlc.project.write import rewrite
 
     for file in find(paths, root, report, exclude):
         source = read_source(file.path, file.shown, report)

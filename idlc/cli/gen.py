@@ -93,7 +93,8 @@ def _line(package: Generated, check: bool) -> str:
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
         f"{package.package}: {counted(package.interfaces, 'interface')} → "
-        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}{needs}\n"
+        f"{counted(package.files, 'file')} in {one_line(package.out)}, "
+        f"runtime {package.runtime}{note}{needs}\n"
     )
 
 
@@ -196,6 +197,11 @@ class _Command(click.Command):
     flag_value="private",
     metavar="[=beside]",
     help="Write the types that OUT uses of other packages into it, or these packages beside it.",
+)
+@click.option(
+    "--runtime",
+    type=click.Choice(["carried", "installed"]),
+    help="Have a copy of the runtime in OUT, or import idlc-runtime. As before, at first carried.",
 )
 @click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
 @options.report_style

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from idlc.check.compiler import sound_models, stage
-from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import printable
 from idlc.documents.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
 from idlc.generate.gen import is_name, named_packages
@@ -20,12 +19,12 @@ from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.atomic import exclusive
 from idlc.project.find import find
-from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
+from idlc.project.lock import Tree
 from idlc.project.package_xml import read_statements
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.templates import RenderedFile, html, verbatim
-from idlc.project.write import Change, Plan, apply_changes, journals, sweep
+from idlc.project.write import apply, owned_files, plan
 
 
 class About(NamedTuple):
@@ -247,66 +246,24 @@ LISTING = "idlc-docs.json"
 def write(out: str, files: Mapping[str, str], root: Root, report: Report) -> bool:
     """Write files below `out`; report IDL612 to IDL614 and return `False` if that is refused."""
     folder = root.absolute(out)
-    with exclusive(folder):
-        return _write(folder, out, files, report)
-
-
-def _write(folder: Path, out: str, files: Mapping[str, str], report: Report) -> bool:
-    tree = Tree(folder)
-    mine = _listed(folder, tree)
     pages = {path: text.encode("utf-8") for path, text in files.items()}
-    listed = {path: digest(data) for path, data in sorted(pages.items())}
-    listing = json.dumps(listed, indent=1).encode() + b"\n"
-    changes: list[Change] = []
-    stale = {path for path, _ in mine} - pages.keys()
-    renamed = tree.renamed(stale, pages)
-    mine |= {(renamed[path], sha256) for path, sha256 in mine if path in renamed}
-    for path in (*pages, *sorted(stale - renamed.keys())):
-        old, new = tree.read(path), pages.get(path)
-        foreign = isinstance(old, Obstacle) or (
-            old is not None and not is_same(old, new) and (path, digest(old)) not in mine
-        )
-        if foreign and new is not None:
-            report.add(_in_the_way(f"{out}/{path}", old))
-        elif not foreign and not isinstance(old, Obstacle) and not is_same(old, new):
-            changes.append(Change(path, old, new))
-    record = tree.read(LISTING)
-    if isinstance(record, Obstacle):
-        report.add(_in_the_way(f"{out}/{LISTING}", record))
-    elif record != listing:
-        changes.append(Change(LISTING, record, listing))
-    if report.had_errors:
-        return False
-    if not changes:
-        sweep(folder)
-    return apply_changes(Plan(folder, tuple(changes), {}), out, report, listing)
+    with exclusive(folder):
+        planned = plan(folder, out, pages, _listed(folder), report, record=LISTING)
+        return planned is not None and apply(planned, out, report, _listing)
 
 
-def _in_the_way(shown: str, current: Obstacle | bytes | None) -> Diagnostic:
-    message = f"`{shown}` was not written by idlc, or edited since"
-    if isinstance(current, Obstacle):
-        message = f"cannot write `{shown}`: {current.what}"
-    return codes.FOREIGN_FILE.of(
-        shown, message, hint="move it away, or choose another folder with -o"
-    )
+def _listing(outputs: Mapping[str, str]) -> bytes:
+    return json.dumps(outputs, indent=1, sort_keys=True).encode() + b"\n"
 
 
-def _listed(folder: Path, tree: Tree) -> set[tuple[str, str]]:
-    """Return the pages that earlier runs may have written, each with its SHA-256."""
-    record = tree.read(LISTING)
-    written: set[tuple[str, str]] = set()
-    for data in (record if isinstance(record, bytes) else b"", *journals(folder)):
-        try:
-            listed = json.loads(data)
-        except (ValueError, RecursionError):
-            continue
-        if isinstance(listed, dict):
-            written |= {
-                (path, sha256)
-                for path, sha256 in listed.items()
-                if may_be_own(path) and isinstance(sha256, str)
-            }
-    return written
+def _listed(folder: Path) -> dict[str, frozenset[str]]:
+    """Return the pages that earlier runs may have written, each with its digests."""
+    record = Tree(folder).read(LISTING)
+    try:
+        listed = json.loads(record) if isinstance(record, bytes) else {}
+    except (ValueError, RecursionError):
+        listed = {}
+    return owned_files(folder, listed if isinstance(listed, dict) else {})
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:

@@ -25,10 +25,11 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.model.distros import Distro
 from idlc.project import inputs, lock, settings
+from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
-from idlc.project.lock import Vendoring, load_lock
+from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
@@ -43,7 +44,7 @@ class GenOptions(NamedTuple):
     """The arguments of `idlc gen`, which writes to `out`, into the prefix `ament`, or both.
 
     Types of `topics` of recordings are written; none means all. `again` is the command for hints
-    that writes the files which `check` compares.
+    that writes the files which `check` compares. Without `runtime`, each package keeps its own.
     """
 
     paths: tuple[str, ...]
@@ -51,6 +52,7 @@ class GenOptions(NamedTuple):
     out: str = ""
     topics: tuple[str, ...] = ()
     check: bool = False
+    runtime: Runtime | None = None
     vendoring: Vendoring = ""
     force: bool = False
     ament: str = ""
@@ -62,6 +64,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
     return options._replace(
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
+        runtime=options.runtime or settings.runtime,
         vendoring=options.vendoring or settings.vendoring,
     )
 
@@ -127,10 +130,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
         return ()
-    vendored = options.vendoring == "beside" or any(
-        each.lock and each.lock.vendored for each in folders
-    )
-    with folders[0].exclusive(beside=vendored or len(folders) > 1):
+    with exclusive(folders[0].path):
         done = _compile_and_write(dict(zip(folders, packages, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
             from idlc.generate.prefix import write_setup_scripts
@@ -155,7 +155,12 @@ def _targets(
     """Return the folder that each package is written to."""
     if not options.ament:
         return folder_targets(
-            packages, options.out, options.scope.root, report, force=options.force
+            packages,
+            options.out,
+            options.scope.root,
+            report,
+            force=options.force,
+            runtime=options.runtime,
         )
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
@@ -167,7 +172,14 @@ def _targets(
     distros = [distro.name for distro in options.scope.distros]
     overlays = [
         Overlay(
-            prefix, name, home, options.scope.root, report, force=options.force, distros=distros
+            prefix,
+            name,
+            home,
+            options.scope.root,
+            report,
+            force=options.force,
+            runtime=options.runtime,
+            distros=distros,
         )
         for name, home in homes
     ]

@@ -58,7 +58,7 @@ def package_of(
     that are written beside it.
     """
     from idlc.generate.python.imports import ALONE, VENDORING
-    from idlc.generate.python.render import render_package
+    from idlc.generate.python.render import carried_runtime, installed_runtime, render_package
     from idlc.generate.python.vendored import vendored_files
     from idlc.project import templates
     from idlc.wire.layout import oversized
@@ -69,8 +69,11 @@ def package_of(
         return None
     templates.keep_compiled()
     with stage("render", model.package):
+        runtime = (
+            carried_runtime() if target.runtime == "carried" else installed_runtime(model.package)
+        )
         rendered = (
-            *render_package(model, VENDORING if copies else ALONE),
+            *render_package(model, VENDORING if copies else ALONE, runtime),
             *vendored_files(model.package, copies),
         )
         modules = {file.path: file.text for file in rendered}
@@ -87,8 +90,10 @@ def package_of(
         target,
         plan,
         lock.Lock(
+            format=lock.FORMAT,
             idlc=__version__,
             package=model.package,
+            runtime=target.runtime,
             vendor_deps=bool(vendoring),
             converts_values=model.distro.converts_values or UNSET,
             vendored=tuple(beside),
@@ -143,6 +148,7 @@ class Generated(NamedTuple):
     out: str
     interfaces: int
     files: int
+    runtime: lock.Runtime
     written: int = 0
     removed: int = 0
     needs: tuple[str, ...] = ()
@@ -153,8 +159,12 @@ def generated(package: Package) -> Generated:
     removed = sum(change.new is None for change in package.plan.changes)
     written = len(package.plan.changes) - removed
     target = package.target
-    files = len(package.plan.outputs)
-    return Generated(target.package, target.name, len(package.lock.inputs), files, written, removed)
+    return _outcome(target, package.lock)._replace(written=written, removed=removed)
+
+
+def _outcome(target: Target, record: lock.Lock) -> Generated:
+    counts = len(record.inputs), len(record.outputs)
+    return Generated(target.package, target.name, *counts, record.runtime)
 
 
 def up_to_date(
@@ -169,11 +179,7 @@ def up_to_date(
         names = library.interfaces(package)
         if not folders[-1].unchanged(as_inputs(names, library), library):
             return ()
-    return tuple(
-        Generated(folder.package, folder.name, len(folder.lock.inputs), len(folder.lock.outputs))
-        for folder in folders
-        if folder.lock
-    )
+    return tuple(_outcome(folder, folder.lock) for folder in folders if folder.lock)
 
 
 def with_needs(

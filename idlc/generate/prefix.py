@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,9 +14,8 @@ from idlc.generate.idl import file_text, idl
 from idlc.generate.native.inspect import inspect
 from idlc.generate.target import Target
 from idlc.project import prefixes, write
-from idlc.project.atomic import exclusive
 from idlc.project.library import Library
-from idlc.project.lock import Tree, Vendoring
+from idlc.project.lock import Runtime, Tree, Vendoring
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
 from idlc.project.root import Root
 from idlc.project.write import Change, Plan
@@ -140,9 +138,10 @@ class Overlay(Target):
         report: Report,
         *,
         force: bool = False,
+        runtime: Runtime | None = None,
         distros: Sequence[str] = (),
     ) -> None:
-        super().__init__(name, package, root, report, force=force)
+        super().__init__(name, package, root, report, force=force, runtime=runtime)
         self._distros = distros
         declared = root.manifest(home) if home else None
         #: The content of its package.xml; `None` if there is none to be copied.
@@ -155,12 +154,12 @@ class Overlay(Target):
     @property
     def place(self) -> str:
         """The prefix's path, for shells that do not know the path of the file they source."""
-        return self._path.as_posix()
+        return self.path.as_posix()
 
     @property
     def distribution(self) -> Distribution:
         """The distribution that libraries are for: the installed one, unless others are chosen."""
-        installed = distribution((self._path, *prefixes.ament_prefixes()))
+        installed = distribution((self.path, *prefixes.ament_prefixes()))
         if not self._distros or installed.name in self._distros:
             return installed
         chosen = self._distros[0]
@@ -168,11 +167,6 @@ class Overlay(Target):
             f"`{self.name}` gets libraries for {chosen}, not for {installed.name} ({installed.why})"
         )
         return Distribution(chosen, f"--distro {chosen}")
-
-    def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
-        """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
-        del beside
-        return exclusive(self._path)
 
     def beside(self, package: str) -> Overlay:
         """Return another package in the prefix."""
@@ -184,6 +178,7 @@ class Overlay(Target):
             self._root,
             self.report,
             force=self._force,
+            runtime=self.runtime,
             distros=self._distros,
         )
 
@@ -206,7 +201,7 @@ class Overlay(Target):
 
     def share(self, files: Mapping[str, str]) -> bool:
         """Write the files for shells; foreign files stay, with a note."""
-        tree, changes = Tree(self._path), []
+        tree, changes = Tree(self.path), []
         for path, text in files.items():
             old, new = tree.read(path), text.encode("utf-8")
             if old is None or (isinstance(old, bytes) and old.startswith(MARK)):
@@ -215,8 +210,8 @@ class Overlay(Target):
                 self.report.notes.append(
                     f"`{self.name}/{path}` is not idlc's: put `{self.name}` into AMENT_PREFIX_PATH"
                 )
-        plan = Plan(self._path, tuple(changes), {})
-        return write.apply_changes(plan, self.name, self.report)
+        plan = Plan(self.path, tuple(changes), {})
+        return write.apply(plan, self.name, self.report)
 
 
 _SHELLS = ("sh", "bash", "zsh")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -16,7 +16,6 @@ from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.model import catalog, ir
 from idlc.model.ir import TypeName
 from idlc.project import inputs, prefixes, write
-from idlc.project.atomic import exclusive
 from idlc.project.files import is_file, is_folder
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
 from idlc.project.inputs import accept_name, by_home, output_folders, separate_homes
@@ -25,6 +24,7 @@ from idlc.project.lock import (
     FILE,
     Lock,
     Obstacle,
+    Runtime,
     Tree,
     Vendoring,
     digest,
@@ -181,7 +181,13 @@ def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
 
 
 def folder_targets(
-    packages: Sequence[inputs.Inputs], out: str, root: Root, report: Report, *, force: bool
+    packages: Sequence[inputs.Inputs],
+    out: str,
+    root: Root,
+    report: Report,
+    *,
+    force: bool,
+    runtime: Runtime | None,
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
@@ -192,7 +198,7 @@ def folder_targets(
         package = packages[0].package
         beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
         folder = f"{out}/{package}" if beside_others else out
-        targets = [Target(folder, package, root, report, force=force)]
+        targets = [Target(folder, package, root, report, force=force, runtime=runtime)]
     elif is_file(top / FILE):
         message = f"`{out}` holds one package, and these are {len(packages)}"
         hint = "choose a folder for all of them with -o, each gets one of its name there"
@@ -200,8 +206,10 @@ def folder_targets(
         return ()
     else:
         base = out.rstrip("/") or out
-        names = [each.package for each in packages]
-        targets = [Target(f"{base}/{name}", name, root, report, force=force) for name in names]
+        targets = [
+            Target(f"{base}/{name}", name, root, report, force=force, runtime=runtime)
+            for name in (each.package for each in packages)
+        ]
     return tuple(targets) if all(target.usable() for target in targets) else ()
 
 
@@ -335,27 +343,38 @@ class Target:
     modules = ""
 
     def __init__(
-        self, name: str, package: str, root: Root, report: Report, *, force: bool = False
+        self,
+        name: str,
+        package: str,
+        root: Root,
+        report: Report,
+        *,
+        force: bool = False,
+        runtime: Runtime | None = None,
     ) -> None:
         self.name = name
         self.package = package
         self._root = root
-        self._path = root.absolute(name)
+        self.path = root.absolute(name)
         self.report = report
         self._force = force
-
-    def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
-        """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
-        return exclusive(self._path.parent if beside else self._path)
+        self._runtime = runtime
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
-        return Target(name, package, self._root, self.report, force=self._force)
+        return Target(
+            name,
+            package,
+            self._root,
+            self.report,
+            force=self._force,
+            runtime=self.runtime,
+        )
 
     def locks_beside(self) -> dict[str, Lock]:
         """Return the locks of the packages in the folder that this one is in, by their folders."""
-        folders = sorted(path.parent for path in self._path.parent.glob(f"*/{FILE}"))
+        folders = sorted(path.parent for path in self.path.parent.glob(f"*/{FILE}"))
         locks = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
         return {name: lock for name, lock in locks if lock}
 
@@ -363,11 +382,16 @@ class Target:
     def lock(self) -> Lock | None:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
         report = Report() if self._force else self.report
-        return load_lock(self._path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
+        return load_lock(self.path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
+
+    @property
+    def runtime(self) -> Runtime:
+        """How the package has its runtime: as was chosen, or as in the last run."""
+        return self._runtime or (self.lock.runtime if self.lock else "carried")
 
     def usable(self) -> bool:
         """Return whether this is or can become a folder; reports IDL612."""
-        for path in (self._path, *self._path.parents):
+        for path in (self.path, *self.path.parents):
             if is_folder(path):
                 return True
             if os.path.lexists(path):
@@ -380,9 +404,11 @@ class Target:
         self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return whether compiling the inputs would change nothing."""
-        is_unchanged = unchanged(self._path, self.lock, self.package, inputs, library, vendoring)
+        is_unchanged = (self.lock is None or self.lock.runtime == self.runtime) and unchanged(
+            self.path, self.lock, self.package, inputs, library, vendoring
+        )
         if is_unchanged:
-            write.sweep(self._path)
+            write.sweep(self.path)
         return is_unchanged
 
     def missing(self) -> list[str]:
@@ -401,7 +427,7 @@ class Target:
     def _finds(self, package: str, kind: str) -> bool:
         """Return whether a package lies next to this one or could be imported; imports nothing."""
         inside = f"{kind}/__init__.py"
-        beside = (self._path / self.modules).parent
+        beside = (self.path / self.modules).parent
         return is_file(beside / package / inside) or any(
             is_file(place / inside) for place in prefixes.python_folders(package)
         )
@@ -415,22 +441,27 @@ class Target:
             path: text.encode("utf-8") if isinstance(text, str) else text
             for path, text in files.items()
         }
-        owned = write.owned_files(self._path / self.home, self.lock)
-        force = check or self._force
-        return plan(self._path, self.name, content, owned, self.report, force=force, home=self.home)
+        outputs = self.lock.outputs if self.lock else {}
+        owned = write.owned_files(self.path / self.home, outputs)
+        force, record = check or self._force, self.home + FILE
+        return plan(self.path, self.name, content, owned, self.report, record=record, force=force)
 
     def apply(self, changes: Plan, record: Lock) -> bool:
         """Make planned changes and write the lock; report IDL612 and return `False` otherwise."""
         self.lock = record
-        return write.apply(changes, encode(record), self.name, self.report)
+
+        def render(outputs: dict[str, str]) -> bytes:
+            return encode(msgspec.structs.replace(record, outputs=outputs))
+
+        return write.apply(changes, self.name, self.report, render)
 
     def remove(self, changes: Plan) -> bool:
         """Remove planned files and the lock; report IDL612 and return `False` otherwise."""
-        whole = changes._replace(changes=(*changes.changes, Change(FILE, changes.record, None)))
-        journal = encode(self.lock) if self.lock else b""
-        is_done = write.apply_changes(whole, self.name, self.report, journal)
+        lock = Change(FILE, changes.recorded, None)
+        whole = Plan(self.path, (*changes.changes, lock), {})
+        is_done = write.apply(whole, self.name, self.report)
         with suppress(OSError):  # other files stay
-            self._path.rmdir()
+            self.path.rmdir()
         return is_done
 
     def drift(self, changes: Plan, record: Lock, again: str) -> None:
@@ -458,7 +489,7 @@ class Target:
             message = f"`{path}` is no longer generated: {why}"
         elif change.old is None:
             message = f"`{path}` is missing" + ("" if wrote else f": {why}")
-        elif wrote is not None and digest(change.old) != wrote:
+        elif wrote is not None and digest(change.old) not in wrote.split():
             message = f"`{path}` was edited since idlc wrote it"
             hint = f"`{again} --force` replaces it, and keeps a copy"
         elif wrote is None:
@@ -491,6 +522,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         reasons.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
     if old.converts_values != new.converts_values:
         reasons.append("it was written for another distribution of ROS 2")
+    if old.runtime != new.runtime:
+        reasons.append(f"its runtime was {old.runtime}, and is to be {new.runtime}")
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
     if old.vendoring != new.vendoring:

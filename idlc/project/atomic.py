@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from idlc.diagnostics import codes
-from idlc.diagnostics.report import apply
-from idlc.project.files import is_folder, reason
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Edit, Report
-    from idlc.project.root import Root
+from idlc.project.files import is_folder
 
 #: All runs of one user wait for one another, wherever they write: they take milliseconds.
 _MUTEX = "Local\\idlc-writes"
 _WAITED = 258
-_SYNCHRONIZE = 0x100000
-_ACCESS_DENIED = 5
 #: Seconds between attempts to move over a file that a scanner or an editor has open.
 PAUSES = (0.01, 0.05, 0.2, 0.5)
 
@@ -33,13 +27,12 @@ def _kernel() -> Any:
     import ctypes
 
     kernel: Any = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined]
-    for name in ("CreateMutexW", "OpenProcess"):
-        getattr(kernel, name).restype = ctypes.c_void_p
+    kernel.CreateMutexW.restype = ctypes.c_void_p
     return kernel
 
 
 @contextlib.contextmanager
-def only_writer_on_windows() -> Iterator[None]:
+def only_writer_on_windows() -> Iterator[bool]:
     """Wait until no other run writes, and keep others out; the lock ends with the process."""
     import ctypes
 
@@ -49,24 +42,10 @@ def only_writer_on_windows() -> Iterator[None]:
     while kernel.WaitForSingleObject(handle, 100) == _WAITED:
         pass
     try:
-        yield
+        yield True
     finally:
         kernel.ReleaseMutex(handle)
         kernel.CloseHandle(handle)
-
-
-def is_running_on_windows(number: int) -> bool:
-    """Return whether there is a process of this number, which may be somebody else's."""
-    import ctypes
-
-    kernel = _kernel()
-    process = kernel.OpenProcess(_SYNCHRONIZE, False, number)
-    if not process:
-        return bool(ctypes.get_last_error() == _ACCESS_DENIED)  # type: ignore[attr-defined]
-    handle = ctypes.c_void_p(process)
-    running = kernel.WaitForSingleObject(handle, 0) == _WAITED
-    kernel.CloseHandle(handle)
-    return bool(running)
 
 
 def replace_patiently(path: str, target: str) -> None:
@@ -90,14 +69,19 @@ def move_over(path: str, target: str) -> None:
         os.replace(path, target)  # noqa: PTH105 - a Path costs as much as moving
 
 
-def create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
-    """Write a whole file or none; without `open`, which takes as long as the system's calls."""
+def create(path: str, data: bytes, how: int = os.O_TRUNC, *, sync: bool = False) -> None:
+    """Write a whole file or none; without `open`, which takes as long as the system's calls.
+
+    With `sync` it is on the disk then.
+    """
     handle = os.open(path, _WRITING | how, 0o666)
     try:
         try:
             rest = memoryview(data)
             while rest:
                 rest = rest[os.write(handle, rest) :]
+            if sync:
+                os.fsync(handle)
         finally:
             os.close(handle)  # first: Windows removes no file that is open
     except BaseException:
@@ -106,84 +90,76 @@ def create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
         raise
 
 
-if sys.platform != "win32":
+def make_folder(folder: Path, created: list[Path]) -> None:
+    """Make a folder and those above it; add the ones that were not there to `created`."""
+    missing = itertools.takewhile(lambda each: not is_folder(each), (folder, *folder.parents))
+    for path in reversed(list(missing)):
+        path.mkdir(exist_ok=True)
+        created.append(path)
+
+
+#: Whether the system keeps other runs away; `None` outside of `exclusive`.
+_is_locked: ContextVar[bool | None] = ContextVar("_is_locked", default=None)
+
+
+@contextlib.contextmanager
+def exclusive(out: Path) -> Iterator[bool]:
+    """Keep other runs from writing to a folder or beside it; yield whether the system can do so.
+
+    The lock is one on the folder above, so it leaves no file and ends with the process. Windows
+    has one lock for all folders. Some network drives lock nothing.
+    """
+    held = _is_locked.get()
+    if held is not None:
+        yield held
+        return
+    windows = sys.platform == "win32"
+    with only_writer_on_windows() if windows else _locked(out.resolve().parent) as held:
+        token = _is_locked.set(held)
+        try:
+            yield held
+        finally:
+            _is_locked.reset(token)
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[bool]:
+    """Hold the lock on a folder, which is made for that time if it does not exist."""
+    created: list[Path] = []
+    handle = None
+    try:
+        handle = _lock(folder, created)
+        yield handle is not None
+    finally:
+        for path in reversed(created):
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        if handle is not None:
+            os.close(handle)
+
+
+def _lock(folder: Path, created: list[Path]) -> int | None:
+    """Return a handle that locks a folder; `None` if the system cannot."""
     import fcntl
 
-#: Folders that this process has locked, so that it does not wait for itself.
-_locked_folders: set[Path] = set()
-
-
-@contextlib.contextmanager
-def exclusive(folder: Path) -> Iterator[None]:
-    """Wait until no other idlc writes to a folder, and keep others out.
-
-    The lock is the operating system's, on the folder itself, or on the nearest one above until it
-    exists: it leaves no file and ends with the process. Where folders cannot be locked, nothing is
-    locked; Windows has one lock for all folders. A run that holds one folder may only lock others
-    below it.
-    """
-    place = _nearest(folder)
-    if sys.platform == "win32" and not _locked_folders:
-        with only_writer_on_windows(), _holding(place):
-            yield
-        return
-    if sys.platform == "win32" or place in _locked_folders:
-        yield
-        return
-    handle = _lock(place)
-    while (now := _nearest(folder)) != place or not _is(handle, place):
-        _unlock(handle)
-        handle = _lock(place := now)
-    try:
-        with _holding(place):
-            yield
-    finally:
-        _unlock(handle)
-
-
-@contextlib.contextmanager
-def _holding(place: Path) -> Iterator[None]:
-    _locked_folders.add(place)
-    try:
-        yield
-    finally:
-        _locked_folders.discard(place)
-
-
-def _nearest(folder: Path) -> Path:
-    return next((path for path in (folder, *folder.parents) if is_folder(path)), folder)
-
-
-def _lock(place: Path) -> int | None:
-    """Lock a folder, after runs that locked one above it because it did not exist yet."""
-    for above in reversed(place.parents):
-        if above not in _locked_folders:
-            _unlock(_opened(above, fcntl.LOCK_SH))
-    return _opened(place, fcntl.LOCK_EX)
-
-
-def _opened(place: Path, how: int) -> int | None:
-    """Return a handle that locks a folder, `None` if it cannot be opened."""
-    try:
-        handle = os.open(place, os.O_RDONLY)
-    except OSError:
-        return None
-    with contextlib.suppress(OSError):
-        fcntl.flock(handle, how)
-    return handle
-
-
-def _unlock(handle: int | None) -> None:
-    if handle is not None:
+    while True:
+        try:
+            make_folder(folder, created)
+            handle = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:
+            continue  # another run made a folder, and removed it again
+        except OSError:
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            if os.path.samestat(os.fstat(handle), folder.stat()):
+                return handle
+        except FileNotFoundError:
+            pass
+        except OSError:
+            os.close(handle)
+            return None
         os.close(handle)
-
-
-def _is(handle: int | None, place: Path) -> bool:
-    """Return whether a handle still is for the folder of this name, or there is no handle."""
-    try:
-        return handle is None or os.path.samestat(os.fstat(handle), place.stat())
-    except OSError:
-        return False
 
 
 @contextlib.contextmanager
@@ -215,53 +191,3 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
         if pressed:
             signal.raise_signal(signal.SIGINT)
-
-
-def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
-    """Give a file new content; report IDL612 and return `False` if that fails.
-
-    A link stays one, and the file that it leads to is replaced. A file that was changed since it
-    was read is not overwritten.
-    """
-    import shutil
-    import tempfile
-
-    target = path.resolve()
-    try:
-        if target.read_bytes() != old.encode("utf-8"):
-            message = f"`{name}` was changed while idlc was running"
-            report.add(codes.CANNOT_WRITE.of(name, message, hint="run it again"))
-            return False
-        handle, draft = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(new.encode("utf-8"))
-            shutil.copymode(target, draft)
-            move_over(draft, str(target))
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(draft).unlink()
-            raise
-    except OSError as error:
-        report.add(codes.CANNOT_WRITE.of(name, f"cannot write `{name}`: {reason(error)}"))
-        return False
-    return True
-
-
-def edit(
-    edits: Iterable[Edit], root: Root, report: Report, keep_layout: Callable[[str, str, str], str]
-) -> int:
-    """Apply edits to their files; return the number of applied edits.
-
-    `keep_layout` takes a file's name, its old text and its edited text, and returns the new text.
-    """
-    by_path: dict[str, list[Edit]] = {}
-    for edit in edits:
-        by_path.setdefault(edit.span.source.path, []).append(edit)
-    done = 0
-    for name, own in by_path.items():
-        old = own[0].span.source.text
-        text, number = apply(old, own)
-        if rewrite(Path(root.path(name)), name, old, keep_layout(name, old, text), report):
-            done += number
-    return done

@@ -116,12 +116,14 @@ class _Header(msgspec.Struct):
     idlc: str
 
 
+#: How a package has its runtime: as a copy of its own, or from the distribution idlc-runtime.
+Runtime: TypeAlias = Literal["carried", "installed"]
 #: The place of the types of other packages that are used: in the generated package, as whole
 #: packages beside it, or where they are installed.
 Vendoring: TypeAlias = Literal["private", "beside", ""]
 
 
-class Lock(msgspec.Struct, frozen=True, kw_only=True):
+class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The record of one generated package.
 
     `inputs` are the compiled files by name within the package, `dependencies` the other
@@ -131,15 +133,16 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     `converts_values` is set where the classes convert values as in Lyrical.
     """
 
-    format: int = FORMAT
+    format: int
     idlc: str
     package: str
+    runtime: Runtime = "carried"
     vendor_deps: bool = False
     converts_values: bool | msgspec.UnsetType = msgspec.UNSET
     vendored: tuple[str, ...] = ()
     imports: tuple[str, ...] = ()
     inputs: dict[str, str]
-    dependencies: dict[str, str]
+    dependencies: dict[str, str] = {}
     types: dict[str, str]
     outputs: dict[str, str]
 

@@ -16,6 +16,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.project.edits import Edited, Outcome, Refused
 from idlc.project.files import read_bytes
+from idlc.project.lock import Runtime
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
@@ -37,6 +38,7 @@ class GeneratedOutput(msgspec.Struct, frozen=True):
     path: str
     package: str
     inputs: Mapping[str, str]
+    runtime: Runtime = "carried"
 
 
 class Facts(msgspec.Struct, frozen=True):
@@ -68,6 +70,12 @@ class Facts(msgspec.Struct, frozen=True):
     available: frozenset[str] = frozenset()
     files: Mapping[str, str] = {}
     folders: Mapping[str, bool] = {}
+
+    @property
+    def runtime(self) -> Runtime:
+        """How the generated classes have their runtime."""
+        modes = [output.runtime for output in self.outputs if output.package == self.name]
+        return modes[0] if modes else "carried"
 
     def declared(self, *tags: str) -> dict[str, Statement]:
         """Return the statements with one of these tags by their text, the first of each."""

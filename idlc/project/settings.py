@@ -31,7 +31,7 @@ from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, DEFAULT, Distro, split_names, unknown_distro
 from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
-from idlc.project.lock import Vendoring
+from idlc.project.lock import Runtime, Vendoring
 from idlc.project.prefixes import distribution
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
+Mode = Annotated[Runtime | None, Meta(title='"carried" or "installed"')]
 SwitchOrBeside = Annotated[bool | Literal["beside"], Meta(title='true, false or "beside"')]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
@@ -142,6 +143,7 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     exclude: Texts = ()
     out: Text = ""
     package: Text = ""
+    runtime: Mode = None
     vendor_deps: SwitchOrBeside = False
     distro: TextOrTexts = ()
     templates: Text = ""
@@ -162,6 +164,7 @@ class Config(msgspec.Struct, frozen=True):
     package: str | None = None
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
+    runtime: Runtime | None = None
     vendor_deps: bool | Literal["beside"] = False
     distro: tuple[str, ...] = ()
     templates: str | None = None
@@ -246,6 +249,7 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
         package=settings.package or None,
         include=tuple(_typed(folder, path, root) for path in settings.include),
         exclude=settings.exclude,
+        runtime=settings.runtime,
         vendor_deps=settings.vendor_deps,
         distro=_distros(settings.distro, place, report),
         templates=_typed(folder, settings.templates, root) if settings.templates else None,

@@ -1,106 +1,43 @@
-"""Plans for writing files: all or nothing, each file whole at any moment, the lock last.
+"""The writer: every file that idlc writes for users goes through `apply`.
 
-All files are first written into a staging folder, then moved into place one by one. When a move
-fails the earlier ones are undone. When the process is killed the staging folder stays; the next
-run reads from it which files are idlc's own.
+A package's record (`idlc.lock`) is written first, with the old and the new digest of each file,
+and last with the new ones alone. So whatever ends a run, the next one knows idlc's own files.
 """
 
 from __future__ import annotations
 
 import contextlib
 import enum
+import itertools
+import json
 import os
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report
-from idlc.project import lock
-from idlc.project.atomic import create, exclusive, move_over, uninterrupted
-from idlc.project.files import is_folder, reason
-from idlc.project.lock import FILE, Obstacle, Tree, digest, is_same
+from idlc.diagnostics import report as diagnostics
+from idlc.project.atomic import create, exclusive, make_folder, move_over, uninterrupted
+from idlc.project.files import reason
+from idlc.project.lock import FILE, Obstacle, Tree, digest, is_same, may_be_own
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic, Edit, Report
+    from idlc.project.root import Root
 
 #: Files of a package that are the user's where they exist already.
 YIELDING = frozenset({"__init__.py", "py.typed"})
 DIFF_LINES = 40
 #: Refused files that are shown with a diff; the others are only named.
 DIFFS = 10
+#: The folder of drafts, beside the record; where the system has no locks, it is one. Earlier
+#: versions of idlc put the number of their process at its end.
+STAGE = ".idlc-stage-new"
 
-
-class Change(NamedTuple):
-    """One file to create, replace or remove; `path` is relative to the package folder.
-
-    `old` and `new` are its content before and after, `None` where there is no file. A change
-    with `backup` is to a file that is not idlc's own.
-    """
-
-    path: str
-    old: bytes | None
-    new: bytes | None
-    backup: bool = False
-
-
-class Plan(NamedTuple):
-    """Changes in the order in which to make them, and the digests of all files afterwards.
-
-    `record` is the lock's content when the changes were planned, if there was a lock. The lock is
-    in `home`, which is empty or ends with a slash.
-    """
-
-    out: Path
-    changes: tuple[Change, ...]
-    outputs: dict[str, str]
-    record: bytes | None = None
-    home: str = ""
-
-
-def plan(
-    out: Path,
-    name: str,
-    files: Mapping[str, bytes],
-    owned: Mapping[str, frozenset[str]],
-    report: Report,
-    *,
-    force: bool = False,
-    home: str = "",
-) -> Plan | None:
-    """Return the changes after which `out` holds `files`; `None` after a report if it must not.
-
-    `owned` are the files that idlc wrote and the digests that they had. A file that is not owned,
-    or was edited since, is only replaced with `force`. `name` is the name of `out` in messages.
-    Reports IDL613 and IDL614.
-    """
-    tree = Tree(out)
-    record = tree.read(home + FILE)
-    changes: list[Change] = []
-    refused: list[Diagnostic] = []
-    outputs: dict[str, str] = {}
-    stale = {path for path in owned if path not in files and path != home + FILE}
-    renamed = tree.renamed(stale, files)
-    owned = {**owned, **{new: owned[old] | owned.get(new, set()) for old, new in renamed.items()}}
-    for path in (*files, *sorted(stale - renamed.keys())):
-        old, new = tree.read(path), files.get(path)
-        if isinstance(old, Obstacle):
-            refused += [_in_the_way(name, path, old)] if new is not None else []
-            continue
-        ground = _ownership(path, old, owned)
-        if ground is Ownership.USERS:
-            continue
-        if new is not None:
-            outputs[path] = digest(new)
-        if not is_same(old, new):
-            if ground is not Ownership.OWN and not force:
-                diff = _diff(old, new) if len(refused) < DIFFS else ""
-                refused.append(_refusal(f"{name}/{path}", ground, diff, removed=new is None))
-            changes.append(Change(path, old, new, backup=ground is not Ownership.OWN))
-    if isinstance(record, Obstacle):
-        refused.append(_in_the_way(name, home + FILE, record))
-    report.extend(refused)
-    if refused or isinstance(record, Obstacle):
-        return None
-    return Plan(out, tuple(changes), outputs, record, home)
+#: Paths below a folder, each with the digests of a file that idlc wrote there.
+Owned: TypeAlias = Mapping[str, frozenset[str]]
+#: Turns the digests of files into the content of their record.
+Render: TypeAlias = Callable[[dict[str, str]], bytes]
 
 
 class Ownership(enum.Enum):
@@ -112,42 +49,126 @@ class Ownership(enum.Enum):
     USERS = "a file that idlc did not write, and that stays"
 
 
-def _ownership(path: str, old: bytes | None, owned: Mapping[str, frozenset[str]]) -> Ownership:
+class Change(NamedTuple):
+    """One file to create, replace or remove; `path` is relative to the folder of its plan.
+
+    `old` and `new` are its content before and after, `None` where there is no file. A copy is
+    kept of a file that is not idlc's own.
+    """
+
+    path: str
+    old: bytes | None
+    new: bytes | None
+    ownership: Ownership = Ownership.OWN
+
+
+class Plan(NamedTuple):
+    """Changes in the order in which to make them, and the digests of all files afterwards.
+
+    `record` is the path of the record, if there is one, and `recorded` its content before.
+    """
+
+    out: Path
+    changes: tuple[Change, ...]
+    outputs: dict[str, str]
+    record: str = ""
+    recorded: bytes | None = None
+
+
+def compare(
+    out: Path, name: str, files: Mapping[str, bytes], owned: Owned, report: Report
+) -> list[Change]:
+    """Return the changes after which `out` holds `files`, and no other files of `owned`.
+
+    `name` is the name of `out` in messages. Reports IDL614 for what is in the way.
+    """
+    tree = Tree(out)
+    stale = owned.keys() - files.keys()
+    renamed = tree.renamed(stale, files)
+    owned = {**owned, **{new: owned[old] | owned.get(new, set()) for old, new in renamed.items()}}
+    changes = []
+    for path in (*files, *sorted(stale - renamed.keys())):
+        old, new = tree.read(path), files.get(path)
+        if isinstance(old, Obstacle):
+            if new is not None:
+                report.add(_in_the_way(shown(name, path), old))
+        elif not is_same(old, new):
+            changes.append(Change(path, old, new, _ownership(path, old, owned)))
+    return changes
+
+
+def _ownership(path: str, old: bytes | None, owned: Owned) -> Ownership:
     if old is None or digest(old) in owned.get(path, ()):
         return Ownership.OWN
     if path in owned:
-        return Ownership.EDITED
+        # a loss of power leaves files without their content
+        return Ownership.EDITED if old.strip(b"\0") else Ownership.OWN
     return Ownership.USERS if path in YIELDING else Ownership.FOREIGN
 
 
-def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
-    return codes.FOREIGN_FILE.of(
-        f"{name}/{path}",
-        f"cannot write `{name}/{path}`: {obstacle.what}",
-        hint="move it away, or choose another folder with -o",
-    )
+def shown(name: str, path: str) -> str:
+    """Return the name in messages of a file in the folder `name`."""
+    return path if name in ("", ".") else f"{name}/{path}"
 
 
-def _refusal(shown: str, ground: Ownership, diff: str, *, removed: bool) -> Diagnostic:
-    if ground is Ownership.FOREIGN:
-        return codes.FOREIGN_FILE.of(
-            shown,
-            f"`{shown}` is in the way and was not written by idlc",
-            hint="move it away, choose another folder with -o, or run again with --force, "
-            "which keeps a copy",
-            detail=diff,
+def plan(
+    out: Path,
+    name: str,
+    files: Mapping[str, bytes],
+    owned: Owned,
+    report: Report,
+    *,
+    record: str,
+    force: bool | None = None,
+) -> Plan | None:
+    """Return the changes after which `out` holds `files`; `None` after a report if it must not.
+
+    A file that is not owned, or was edited since, is only replaced with `force`; `None` is for
+    commands without such an option. Reports IDL613 and IDL614.
+    """
+    problems = diagnostics.Report()
+    changes = compare(out, name, files, {p: d for p, d in owned.items() if p != record}, problems)
+    recorded = Tree(out).read(record)
+    if isinstance(recorded, Obstacle):
+        problems.add(_in_the_way(shown(name, record), recorded))
+    left_alone = {each.path for each in changes if each.ownership is Ownership.USERS}
+    changes = [each for each in changes if each.path not in left_alone]
+    if not force:
+        refused = [each for each in changes if each.ownership is not Ownership.OWN]
+        problems.extend(
+            _refusal(shown(name, change.path), change, force, in_full=number < DIFFS)
+            for number, change in enumerate(refused)
         )
-    message = "was edited since idlc wrote it" + (", and is to be removed" if removed else "")
-    return codes.EDITED_FILE.of(
-        shown,
-        f"`{shown}` {message}",
-        hint="move the edit out of generated code, or run again with --force, which keeps a copy",
-        detail=diff,
+    report.extend(problems)
+    if problems.had_errors or isinstance(recorded, Obstacle):
+        return None
+    outputs = {path: digest(data) for path, data in files.items() if path not in left_alone}
+    return Plan(out, tuple(changes), outputs, record, recorded)
+
+
+def _in_the_way(shown_path: str, obstacle: Obstacle) -> Diagnostic:
+    return codes.FOREIGN_FILE.of(
+        shown_path,
+        f"cannot write `{shown_path}`: {obstacle.what}",
+        hint="move it away, or write to another folder",
     )
 
 
-def _diff(old: bytes | None, new: bytes | None) -> str:
-    return "\n".join(difference(old or b"", new)) if new is not None else ""
+def _refusal(path: str, change: Change, force: bool | None, *, in_full: bool) -> Diagnostic:
+    diff = ""
+    if in_full and change.new is not None:
+        diff = "\n".join(difference(change.old or b"", change.new))
+    if change.ownership is Ownership.FOREIGN:
+        code, message = codes.FOREIGN_FILE, "is in the way and was not written by idlc"
+        ways = ["move it away", "choose another folder with -o"]
+    else:
+        code, message = codes.EDITED_FILE, "was edited since idlc wrote it"
+        message += ", and is to be removed" if change.new is None else ""
+        ways = ["move the edit out of generated code"]
+    if force is not None:
+        ways.append("run again with --force, which keeps a copy")
+    hint = ", or ".join(filter(None, (", ".join(ways[:-1]), ways[-1])))
+    return code.of(path, f"`{path}` {message}", hint=hint, detail=diff)
 
 
 def difference(old: bytes, new: bytes) -> Iterator[str]:
@@ -166,157 +187,93 @@ def _lines(data: bytes) -> list[str]:
     return data.decode("utf-8", errors="replace").splitlines()
 
 
-def emptied_folders(changes: Iterable[Change]) -> list[str]:
-    """Return the folders of removed files, the deepest first."""
-    folders = {
-        str(folder)
-        for change in changes
-        if change.new is None
-        for folder in PurePosixPath(change.path).parents
-        if folder.parts
-    }
-    return sorted(folders, key=lambda folder: (-folder.count("/"), folder))
+def owned_files(folder: Path, outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
+    """Return the files that a record in `folder` lists, each with the digests that it may have.
+
+    The record of an interrupted run has two for a file.
+    """
+    owned: dict[str, frozenset[str]] = {}
+    for listed in (outputs, *_journals(folder)):
+        for path, digests in listed.items():
+            if may_be_own(path) and isinstance(digests, str):
+                owned[path] = owned.get(path, frozenset()).union(digests.split())
+    return owned
 
 
-STAGE = ".idlc-stage-"
+def _journals(folder: Path) -> Iterator[dict[str, str]]:
+    """Yield what killed runs of idlc 0.1.0 and before wrote beside their drafts."""
+    for stage in _stages(folder):
+        with contextlib.suppress(OSError, ValueError, RecursionError):
+            journal = json.loads((stage / FILE).read_bytes())
+            listed = journal.get("outputs", journal) if isinstance(journal, dict) else {}
+            yield listed if isinstance(listed, dict) else {}
 
 
-def owned_files(out: Path, existing: lock.Lock | None) -> dict[str, frozenset[str]]:
-    """Return the files that idlc wrote below `out`, each with the digests that it may have."""
-    digests = {
-        path: frozenset((value,)) for path, value in (existing.outputs if existing else {}).items()
-    }
-    for journal in journals(out):
-        with contextlib.suppress(ValueError):
-            for path, value in lock.decode(journal).outputs.items():
-                digests[path] = digests.get(path, frozenset()) | {value}
-    return digests
-
-
-def journals(out: Path) -> Iterator[bytes]:
-    """Yield the journals of killed runs, which list the files that they were moving into place."""
-    for stage in _abandoned(out):
-        with contextlib.suppress(OSError):
-            yield (stage / lock.FILE).read_bytes()
-
-
-def _abandoned(out: Path) -> list[Path]:
+def _stages(folder: Path) -> list[Path]:
     try:
-        names = sorted(name for name in os.listdir(out) if name.startswith(STAGE))  # noqa: PTH208
-        return [out / name for name in names if not _in_use(out / name)]
+        names = os.listdir(folder)  # noqa: PTH208 - half of the time
+        return [folder / name for name in names if name.startswith(STAGE.removesuffix("new"))]
     except OSError:
         return []
 
 
-def _in_use(stage: Path) -> bool:
-    """Return whether the process that made a staging folder may still be running."""
-    number = stage.name.removeprefix(STAGE)
-    if not number.isdigit() or int(number) == os.getpid():
-        return False
-    if sys.platform == "win32":
-        from idlc.project import atomic
+def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -> bool:
+    """Make changes, all or none; report IDL612 and return `False` on a failure.
 
-        return atomic.is_running_on_windows(int(number))
-    try:
-        os.kill(int(number), 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
-    """Make the changes and write the lock; report IDL612 and return `False` on a failure.
-
-    After a failure every file is as it was, or the report names the others.
+    After a failure every file is as it was, or the report names the others. `render` makes the
+    content of the record, for a plan that has one.
     """
-    if not plan.changes and plan.record == new_lock:
-        with contextlib.suppress(OSError):  # a package that cannot be written may be right
-            os.utime(plan.out / plan.home / lock.FILE)
-        sweep(plan.out / plan.home)
-        return True
-    change = Change(plan.home + lock.FILE, plan.record, new_lock)
-    whole = plan._replace(changes=(*plan.changes, change))
-    return _carry_out(whole, new_lock, name, report)
-
-
-def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
-    """Make all changes or none; report IDL612 and return `False` on a failure."""
-    out = plan.out
-    with exclusive(out):
-        try:
-            transaction = _Transaction(out, plan.home)
-        except OSError as error:
-            report.add(_failure(name, error))
+    with exclusive(plan.out) as is_locked:
+        tree, changes = Tree(plan.out), []
+        record = [Change(plan.record, plan.recorded, plan.recorded)] if render else []
+        for change in (*plan.changes, *record):
+            now = tree.read(change.path)
+            if now not in (change.old, change.new):
+                path = shown(name, change.path)
+                message = f"`{path}` was changed while idlc was running"
+                report.add(codes.CANNOT_WRITE.of(path, message, hint="run it again"))
+                return False
+            changes += [change] if now != change.new else []
+        home = (plan.out / plan.record).parent if plan.record else plan.out
+        if render:
+            changes = _recorded(changes, plan, render)
+            if not changes:
+                with contextlib.suppress(OSError):  # a package that cannot be written may be right
+                    os.utime(plan.out / plan.record)
+        sweep(home)
+        if not is_locked and os.path.lexists(home / STAGE):
+            path = shown(name, (home / STAGE).relative_to(plan.out).as_posix())
+            message = f"`{path}` is another run's, and this file system locks no folders"
+            hint = "wait for that run, or remove the folder if none is running"
+            report.add(codes.CANNOT_WRITE.of(path, message, hint=hint))
             return False
-        left, changed = _pending(out, plan.changes)
-        if changed is not None:
-            transaction.undo()
-            report.add(_changed_meanwhile(name, changed))
-            return False
-        try:
-            transaction.run(left, journal)
-        except BaseException as error:
-            with uninterrupted():
-                torn = transaction.undo()
-            if not isinstance(error, OSError):
-                raise
-            where = f"{name}/{transaction.current}" if transaction.current else name
-            message = f"cannot write `{where}`: {reason(error)}"
-            report.add(codes.CANNOT_WRITE.of(where, message, hint=_outcome(torn, name)))
-            return False
-        sweep(out / plan.home)
-    return True
+        return not changes or _Transaction(plan, home / STAGE).run(changes, name, report)
 
 
-def _pending(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
-    """Return the changes that no other process has made meanwhile, and the first conflict."""
-    tree = Tree(out)
-    left = []
-    for change in changes:
-        now = tree.read(change.path)
-        if now == change.new:
-            continue
-        if now != change.old:
-            return (), change.path
-        left.append(change)
-    return tuple(left), None
+def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]:
+    """Return changes with those of the record: both digests before the others, one after them."""
+    final = render(plan.outputs)
+    first = final
+    if changes:
+        digests = dict(plan.outputs)
+        for path, old, _, ownership in changes:
+            if old is not None and ownership is Ownership.OWN:
+                digests[path] = f"{digests.get(path, '')} {digest(old)}".lstrip()
+        first = render(digests)
+    records = ((plan.recorded, first), (first, final))
+    before, after = ([Change(plan.record, *each)] if each[0] != each[1] else [] for each in records)
+    return [*before, *changes, *after]
 
 
-def _changed_meanwhile(name: str, path: str) -> Diagnostic:
-    return codes.CANNOT_WRITE.of(
-        f"{name}/{path}",
-        f"`{name}/{path}` was changed while idlc was running",
-        hint=f"nothing in `{name}` was changed by this run; run it again",
-    )
-
-
-def _failure(name: str, error: OSError) -> Diagnostic:
-    return codes.CANNOT_WRITE.of(name, f"cannot write to `{name}`: {reason(error)}")
-
-
-def apply_changes(plan: Plan, name: str, report: Report, journal: bytes = b"") -> bool:
-    """Make changes in a folder that has no lock; report IDL612 and return `False` on a failure."""
-    if not plan.changes:
-        return True
-    return _carry_out(plan, journal, name, report)
-
-
-def _outcome(torn: list[str], name: str) -> str:
-    if not torn:
-        return f"nothing in `{name}` was changed"
-    return "undoing failed as well; these files are new, the others as before: " + ", ".join(torn)
-
-
-def sweep(out: Path) -> None:
-    """Remove the staging folders of killed runs."""
-    for stage in _abandoned(out):
-        _remove(stage)
+def sweep(folder: Path) -> None:
+    """Remove the drafts that killed runs left in a folder, if no other run can be at work."""
+    with exclusive(folder) as is_locked:
+        for stage in _stages(folder) if is_locked else ():
+            _remove(stage)
 
 
 def _remove(stage: Path) -> None:
-    """Remove a staging folder, which holds no folders."""
+    """Remove a folder of drafts, which holds no folders."""
     with contextlib.suppress(OSError):
         for path in stage.iterdir():
             path.chmod(0o600)  # Windows removes no file that is not for writing
@@ -325,108 +282,141 @@ def _remove(stage: Path) -> None:
 
 
 class _Transaction:
-    """Moves staged files into place, and can undo that."""
+    """Moves drafts into place, and can undo that."""
 
-    def __init__(self, out: Path, home: str) -> None:
-        self._out = out
-        self._stage = out / home / f"{STAGE}{os.getpid()}"
+    def __init__(self, plan: Plan, stage: Path) -> None:
+        self._out = plan.out
+        self._record = plan.record
+        self._stage = stage
         self._created: list[Path] = []
-        self._done: list[tuple[str, bytes | None]] = []
-        self._folders: set[str] = set()
-        self.current = ""
-        self._make_folder(out)
+        self._done: list[tuple[str, bytes | None, int]] = []
+        self._current = ""
 
-    def _make_folder(self, folder: Path) -> None:
-        missing = []
-        while not is_folder(folder):
-            missing.append(folder)
-            folder = folder.parent
-        for path in reversed(missing):
-            path.mkdir()
-            self._created.append(path)
+    def run(self, changes: list[Change], name: str, report: Report) -> bool:
+        """Make all changes, in order, or none; report IDL612."""
+        try:
+            self._write_drafts(changes)
+            with uninterrupted():
+                for number, change in enumerate(changes):
+                    self._current = change.path
+                    self._make(change, f"{self._stage}/{number}")
+        except BaseException as error:
+            with uninterrupted():
+                torn = self._undo()
+            if not isinstance(error, OSError):
+                raise
+            where = shown(name, self._current) if self._current else name
+            hint = f"nothing in `{name}` was changed"
+            if torn:
+                hint = "undoing failed as well; these files are new, the others as before: "
+                hint += ", ".join(torn)
+            message = f"cannot write `{where}`: {reason(error)}"
+            report.add(codes.CANNOT_WRITE.of(where, message, hint=hint))
+            return False
+        self._tidy(changes)
+        return True
 
-    def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
-        """Make all changes, in order; raises the first failure."""
-        self._make_folder(self._stage)
-        create(f"{self._stage}/{lock.FILE}", journal)
+    def _write_drafts(self, changes: list[Change]) -> None:
+        make_folder(self._stage.parent, self._created)
+        self._stage.mkdir()
+        self._created.append(self._stage)
         for number, change in enumerate(changes):
             if change.new is not None:
-                self.current = change.path
-                create(f"{self._stage}/{number}", change.new)
-        with uninterrupted():
-            self._move(changes)
-        self.current = ""
-        self._remove_empty(changes)
-        _remove(self._stage)
+                self._current = change.path
+                # only the record must be on the disk when the others move
+                create(f"{self._stage}/{number}", change.new, sync=change.path == self._record)
 
-    def _move(self, changes: tuple[Change, ...]) -> None:
-        for number, change in enumerate(changes):
-            self.current = change.path
-            target = f"{self._out}/{change.path}"
-            if change.backup and change.old is not None:
-                self._keep(change.path, change.old)
-            if change.new is None:
-                Path(target).unlink()
-            else:
-                staged = f"{self._stage}/{number}"
-                if change.old is not None:
-                    Path(staged).chmod(Path(target).stat().st_mode & 0o7777)
-                self._make_parent(change.path)
-                move_over(staged, target)
-            self._done.append((change.path, change.old))
-
-    def _make_parent(self, path: str) -> None:
-        folder = path.rpartition("/")[0]
-        if folder not in self._folders:
-            self._make_folder(self._out / folder)
-            self._folders.add(folder)
+    def _make(self, change: Change, draft: str) -> None:
+        path, old, new, ownership = change
+        target, mode = self._out / path, 0
+        if ownership is not Ownership.OWN and old is not None:
+            self._keep(path, old)
+        if old is not None:
+            mode = target.stat().st_mode & 0o7777
+        if new is None:
+            target.unlink()
+        else:
+            if mode:
+                Path(draft).chmod(mode)
+            make_folder(target.parent, self._created)
+            move_over(draft, str(target))
+        self._done.append((path, old, mode))
 
     def _keep(self, path: str, content: bytes) -> None:
         """Write a copy of a file beside it, under a name that is free."""
-        for suffix in _suffixes():
+        for number in itertools.count():
+            kept = f"{path}.bak{number or ''}"
             with contextlib.suppress(FileExistsError):
-                create(f"{self._out}/{path}{suffix}", content, os.O_EXCL)
-                self._done.append((path + suffix, None))
+                create(f"{self._out}/{kept}", content, os.O_EXCL)
+                self._done.append((kept, None, 0))
                 return
 
-    def _remove_empty(self, changes: tuple[Change, ...]) -> None:
-        for change in changes:
-            if change.new is None:
-                target = self._out / change.path
-                for cached in (target.parent / "__pycache__").glob(f"{target.stem}.*.pyc"):
-                    with contextlib.suppress(OSError):
-                        cached.unlink()
-        for folder in emptied_folders(changes):
-            for path in (self._out / folder / "__pycache__", self._out / folder):
-                with contextlib.suppress(OSError):
-                    path.rmdir()
-
-    def undo(self) -> list[str]:
+    def _undo(self) -> list[str]:
         """Restore all files; return those for which that failed."""
-        torn = []
-        for path, old in reversed(self._done):
-            target = self._out / path
+        torn: list[str] = []
+        for path, old, mode in reversed(self._done):
+            if torn and path == self._record:
+                break  # it goes on to list old files and new ones
+            target, draft = self._out / path, self._stage / "old"
             try:
                 if old is None:
                     target.unlink(missing_ok=True)
-                else:
-                    spare = self._stage / "old"
-                    create(str(spare), old)
-                    target.parent.mkdir(parents=True, exist_ok=True)
-                    move_over(str(spare), str(target))
+                    continue
+                make_folder(self._stage, self._created)
+                make_folder(target.parent, self._created)
+                create(str(draft), old)
+                draft.chmod(mode)
+                move_over(str(draft), str(target))
             except OSError:
                 torn.append(path)
-        if not torn:
-            _remove(self._stage)
+        _remove(self._stage)
         for folder in reversed(self._created):
             with contextlib.suppress(OSError):
                 folder.rmdir()
         return torn
 
+    def _tidy(self, changes: list[Change]) -> None:
+        """Remove drafts, byte code of removed modules, and folders that are empty now."""
+        folders: set[Path] = set()
+        for change in changes:
+            if change.new is None:
+                target = self._out / change.path
+                folders.update(self._out / above for above in PurePosixPath(change.path).parents)
+                for cached in (target.parent / "__pycache__").glob(f"{target.stem}.*.pyc"):
+                    with contextlib.suppress(OSError):
+                        cached.unlink()
+        for folder in sorted(folders - {self._out}, key=lambda each: -len(each.parts)):
+            for path in (folder / "__pycache__", folder):
+                with contextlib.suppress(OSError):
+                    path.rmdir()
+        _remove(self._stage)
 
-def _suffixes() -> Iterator[str]:
-    yield ".bak"
-    number = 1
-    while True:
-        yield f".bak{number}"
-        number += 1
+
+def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
+    """Give a file new content; report IDL612 and return `False` if that fails.
+
+    A link stays one, and the file that it leads to is replaced.
+    """
+    target = path.resolve()
+    change = Change(target.name, old.encode("utf-8"), new.encode("utf-8"))
+    folder = PurePosixPath(name).parent.as_posix()
+    return apply(Plan(target.parent, (change,), {}), folder, report)
+
+
+def edit(
+    edits: Iterable[Edit], root: Root, report: Report, keep_layout: Callable[[str, str, str], str]
+) -> int:
+    """Apply edits to their files; return the number of applied edits.
+
+    `keep_layout` takes a file's name, its old text and its edited text, and returns the new text.
+    """
+    by_path: dict[str, list[Edit]] = {}
+    for edit in edits:
+        by_path.setdefault(edit.span.source.path, []).append(edit)
+    done = 0
+    for name, own in by_path.items():
+        old = own[0].span.source.text
+        text, number = diagnostics.apply(old, own)
+        if rewrite(Path(root.path(name)), name, old, keep_layout(name, old, text), report):
+            done += number
+    return done

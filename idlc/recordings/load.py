@@ -171,14 +171,10 @@ SUPPORT = '''\
 """The runtime of this package, which is that of idlc."""
 
 from idlc.runtime import *
-from idlc.runtime import message
+from idlc.runtime import __getattr__, message
 
 _home = __name__.rpartition(".")[0]
 message.SHOWN[_home] = _home.rpartition(".")[2]
-
-
-def __getattr__(name):
-    return getattr(__import__("idlc.runtime", fromlist=[name]), name)
 '''
 
 
@@ -322,11 +318,11 @@ def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     from idlc.generate.python.imports import Surroundings
     from idlc.generate.python.render import render_package
 
+    runtime = (RenderedFile("_idlc.py", SUPPORT),)
     for package, model in models.items():
-        yield RenderedFile(f"{package}/_idlc.py", SUPPORT)
-        for file in render_package(model, Surroundings(others=f"{parent}.")):
-            if not file.path.startswith("_idlc/"):
-                yield RenderedFile(f"{package}/{file.path}", file.text)
+        surroundings = Surroundings(others=f"{parent}.")
+        for file in render_package(model, surroundings, runtime):
+            yield RenderedFile(f"{package}/{file.path}", file.text)
 
 
 def _key(texts: Iterable[str], *, converts: bool) -> str:

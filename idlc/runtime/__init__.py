@@ -27,10 +27,17 @@ if TYPE_CHECKING:
 
     from typing_extensions import Unpack as Unpack
 
+    from . import arrays as arrays
     from .conversions import *
     from .protocol import *
     from .typeinfo import *
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     _LAZY = {**dict.fromkeys(_HINTS.split(), "conversions"), "type_hash": "typeinfo"}
-    __getattr__, __dir__ = lazily(__name__, _LAZY)
+    _lazy, __dir__ = lazily(__name__, _LAZY)
+
+    def __getattr__(name):
+        """Return what is imported on first use, `arrays` for modules with these names, too."""
+        if name == "arrays":
+            return __import__(f"{__name__}.arrays", fromlist=["Values"])
+        return _lazy(name)

@@ -150,6 +150,10 @@ class importing:
     ) -> None:
         if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
             return
+        if (
+            error.name == "idlc_runtime"
+        ):  # a package says itself that it lacks its runtime
+            return
         package = (error.name or "").partition(".")[0] or "another package"
         raise MissingPackageError(
             f"this message needs {package}, which cannot be imported ({error}). "

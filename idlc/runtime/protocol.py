@@ -15,9 +15,9 @@ from struct import pack
 from types import FunctionType
 
 from . import codec
-from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
+from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, order_of, wide_text
 from .message import Message, OnDemand, Service, define, equal
-from .names import importing, owner_of, public_name, wire_name
+from .names import owner_of, public_name, wire_name
 from .sequences import ListOf, sequence_writer
 
 TYPE_CHECKING = False
@@ -64,16 +64,18 @@ class ActionImpl:
     GoalStatusMessage = OnDemand("protocol", "import_goal_status")
 
 
-def import_cancel_goal(_impl: type) -> Any:
+def import_cancel_goal(impl: type) -> Any:
     """Return the service that cancels goals of any action."""
-    with importing():
-        return __import__("action_msgs.srv", fromlist=["srv"]).CancelGoal
+    from .typeinfo import types_of
+
+    return types_of(impl).find_class("action_msgs/srv/CancelGoal")
 
 
-def import_goal_status(_impl: type) -> Any:
+def import_goal_status(impl: type) -> Any:
     """Return the message in which an action server publishes the states of goals."""
-    with importing():
-        return __import__("action_msgs.msg", fromlist=["msg"]).GoalStatusArray
+    from .typeinfo import types_of
+
+    return types_of(impl).find_class("action_msgs/msg/GoalStatusArray")
 
 
 # the fields of composed messages, as type checkers see them, constructors and docstrings
@@ -380,10 +382,16 @@ def _spell(field: FieldInfo, boolean: str = "bool", listed: str = "{}[<={}]") ->
 
 def field_codecs(kind: type) -> codec.Codecs:
     """Return codecs that read and write a message field by field, as the type data has them."""
-    from .typeinfo import read_carefully, structure_of
+    from functools import cache
+
+    from .typeinfo import CarefulReader, structure_of
 
     owner = owner_of(kind)
     structure = structure_of(owner)
+
+    @cache
+    def maker_of(other: Structure) -> Any:
+        return codec.maker(owner if other is structure else other.find_class())
 
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
         def encode(message: Any, join: Any) -> Any:
@@ -394,7 +402,10 @@ def field_codecs(kind: type) -> codec.Codecs:
         def decode(data: Any) -> Any:
             if not reading.copy:
                 data = memoryview(data)
-            return read_carefully(owner, data, codec.maker, reading)
+            reader = CarefulReader(
+                data, order_of(data), lambda other: maker_of(other)(), reading
+            )
+            return reader.message(structure, "")
 
         return codec.Codec(encode, decode, bulk=True)
 

@@ -15,162 +15,102 @@ from __future__ import annotations
 import ctypes
 import sys
 from array import array
-from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_void_p
+from ctypes import PYFUNCTYPE, c_bool, c_size_t, c_void_p
 from functools import cache
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 
 from . import c, introspection
 from .c import RefusedError
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, functions
 from .introspection import allocator, c_structure, element_type, placed_fields
-from .typeinfo import ARRAY, SCALAR, FieldInfo, Structure
+from .typeinfo import SCALAR, FieldInfo, Structure
 
 _HEADER = 4
 _COUNT = Struct("=I")
-#: The type ids of wide strings.
-_WIDE = (18, 22)
-
-
-class Cursor:
-    """A position in CDR that reading advances, counted from after the header."""
-
-    __slots__ = ("at", "data")
-
-    def __init__(self, body: memoryview) -> None:
-        self.data = body
-        self.at = 0
-
-    def take(self, size: int, align: int) -> memoryview:
-        """Return the next `size` bytes, at a multiple of `align`."""
-        start = self.at + -self.at % align
-        self.at = start + size
-        return self.data[start : self.at]
-
-    def count(self) -> int:
-        """Return the next uint32."""
-        return int(_COUNT.unpack(self.take(4, 4))[0])
-
-
-def _put(out: bytearray, data: bytes | memoryview, align: int) -> None:
-    """Append `data` at a multiple of `align` after the header."""
-    out += bytes(-(len(out) - _HEADER) % align)
-    out += data
 
 
 @cache
 def _runtime() -> tuple[Any, Any, Any]:
     """Return the functions that assign a string, and a wide one, and that give zeroed memory."""
     library = c.load_library("librosidl_runtime_c.so")
-    assign = PYFUNCTYPE(c_bool, c_void_p, c_char_p, c_size_t)
-    assign_wide = PYFUNCTYPE(c_bool, c_void_p, c_void_p, c_size_t)
+    assign = PYFUNCTYPE(c_bool, c_void_p, c_void_p, c_size_t)
     return (
         assign(("rosidl_runtime_c__String__assignn", library)),
-        assign_wide(("rosidl_runtime_c__U16String__assignn", library)),
+        assign(("rosidl_runtime_c__U16String__assignn", library)),
         PYFUNCTYPE(c_void_p, c_size_t, c_size_t, c_void_p)(allocator().zero_allocate),
     )
 
 
-class Run:
+class Run(NamedTuple):
     """Numbers that lie in C as they do in CDR."""
 
-    def __init__(self, offset: int, size: int, align: int) -> None:
-        self.offset, self.size, self.align = offset, size, align
-
-    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
-        start = base + self.offset
-        c.MEMORY[start : start + self.size] = cursor.take(self.size, self.align)
-
-    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
-        start = base + self.offset
-        _put(out, c.MEMORY[start : start + self.size], self.align)
+    offset: int
+    size: int
+    align: int
 
 
-class Text:
+class Text(NamedTuple):
     """A string: data, size and capacity."""
 
-    def __init__(self, offset: int) -> None:
-        self.offset = offset
-
-    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
-        text = bytes(cursor.take(cursor.count(), 1))[:-1]
-        _demand(_runtime()[0](base + self.offset, text, len(text)))
-
-    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
-        data, size = _data_and_size(base + self.offset)
-        _put(out, _COUNT.pack(size + 1), 4)
-        out += c.MEMORY[data : data + size]
-        out += b"\0"
+    offset: int
+    wide: bool
 
 
-class WideText(Text):
-    """A wstring: UTF-16 units, four bytes each in CDR and two in C."""
+class Repeat(NamedTuple):
+    """Elements of `stride` bytes, one after the other."""
 
-    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
-        count = cursor.count()
-        units = array("H", cursor.take(4 * count, 1).cast("I"))
+    offset: int
+    steps: tuple[Step, ...]
+    stride: int
+    number: int | None  #: none of a sequence, which has its own
+    align: int  #: not 0 if elements are nothing but numbers without gaps
+
+
+#: One piece of a structure that lies somewhere else in CDR.
+Step = Run | Text | Repeat
+
+
+class _Reader:
+    """Moves CDR, from after the header on, to C memory that is zero."""
+
+    def __init__(self, body: memoryview) -> None:
+        self.data = body
+        self.at = 0
+
+    def take(self, size: int, align: int) -> memoryview:
+        start = self.at + -self.at % align
+        self.at = start + size
+        return self.data[start : self.at]
+
+    def numbers(self, address: int, size: int, align: int) -> None:
+        c.MEMORY[address : address + size] = self.take(size, align)
+
+    def count(self) -> int:
+        return int(_COUNT.unpack(self.take(4, 4))[0])
+
+    def text(self, address: int) -> None:
+        text = bytes(self.take(self.count(), 1))[:-1]
+        _demand(_runtime()[0](address, text, len(text)))
+
+    def wide_text(self, address: int) -> None:
+        count = self.count()
+        units = array("H", self.take(4 * count, 1).cast("I"))
         units.append(0)  # an empty array has no address
-        _demand(_runtime()[1](base + self.offset, units.buffer_info()[0], count))
+        _demand(_runtime()[1](address, units.buffer_info()[0], count))
 
-    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
-        data, size = _data_and_size(base + self.offset)
-        _put(out, _COUNT.pack(size), 4)
-        units = array("H", c.MEMORY[data : data + 2 * size].tobytes())
-        out += array("I", units).tobytes()
-
-
-class Repeat:
-    """A fixed number of structures or strings, one after the other."""
-
-    def __init__(self, steps: list[Step], offset: int, count: int, stride: int) -> None:
-        self.steps = steps
-        self.starts = range(offset, offset + count * stride, stride)
-
-    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
-        for start in self.starts:
-            for step in self.steps:
-                step.fill(cursor, base + start)
-
-    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
-        for start in self.starts:
-            for step in self.steps:
-                step.drain(base + start, out)
-
-
-class Many:
-    """A sequence; `steps` move one element, which takes `stride` bytes."""
-
-    def __init__(self, steps: list[Step], offset: int, stride: int) -> None:
-        self.steps, self.offset, self.stride = steps, offset, stride
-        only = steps[0] if len(steps) == 1 else None
-        gapless = isinstance(only, Run) and only.size == stride
-        #: Alignment of the numbers, if the elements are nothing but numbers without
-        #: gaps.
-        self.align = only.align if isinstance(only, Run) and gapless else 0
-
-    def content(self, count: int) -> Step:
-        """Return the step that moves `count` elements, from the first one on."""
-        if self.align:
-            return Run(0, count * self.stride, self.align)
-        return Repeat(self.steps, 0, count, self.stride)
-
-    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
-        count = cursor.count()
-        if count:
-            data = allocate(base + self.offset, count, self.stride)
-            self.content(count).fill(cursor, data)
-
-    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
-        data, count = _data_and_size(base + self.offset)
-        _put(out, _COUNT.pack(count), 4)
-        if count:
-            self.content(count).drain(data, out)
-
-
-#: Moves one piece of a structure from CDR to C memory that is zero (`fill`), or back (`drain`);
-#: `base` is the address of the structure.
-Step = Run | Text | Repeat | Many
+    def sequence(self, address: int, stride: int) -> tuple[int, int]:
+        """Allocate the elements, of which no function of rosidl_runtime_c knows all sizes."""
+        count = self.count()
+        if not count:
+            return 0, 0
+        data = _runtime()[2](count, stride, None)
+        _demand(bool(data))
+        word = address >> 3
+        c.WORDS[word] = data
+        c.WORDS[word + 1] = c.WORDS[word + 2] = count
+        return data, count
 
 
 def _demand(done: bool) -> None:
@@ -178,50 +118,78 @@ def _demand(done: bool) -> None:
         raise MemoryError
 
 
+class _Writer:
+    """Moves C memory to CDR, which begins with its header."""
+
+    def __init__(self) -> None:
+        self.out = bytearray(HEADERS[NATIVE])
+
+    def put(self, data: bytes | memoryview, align: int) -> None:
+        self.out += bytes(-(len(self.out) - _HEADER) % align)
+        self.out += data
+
+    def numbers(self, address: int, size: int, align: int) -> None:
+        self.put(c.MEMORY[address : address + size], align)
+
+    def text(self, address: int) -> None:
+        data, size = _data_and_size(address)
+        self.put(_COUNT.pack(size + 1), 4)
+        self.out += c.MEMORY[data : data + size]
+        self.out += b"\0"
+
+    def wide_text(self, address: int) -> None:
+        """Write UTF-16 units, which take four bytes each in CDR and two in C."""
+        data, size = self.sequence(address, 2)
+        units = array("H", c.MEMORY[data : data + 2 * size].tobytes())
+        self.out += array("I", units).tobytes()
+
+    def sequence(self, address: int, _: int) -> tuple[int, int]:
+        data, size = _data_and_size(address)
+        self.put(_COUNT.pack(size), 4)
+        return data, size
+
+
 def _data_and_size(address: int) -> tuple[int, int]:
     """Return the first two members of a string or sequence."""
     return c.WORDS[address >> 3], c.WORDS[(address >> 3) + 1]
 
 
-def allocate(sequence: int, count: int, stride: int) -> int:
-    """Give an empty sequence `count` elements, all zero; return the address of the first.
+def _move(side: _Reader | _Writer, steps: tuple[Step, ...], base: int) -> None:
+    """Move a structure that begins at `base`."""
+    for step in steps:
+        start = base + step.offset
+        if isinstance(step, Run):
+            side.numbers(start, step.size, step.align)
+        elif isinstance(step, Text):
+            (side.wide_text if step.wide else side.text)(start)
+        else:
+            _, inner, stride, number, align = step
+            if number is None:
+                start, number = side.sequence(start, stride)
+            if align and number:
+                side.numbers(start, number * stride, align)
+            else:
+                for address in range(start, start + number * stride, stride):
+                    _move(side, inner, address)
 
-    No function of rosidl_runtime_c does it: each knows one kind of sequence, and there are
-    kinds of different sizes.
-    """
-    data = _runtime()[2](count, stride, None)
-    _demand(bool(data))
-    word = sequence >> 3
-    c.WORDS[word] = data
-    c.WORDS[word + 1] = c.WORDS[word + 2] = count
-    return int(data)
 
-
-def _element_steps(field: FieldInfo) -> list[Step]:
-    """Return the steps of one element that begins at 0."""
-    if field.nested:
-        return list(steps(field.nested))
+def _field_steps(field: FieldInfo, offset: int) -> tuple[Step, ...]:
     kind = element_type(field)
-    if kind is c.String:
-        return [WideText(0) if field.base in _WIDE else Text(0)]
-    return [Run(0, ctypes.sizeof(kind), ctypes.sizeof(kind))]
-
-
-def _moved(step: Step, offset: int) -> Step:
-    """Return a step for a structure that lies `offset` bytes further on."""
-    if isinstance(step, Run):
-        return Run(step.offset + offset, step.size, step.align)
-    return Repeat([step], offset, 1, 1)
-
-
-def _field_steps(field: FieldInfo, offset: int) -> list[Step]:
-    elements = _element_steps(field)
-    stride = ctypes.sizeof(element_type(field))
+    stride = ctypes.sizeof(kind)
+    inner: tuple[Step, ...]
+    if field.nested:
+        inner = steps(field.nested)
+    elif field.text:
+        inner = (Text(0, field.wide),)
+    else:
+        inner = (Run(0, stride, stride),)
     if field.shape == SCALAR:
-        return [_moved(step, offset) for step in elements]
-    if field.shape == ARRAY:
-        return [_moved(Many(elements, 0, stride).content(field.capacity), offset)]
-    return [Many(elements, offset, stride)]
+        return tuple(step._replace(offset=step.offset + offset) for step in inner)
+    first = inner[0]
+    align = first.align if isinstance(first, Run) and first.size == stride else 0
+    if field.size and align:
+        return (Run(offset, field.size * stride, align),)
+    return (Repeat(offset, inner, stride, field.size, align),)
 
 
 @cache
@@ -239,7 +207,7 @@ def steps(structure: Structure) -> tuple[Step, ...]:
                 and step.align <= last.align
                 and last.size % step.align == 0
             ):
-                joined[-1] = Run(last.offset, last.size + step.size, last.align)
+                joined[-1] = last._replace(size=last.size + step.size)
             else:
                 joined.append(step)
     return tuple(joined)
@@ -249,19 +217,19 @@ def _converter(cls: Any, structure: Structure) -> object:
     """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
     _, decode = functions(cls)
-    message_step = Repeat(list(steps(structure)), 0, 1, 1)
+    parts = steps(structure)
 
     def store(address: int, message: Any) -> None:
         try:
             data = encode(message, b"".join)
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        message_step.fill(Cursor(memoryview(data)[_HEADER:]), address)
+        _move(_Reader(memoryview(data)[_HEADER:]), parts, address)
 
     def fetch(address: int) -> Any:
-        data = bytearray(HEADERS[NATIVE])
-        message_step.drain(address, data)
-        return decode(data)
+        side = _Writer()
+        _move(side, parts, address)
+        return decode(side.out)
 
     methods = {
         "__setitem__": staticmethod(store),
@@ -270,8 +238,8 @@ def _converter(cls: Any, structure: Structure) -> object:
     return type("Converter", (), methods)()
 
 
-def message(cls: Any, structure: Structure) -> c.MessageSupport:
-    """Return what rclpy needs to publish and take messages of a class."""
+def message(cls: Any, structure: Structure) -> tuple[int, ...]:
+    """Return the addresses that rclpy reads from a message class, in their order."""
     size = ctypes.sizeof(c_structure(structure))
     content = introspection.content(structure)
     try:
@@ -285,26 +253,12 @@ def message(cls: Any, structure: Structure) -> c.MessageSupport:
             "with colcon"
         ) from error
     names = ("create", "destroy", "convert_from_py", "convert_to_py")
-    return c.MessageSupport(handle, *map(addresses.__getitem__, names))
-
-
-#: `rosidl_typesupport_introspection_c__ServiceMembers`.
-_ServiceMembers = c.structure(
-    "ServiceMembers",
-    namespace=c_char_p,
-    name=c_char_p,
-    request=c_void_p,
-    response=c_void_p,
-    event=c_void_p,
-)
+    return *map(addresses.__getitem__, names), handle
 
 
 def service(name: str, *handles: int) -> tuple[int, int]:
     """Return identifier and data of a service's type support, from its messages' handles."""
-    package, kind, short = name.split("/")
-    members = [
-        c.MessageTypeSupport.from_address(handle).data if handle else None
-        for handle in handles
-    ]
-    data = _ServiceMembers(f"{package}__{kind}".encode(), short.encode(), *members)
-    return introspection.library()[0], c.pointer(data)
+    members = [c.MessageTypeSupport.from_address(handle).data for handle in handles]
+    names = c.namespace_and_name(name, "__")
+    data = c.ServiceMembers(*names, (c_void_p * 3)(*members))
+    return c.identifier(introspection.IDENTIFIER), c.pointer(data)

@@ -178,7 +178,17 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-_types_of = cache(Types)
+_types_in = cache(Types)
+
+
+def types_of(kind: type) -> Types:
+    """Return what the package of a generated class says of types."""
+    home, _, _ = kind.__module__.rsplit(".", 2)
+    try:
+        data = import_module(f"{home}._type_data")
+    except ModuleNotFoundError:
+        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
+    return _types_in(data)
 
 
 def structure_of(kind: type) -> Structure:
@@ -191,12 +201,8 @@ def structure_of(kind: type) -> Structure:
 
 @cache
 def _structure_of(owner: type) -> Structure:
-    home, kind, _ = owner.__module__.rsplit(".", 2)
-    try:
-        data = import_module(f"{home}._type_data")
-    except ModuleNotFoundError:
-        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    types = _types_of(data)
+    types = types_of(owner)
+    kind = owner.__module__.rsplit(".", 2)[1]
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
@@ -272,10 +278,7 @@ def counted(count: int, what: str) -> str:
 
 
 def read_carefully(
-    kind: type,
-    data: Any,
-    maker: Callable[[Any], Callable[[], Any]],
-    reading: Reading = COPYING,
+    kind: type, data: bytes, maker: Callable[[Any], Callable[[], Any]]
 ) -> Any:
     """Return the message in `data`; raise DecodeError naming the field and the byte.
 
@@ -288,7 +291,7 @@ def read_carefully(
         # what a constructor makes may be larger than the buffer
         return maker(kind if other is structure else other.find_class())()
 
-    return CarefulReader(data, order_of(data), make, reading).message(structure, "")
+    return CarefulReader(data, order_of(data), make).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:

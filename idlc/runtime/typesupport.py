@@ -15,8 +15,9 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
+from collections.abc import Callable, Iterable
 from ctypes import PYFUNCTYPE, c_bool, c_void_p, py_object
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.machinery import PathFinder
 from importlib.util import module_from_spec
@@ -41,23 +42,19 @@ _SUPPORT = "_TYPE_SUPPORT"
 #: Packages whose messages rcl, rcl_action and rcl_lifecycle know as C structures.
 _OF_RCL = {"action_msgs", "lifecycle_msgs", "type_description_interfaces"}
 
-#: What rclpy reads from a message's metaclass, and the names in extensions. The type support
+#: What rclpy reads from a class's metaclass, and the names in extensions. The type support
 #: comes last, because its presence says that all is there.
-_MESSAGE = {
-    "_CREATE_ROS_MESSAGE": "create_ros_message_msg",
-    "_DESTROY_ROS_MESSAGE": "destroy_ros_message_msg",
-    "_CONVERT_FROM_PY": "convert_from_py_msg",
-    "_CONVERT_TO_PY": "convert_to_py_msg",
-    _SUPPORT: "type_support_msg",
+_CAPSULES = {
+    c.MessageTypeSupport: {
+        "_CREATE_ROS_MESSAGE": "create_ros_message_msg",
+        "_DESTROY_ROS_MESSAGE": "destroy_ros_message_msg",
+        "_CONVERT_FROM_PY": "convert_from_py_msg",
+        "_CONVERT_TO_PY": "convert_to_py_msg",
+        _SUPPORT: "type_support_msg",
+    },
+    c.ServiceTypeSupport: {_SUPPORT: "type_support_srv"},
+    c.ActionTypeSupport: {_SUPPORT: "type_support_action"},
 }
-_SERVICE = {_SUPPORT: "type_support_srv"}
-_ACTION = {_SUPPORT: "type_support_action"}
-
-
-def _snake(name: str) -> str:
-    """Return rosidl's spelling of a type name in module and symbol names."""
-    name = re.sub("(.)([A-Z][a-z]+)", r"\1_\2", name)
-    return re.sub("([a-z0-9])([A-Z])", r"\1_\2", name).lower()
 
 
 @cache
@@ -87,23 +84,6 @@ def _type_hash(support: object, structure: Any) -> str:
     return f"RIHS{value.version:02d}_{bytes(value.value).hex()}"
 
 
-def _built(
-    cls: type, structure: Structure, names: dict[str, str], support_type: Any
-) -> dict[str, object]:
-    """Return an extension's capsules for a class; none if it is absent or outdated."""
-    package, kind, short = structure.name.split("/")
-    if cls.__module__.partition(".")[0] != package:
-        return {}
-    module = _import(package)
-    ending = f"__{kind}__{_snake(short)}"
-    support = getattr(module, names[_SUPPORT] + ending, None)
-    if not support or _type_hash(support, support_type) != structure.hash:
-        return {}
-    return {
-        attribute: getattr(module, name + ending) for attribute, name in names.items()
-    }
-
-
 # type support
 
 
@@ -113,11 +93,7 @@ def _implementation() -> ModuleType:
     try:
         utilities = import_module("rclpy.utilities")
     except ImportError as error:
-        raise ImportError(
-            "type support needs rclpy: install it (for example `pip install "
-            "ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp`), or source your ROS 2 "
-            "installation first"
-        ) from error
+        raise ImportError(f"type support needs rclpy: {c.ADVICE}") from error
     middleware = utilities.get_rmw_implementation_identifier()
     if middleware in _UNSUPPORTED:
         raise ImportError(
@@ -140,14 +116,27 @@ def _handle(cls: Any) -> int:
     return c.capsule_pointer(getattr(meta, _SUPPORT))
 
 
-def _set_capsules(cls: Any, capsules: dict[str, object]) -> None:
-    for attribute, capsule in capsules.items():
+def _supply(cls: Any, layout: Any, make: Callable[[Structure], Iterable[int]]) -> None:
+    """Give `type(cls)` the capsules of an extension, else of the addresses that `make` returns."""
+    structure, names = structure_of(cls), _CAPSULES[layout]
+    package, kind, short = structure.name.split("/")
+    # rosidl's spelling of a type name in symbols
+    words = re.sub("(?<=.)(?=[A-Z][a-z])|(?<=[a-z0-9])(?=[A-Z])", "_", short)
+    ending = f"__{kind}__{words.lower()}"
+    own = cls.__module__.partition(".")[0] == package
+    extension = _import(package) if own else None
+    support = getattr(extension, names[_SUPPORT] + ending, None)
+    capsules: list[Any]
+    if support and _type_hash(support, layout) == structure.hash:
+        capsules = [getattr(extension, name + ending) for name in names.values()]
+    else:
+        capsules = list(map(c.capsule, make(structure)))
+    for attribute, capsule in zip(names, capsules, strict=True):
         setattr(type(cls), attribute, capsule)
 
 
 @cache
-def _message(cls: Any) -> c.MessageSupport:
-    structure = structure_of(cls)
+def _message(cls: Any, structure: Structure) -> tuple[int, ...]:
     if structure.types.package in _OF_RCL:
         raise ImportError(
             f"ROS reads the memory of {structure.name} itself, and what it was built with is not "
@@ -169,31 +158,27 @@ def import_message(cls: Any) -> None:
     """Give `type(cls)` the capsules that rclpy reads from a message class."""
     if _base() is not None:
         _base().register(cls)
-    built = _built(cls, structure_of(cls), _MESSAGE, c.MessageTypeSupport)
-    if not built:
-        handle, *functions = map(c.capsule, _message(cls))
-        built = dict(zip(_MESSAGE, (*functions, handle), strict=True))
-    _set_capsules(cls, built)
+    _supply(cls, c.MessageTypeSupport, partial(_message, cls))
 
 
 def import_service(cls: Any) -> None:
     """Give `type(cls)`, and those of its messages, the capsules that rclpy reads."""
-    request, response = map(_handle, (cls.Request, cls.Response))
     # ROS 2 Humble knows no events, and has no package that they need
-    happened = _handle(cls.Event) if has_hashes() else 0
-    structure = structure_of(cls)
-    built = _built(cls, structure, _SERVICE, c.ServiceTypeSupport)
-    if not built:
-        handles = (request, response, happened)
+    parts = (cls.Request, cls.Response, *([cls.Event] if has_hashes() else []))
+    handles = [_handle(part) for part in parts]
+
+    def make(structure: Structure) -> tuple[int]:
         support = c.ServiceTypeSupport(
             *_implementation().service(structure.name, *handles),
-            introspection.library()[2],
+            introspection.same_handle("service"),
             *handles,
-            *(_event_functions(cls) if happened else (0, 0)),
-            introspection.about(structure),
+            about=introspection.about(structure),
         )
-        built = {_SUPPORT: c.capsule(c.pointer(support))}
-    _set_capsules(cls, built)
+        if has_hashes():
+            support.event_create, support.event_destroy = _event_functions(cls)
+        return (c.pointer(support),)
+
+    _supply(cls, c.ServiceTypeSupport, make)
 
 
 def import_action(cls: Any) -> None:
@@ -201,45 +186,26 @@ def import_action(cls: Any) -> None:
 
     Goals are identified by GoalInfo, which rclpy converts without asking for its type support.
     """
-    parts = cls.Impl
     _handle(import_module("action_msgs.msg").GoalInfo)
-    handles = [
-        _handle(part)
-        for part in (
-            parts.SendGoalService,
-            parts.GetResultService,
-            parts.CancelGoalService,
-            parts.FeedbackMessage,
-            parts.GoalStatusMessage,
-        )
-    ]
-    structure = structure_of(cls)
-    built = _built(cls, structure, _ACTION, c.ActionTypeSupport)
-    if not built:
-        support = c.ActionTypeSupport(*handles, introspection.about(structure))
-        built = {_SUPPORT: c.capsule(c.pointer(support))}
-    _set_capsules(cls, built)
+    names = (
+        "SendGoalService GetResultService CancelGoalService "
+        "FeedbackMessage GoalStatusMessage"
+    )
+    handles = [_handle(getattr(cls.Impl, name)) for name in names.split()]
+
+    def make(structure: Structure) -> tuple[int]:
+        about = introspection.about(structure)
+        return (c.pointer(c.ActionTypeSupport(*handles, about)),)
+
+    _supply(cls, c.ActionTypeSupport, make)
 
 
 # events of service introspection
 
 
-class _Memory:
-    """The functions of message memory that a class's metaclass has for rclpy."""
-
-    def __init__(self, cls: type) -> None:
-        def function(name: str, *prototype: Any) -> Any:
-            capsule = getattr(type(cls), name)
-            return PYFUNCTYPE(*prototype)(c.capsule_pointer(capsule))
-
-        self.create = function("_CREATE_ROS_MESSAGE", c_void_p)
-        self.destroy = function("_DESTROY_ROS_MESSAGE", None, c_void_p)
-        self.store = function("_CONVERT_FROM_PY", c_bool, py_object, c_void_p)
-        self.fetch = function("_CONVERT_TO_PY", py_object, c_void_p)
-
-    def messages(self, memory: int | None) -> list[object]:
-        """Return the message in some memory, as events hold it; NULL is no message."""
-        return [] if memory is None else [self.fetch(memory)]
+def _function(cls: type, name: str, *prototype: Any) -> Any:
+    """Return a function of message memory that a class's metaclass has for rclpy."""
+    return PYFUNCTYPE(*prototype)(c.capsule_pointer(getattr(type(cls), name)))
 
 
 def _event_functions(cls: Any) -> tuple[int, int]:
@@ -247,31 +213,39 @@ def _event_functions(cls: Any) -> tuple[int, int]:
 
     Both functions are needed as soon as there is a handle: rcl does not check for NULL.
     """
-    requests, responses, events = map(_Memory, (cls.Request, cls.Response, cls.Event))
+    fetchers = [
+        _function(part, "_CONVERT_TO_PY", py_object, c_void_p)
+        for part in (cls.Request, cls.Response)
+    ]
+    allocate = _function(cls.Event, "_CREATE_ROS_MESSAGE", c_void_p)
+    free = _function(cls.Event, "_DESTROY_ROS_MESSAGE", None, c_void_p)
+    store = _function(cls.Event, "_CONVERT_FROM_PY", c_bool, py_object, c_void_p)
 
-    def create(info: Any, _: int, request: int | None, response: int | None) -> int:
+    def create(info: Any, _: int, *parts: int | None) -> int:
         memory = 0
         try:
             event_info = info.contents
-            message = cls.Event(
-                request=requests.messages(request),
-                response=responses.messages(response),
+            # NULL is no message
+            request, response = (
+                [] if part is None else [fetch(part)]
+                for fetch, part in zip(fetchers, parts, strict=True)
             )
+            message = cls.Event(request=request, response=response)
             message.info.event_type = event_info.event_type
             message.info.stamp.sec = event_info.sec
             message.info.stamp.nanosec = event_info.nanosec
             message.info.client_gid = list(event_info.client_gid)
             message.info.sequence_number = event_info.sequence_number
-            memory = int(events.create())
-            events.store(message, memory)
+            memory = int(allocate())
+            store(message, memory)
             return memory
         except BaseException as error:
             failure = error
         try:
             if memory:
-                events.destroy(memory)
+                free(memory)
             if c.interrupted(failure):
-                return create(info, _, request, response)
+                return create(info, _, *parts)
             c.report("a service event was not sent", failure)
         except BaseException:  # noqa: S110
             pass
@@ -279,7 +253,7 @@ def _event_functions(cls: Any) -> tuple[int, int]:
 
     def destroy(memory: int, _: int) -> bool:
         try:
-            events.destroy(memory)
+            free(memory)
         except BaseException as error:
             failure = error
         else:

@@ -13,18 +13,18 @@ from idlc.check.compiler import stage
 from idlc.check.package.facts import home_of
 from idlc.check.package.setup_edits import wrap_lines
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.project.edits import Edited, Outcome
 from idlc.project.files import decode, read_bytes
 from idlc.project.library import Library
-from idlc.project.lock import Obstacle, Tree, is_same
+from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import keep_compiled, verbatim
-from idlc.project.write import Change, Plan, apply_changes, difference
+from idlc.project.write import Plan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, Endpoint, Role
 from idlc.scaffold.templates import BrokenTemplateError, Templates, read
 
@@ -47,7 +47,7 @@ class Project:
 
     def shown(self, path: str) -> str:
         """Return the name of a file in the folder for reports."""
-        return path if self.name in ("", ".") else f"{self.name}/{path}"
+        return shown(self.name, path)
 
     def has(self, path: str) -> bool:
         """Return whether a file or folder of this name exists."""
@@ -77,36 +77,34 @@ class Project:
         folder is written with force. Reports IDL614 and IDL620.
         """
         edited = edited or {}
-        changes: list[Change] = []
-        done: list[FileOutcome] = []
-        refused = False
-        tree = Tree(self.path)
-        for path, text in sorted({**added, **edited}.items()):
-            old, new = tree.read(path), text.encode("utf-8")
-            if path in edited and isinstance(old, bytes) and old.startswith(BOM_UTF8):
-                new = BOM_UTF8 + new
-            if isinstance(old, Obstacle):
-                self._in_the_way(path, old)
-                refused = True
-            elif is_same(old, new):
-                done.append(FileOutcome(path, "unchanged"))
-            elif old is None:
-                changes.append(Change(path, None, new))
-                done.append(FileOutcome(path, "created"))
+        files = {path: text.encode("utf-8") for path, text in sorted({**added, **edited}.items())}
+        tree, owned = Tree(self.path), {}
+        for path in edited:
+            old = tree.read(path)
+            if isinstance(old, bytes):
+                files[path] = BOM_UTF8 * old.startswith(BOM_UTF8) + files[path]
+                owned[path] = frozenset((digest(old),))
+        report = Report()
+        changes = {c.path: c for c in compare(self.path, self.name, files, owned, report)}
+        outcomes = []
+        for path in files:
+            change = changes.get(path)
+            if change is None:
+                outcomes.append(FileOutcome(path, "unchanged"))
+            elif change.old is None:
+                outcomes.append(FileOutcome(path, "created"))
             elif path in edited:
-                changes.append(Change(path, old, new))
-                done.append(FileOutcome(path, "edited"))
-            elif self._force:
-                changes.append(Change(path, old, new, backup=True))
-                done.append(FileOutcome(path, "replaced"))
+                outcomes.append(FileOutcome(path, "edited"))
             else:
-                self._differs(path, old, new)
-                refused = True
-        return None if refused else (Plan(self.path, tuple(changes), {}), done)
+                outcomes.append(FileOutcome(path, "replaced"))
+                if not self._force:
+                    report.add(self._differs(path, change.old, files[path]))
+        self._report.extend(report)
+        return None if report.had_errors else (Plan(self.path, (*changes.values(),), {}), outcomes)
 
     def apply(self, plan: Plan) -> bool:
         """Make planned changes, all or none; report IDL612 and return `False` otherwise."""
-        return apply_changes(plan, self.name, self._report)
+        return apply(plan, self.name, self._report)
 
     def diff(self, plan: Plan) -> Iterator[str]:
         """Yield the lines of a unified diff of planned changes."""
@@ -122,21 +120,13 @@ class Project:
             if not old and not new:
                 yield f"--- {before}\n+++ b/{path}\n"
 
-    def _in_the_way(self, path: str, obstacle: Obstacle) -> None:
+    def _differs(self, path: str, old: bytes, new: bytes) -> Diagnostic:
         shown = self.shown(path)
-        message = f"cannot write `{shown}`: {obstacle.what}"
-        self._report.add(codes.FOREIGN_FILE.of(shown, message, hint="move it away"))
-
-    def _differs(self, path: str, old: bytes, new: bytes) -> None:
-        shown = self.shown(path)
-        self._report.add(
-            codes.EXISTING_FILE.of(
-                shown,
-                f"`{shown}` exists and is not what would be written",
-                hint="keep it and choose another name, or run again with --force, which keeps "
-                "a copy",
-                detail="\n".join(difference(old, new)),
-            )
+        return codes.EXISTING_FILE.of(
+            shown,
+            f"`{shown}` exists and is not what would be written",
+            hint="keep it and choose another name, or run again with --force, which keeps a copy",
+            detail="\n".join(difference(old, new)),
         )
 
 

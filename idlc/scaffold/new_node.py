@@ -168,7 +168,7 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     result = None if edited is None else write(project, entry.added, edited, settings, report)
     if result is None:
         return None
-    missing = not project.has(f"{own}/_idlc")
+    missing = not project.has(f"{own}/_type_data.py")
     used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
     compiled = any(name.package == own for name in used_names)
     after = generation(project, own, settings) if missing and compiled else ()

@@ -45,9 +45,9 @@ _VARIABLES: Mapping[ir.Kind | None, tuple[str, ...]] = {
 class Part(NamedTuple):
     """An endpoint: `word` is for names, `title` for text, `name` the literal of its name in ROS 2.
 
-    `template` has the macros of its role. `sample` has a value for each section of the interface,
-    `log` the replacement field of an f-string that shows it. `patience` is the number of seconds in
-    which two messages come.
+    `template` has the sections of its role. `sample` has values for the sections of the interface
+    that the role spells out, `log` for each the replacement field of an f-string that shows it.
+    `patience` is the number of seconds in which two messages come.
     """
 
     template: str
@@ -148,8 +148,8 @@ def view(planned: Plan) -> NodeView:
 
 def _part(placed: Placed, page: Page) -> Part:
     """Return an endpoint as its node sees it."""
-    sections = _sections(placed)
-    sample = {variable: samples.sample(section, page) for variable, section in sections}
+    sections = dict(_sections(placed))
+    sample = {name: samples.sample(sections[name], page) for name in placed.endpoint.role.samples}
     return _bare_part(placed, page)._replace(sample=sample)
 
 

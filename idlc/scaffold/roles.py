@@ -82,9 +82,10 @@ class Role(NamedTuple):
     """A role: its option, its question in the wizard, and what its template needs around it.
 
     `name` is that of the template and, with dashes, of the option. `kind` is the kind of interface
-    that it speaks, if any. Endpoints of roles of one `family` have different words, because their
-    names in Python are made in the same way. `helpers` are the methods of the node that its own
-    methods call: `pause`, `until`, `retire`.
+    that it speaks, if any, of which the template spells out the sections `samples`. Endpoints of
+    roles of one `family` have different words, because their names in Python are made in the same
+    way. `helpers` are the methods of the node that its own methods call: `pause`, `until`,
+    `retire`.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Role(NamedTuple):
     answer: str
     summary: str
     family: str
+    samples: tuple[str, ...] = ()
     question: Question | None = None
     imports: Imports = NO_IMPORTS
     test_imports: Imports = NO_IMPORTS
@@ -173,6 +175,7 @@ ROLES: tuple[Role, ...] = (
         question=Question("Rate in Hz", "1", separator="@"),
         summary="publishes",
         family="timer",
+        samples=("message",),
     ),
     Role(
         name="subscriber",
@@ -193,6 +196,7 @@ ROLES: tuple[Role, ...] = (
         answer="serve",
         summary="serves",
         family="service",
+        samples=("response",),
     ),
     Role(
         name="client",
@@ -215,6 +219,7 @@ ROLES: tuple[Role, ...] = (
         answer="act",
         summary="works on goals for",
         family="action",
+        samples=("result", "feedback"),
         imports={
             "rclpy.action.server": (
                 "ActionServer",

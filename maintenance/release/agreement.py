@@ -5,19 +5,21 @@ from __future__ import annotations
 import json
 import re
 
-from maintenance.release.project import EXTENSION_FILES, FailedError, Project
+from maintenance.release.project import EXTENSION_FILES, RUNTIME, FailedError, Project
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 
 
 def of_versions(project: Project) -> None:
-    """The changelog begins with the version; the citation and the extension of VS Code have it."""
+    """All that has a version has that of idlc, and the changelog begins with it."""
     version = project.version
     heads = re.findall(r"(?m)^## (\S+) \((.*)\)$", project.text("CHANGELOG.md"))
     if not heads or heads[0][0] != version:
         raise FailedError(f"CHANGELOG.md does not begin with ## {version}")
     if f"\nversion: {version}\n" not in project.text("CITATION.cff"):
         raise FailedError(f"CITATION.cff is not for {version}")
+    if f'\nversion = "{version}"\n' not in project.text(f"{RUNTIME}/pyproject.toml"):
+        raise FailedError(f"{RUNTIME}/pyproject.toml is not for {version}")
     for path in EXTENSION_FILES:
         if json.loads(project.text(path))["version"] != version:
             raise FailedError(f"{path} is not for {version}")

@@ -6,7 +6,7 @@ import json
 import re
 from typing import NamedTuple
 
-from maintenance.release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
+from maintenance.release.project import EXTENSION, EXTENSION_FILES, RUNTIME, FailedError, Project
 
 #: The paragraphs that say what to do as long as there is no repository and no index.
 _UNTIL = re.compile(r"<!-- until idlc is published -->\n.*?<!-- end -->\n\n?", re.DOTALL)
@@ -82,9 +82,12 @@ def publish_at(project: Project, repository: str) -> None:
         raise FailedError(f"pyproject.toml names {project.repository} already")
     edits = _Edits(project, {})
     facts = {"repository": repository, "name": known[1], "version": project.version}
-    mark = "\n[project.optional-dependencies]\n"
-    text = edits.text("pyproject.toml")
-    edits.write("pyproject.toml", text.replace(mark, _URLS.format(**facts) + mark, 1))
+    for path, mark in (
+        ("pyproject.toml", "\n[project.optional-dependencies]\n"),
+        (f"{RUNTIME}/pyproject.toml", "\n[tool.setuptools.packages.find]\n"),
+    ):
+        text = edits.text(path)
+        edits.write(path, text.replace(mark, _URLS.format(**facts) + mark, 1))
     citation = edits.text("CITATION.cff")
     edits.write("CITATION.cff", f"{citation}repository-code: {repository}\n")
     place = {"type": "git", "url": f"{repository}.git", "directory": EXTENSION}
@@ -103,7 +106,7 @@ def publish_at(project: Project, repository: str) -> None:
 def version_is(project: Project, version: str, day: str) -> None:
     """Give the version and its day to everything that names them.
 
-    That is the package, the extension of VS Code, the changelog, documents and the citation.
+    That is both packages, the extension of VS Code, the changelog, documents and the citation.
     """
     if not re.fullmatch(r"\d+\.\d+\.\d+", version):
         raise FailedError(f"{version} is not like 1.2.3")
@@ -114,6 +117,7 @@ def version_is(project: Project, version: str, day: str) -> None:
         ("CHANGELOG.md", rf"## {re.escape(version)} \(.*\)", f"## {version} ({day})", _NO_CHANGES),
         ("idlc/version.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
         ("CITATION.cff", "version: .*", f"version: {version}", _NO_VERSION),
+        (f"{RUNTIME}/pyproject.toml", 'version = ".*"', f'version = "{version}"', _NO_VERSION),
     ):
         edits.substitute(path, f"(?m)^{pattern}$", new, missing.format(path=path, version=version))
     manifest, lock = (json.loads(edits.text(path)) for path in EXTENSION_FILES)

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,12 +18,12 @@ else:
 
 #: What a source distribution holds besides the package.
 BESIDE = ("LICENSE", "README.md", "pyproject.toml")
+#: The folder that describes idlc-runtime.
+RUNTIME = "maintenance/runtime"
 #: The extension of VS Code.
 EXTENSION = "editors/vscode"
 #: Its files that have a version.
 EXTENSION_FILES = (f"{EXTENSION}/package.json", f"{EXTENSION}/package-lock.json")
-#: The package's folders, and what they are called in it.
-PACKAGE = {"idlc": "idlc", "templates": "idlc/templates"}
 
 
 class Project(NamedTuple):
@@ -58,15 +59,18 @@ class Project(NamedTuple):
         listed = self.git(*words).split("\0")
         return sorted(path for path in set(listed) if path and (self.root / path).is_file())
 
-    def sources(self) -> dict[str, str]:
-        """Return the files of the package, by what they are called in it."""
-        found = {}
-        for path in self.files():
-            folder, _, rest = path.partition("/")
+    def sources(self, folders: Mapping[str, str]) -> dict[str, str]:
+        """Return the files in some folders, by what they are called in a package.
+
+        `folders` are those of the repository, and what they are called there.
+        """
+        return {
+            f"{inside}/{path.removeprefix(folder + '/')}": path
+            for path in self.files()
+            for folder, inside in folders.items()
             # ruff.toml tells how this repository is linted
-            if folder in PACKAGE and not path.endswith("/ruff.toml"):
-                found[f"{PACKAGE[folder]}/{rest}"] = path
-        return found
+            if path.startswith(f"{folder}/") and not path.endswith("/ruff.toml")
+        }
 
     def git(self, *words: str) -> str:
         """Return what git prints."""
@@ -77,19 +81,18 @@ class Project(NamedTuple):
         """Return when the last commit was made, which is the time in the archives."""
         return int(self.git("log", "-1", "--format=%ct"))
 
-    def copy(self, folder: Path) -> None:
-        """Copy what a build needs, with the same permissions everywhere and times of its own."""
-        for path in (*BESIDE, *self.sources().values()):
+    def copy(self, files: Mapping[str, str], folder: Path) -> None:
+        """Copy files into a folder, by their paths there, with the same permissions everywhere."""
+        for path, source in files.items():
             target = folder / path
             target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(self.root / path, target)
+            shutil.copyfile(self.root / source, target)
             target.chmod(0o644)
         readme = folder / "README.md"
-        readme.write_text(self.readme(), encoding="utf-8")
+        readme.write_text(self.shown(readme.read_text(encoding="utf-8")), encoding="utf-8")
 
-    def readme(self) -> str:
-        """Return the README as an index shows it, where links to files lead nowhere."""
-        text = self.text("README.md")
+    def shown(self, text: str) -> str:
+        """Return a README as an index shows it, where links to files lead nowhere."""
         if self.repository is None:
             return text
         there = f"{self.repository}/blob/v{self.version}/"

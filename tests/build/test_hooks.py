@@ -19,6 +19,7 @@ from idlc.build import compile_interfaces
 from idlc.cli.main import main
 from idlc.generate.native.layouts import LAYOUTS
 from idlc.project import prefixes
+from idlc.version import RUNTIME
 from tests.support import programs
 from tests.support.programs import ended
 
@@ -272,6 +273,7 @@ TOLD = {
         "Requires-Dist": ["acme-base"],
         "License-Expression": None,
     },
+    "a runtime that is installed": {"Requires-Dist": [RUNTIME, "numpy"]},
     "partly": {
         "Name": ["acme-demo"],
         "Version": ["1.2.3"],
@@ -283,6 +285,9 @@ TOLD = {
 }
 CHANGED = {
     "": {},
+    "a runtime that is installed": {
+        "pyproject.toml": BUILD + '[tool.idlc]\nruntime = "installed"\n'
+    },
     "several licences": added("<license>Apache-2.0 OR Zlib</license>"),
     "loose licences": added("<license>BSD</license>"),
     "people": added(
@@ -321,6 +326,21 @@ def test_metadata_is_what_the_package_declares(case, source, tmp_path):
     with tarfile.open(built(tmp_path, backend.build_sdist)) as sdist:
         (top,) = {member.partition("/")[0] for member in sdist.getnames()}
     assert top == f"{name}-{metadata['Version']}"
+
+
+def test_a_wheel_whose_project_does_not_require_the_runtime_is_reported(source, tmp_path, capsys):
+    settings = BUILD + '[tool.idlc]\nruntime = "installed"\n'
+    project = '[project]\nname = "demo_msgs"\nversion = "1"\ndependencies = [{}]\n'
+    write(source, {"pyproject.toml": settings + project.format('"numpy"')})
+    names, _ = read(built(tmp_path))
+    assert "demo_msgs/_idlc.py" in names
+    assert not [name for name in names if name.startswith("demo_msgs/_idlc/")]
+    said = capsys.readouterr().err
+    assert "IDL459" in said
+    assert f'add "{RUNTIME}" to `dependencies`' in said
+    write(source, {"pyproject.toml": settings + project.format(f'"numpy", "{RUNTIME}"')})
+    built(tmp_path)
+    assert "IDL459" not in capsys.readouterr().err
 
 
 REFUSED = {

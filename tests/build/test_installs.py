@@ -144,3 +144,32 @@ def test_pip_installs_into_a_clean_environment(distributions, source, tmp_path):
     assert (prefix / "share/ament_index/resource_index/packages/demo_msgs").is_file()
     run(*pip, "uninstall", "--yes", "demo-msgs", cwd=tmp_path)
     assert not [path for path in prefix.rglob("*demo_msgs*") if path.is_file()]
+
+
+def test_a_library_that_comes_with_types_is_installed_with_and_without_ros(tmp_path):
+    folder = write(
+        tmp_path / "trackkit",
+        {
+            "pyproject.toml": '[build-system]\nrequires = ["hatchling"]\n'
+            'build-backend = "hatchling.build"\n[project]\nname = "trackkit"\nversion = "1"\n'
+            '[tool.idlc]\npaths = ["interfaces"]\npackage = "track_msgs"\n'
+            'out = "src/trackkit/ros"\nvendor-deps = true\n',
+            "interfaces/msg/Track.msg": "std_msgs/Header header\ngeometry_msgs/Point[] points\n",
+            "src/trackkit/__init__.py": "",
+        },
+    )
+    run(sys.executable, "-m", "idlc", "gen", cwd=folder)
+    prefix = tmp_path / "prefix"
+    run(*PIP, "--prefix", prefix, folder, cwd=tmp_path)
+    code = f"import sys; sys.path.insert(0, {str(site(prefix))!r})\n"
+    code += """
+from trackkit.ros.msg import Track
+from trackkit.ros.vendor.std_msgs.msg import Header
+track = Track(header=Header(frame_id="map"))
+assert Track.deserialize(track.serialize()) == track
+print(Header.__module__)
+"""
+    said = run(sys.executable, "-c", code, cwd=tmp_path)
+    assert said == "std_msgs.msg._header\n"
+    said = run(sys.executable, "-I", "-S", "-c", code, cwd=tmp_path)
+    assert said == "trackkit.ros.vendor.std_msgs.msg._header\n"

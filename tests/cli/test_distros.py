@@ -331,7 +331,7 @@ def test_services_for_humble_which_has_no_events(capsys):
     for words in (["check", "demo"], ["gen", "demo", "-o", "out/demo", "--vendor-deps"]):
         assert main([*words, "--distro", "humble"]) == 0, capsys.readouterr().err
     capsys.readouterr()
-    assert Path("out/service_msgs/msg/_service_event_info.py").is_file()
+    assert Path("out/demo/_vendor/service_msgs/msg/_service_event_info.py").is_file()
     for text in ("---\n", "service_msgs/ServiceEventInfo b\n---\n"):
         write({"demo/srv/S.srv": text, "demo/msg/M.msg": "service_msgs/ServiceEventInfo a\n"})
         found = said(capsys, "check", "demo", "--distro", "humble,jazzy")

@@ -213,7 +213,8 @@ def test_killed_at_any_write(machine, versions):
         machine.reset(versions[0])
         assert machine.run(WORDS, point=point, torn=True)["status"] == -signal.SIGKILL
         for path, data in machine.tree.items():
-            assert data in (old.get(path), new.get(path)), f"{path} at write {point}"
+            known = (old.get(path), new.get(path))
+            assert data in known or path.endswith("idlc.lock"), f"{path} at write {point}"
         assert machine.run(WORDS)["status"] == 0
         assert machine.tree == new
         assert not list((machine.folder / "out").rglob(".idlc-stage-*"))
@@ -231,7 +232,8 @@ def test_a_full_disk_changes_nothing(machine, versions):
             left = machine.tree
             assert left == old or "undoing failed as well" in found["said"]
             for path, data in left.items():
-                assert data in (old.get(path), new.get(path))
+                known = (old.get(path), new.get(path))
+                assert data in known or path.endswith("idlc.lock")
         assert machine.run(WORDS)["status"] == 0
         assert machine.tree == new
     machine.reset(versions[0])

@@ -155,6 +155,10 @@ assert Ask.Event.deserialize(event.serialize()) == event
 assert type(event.info) is vendor.service_msgs.msg.ServiceEventInfo
 answer = Go.Impl.SendGoalService.Response()
 assert type(answer.stamp) is vendor.builtin_interfaces.msg.Time
+assert Go.Impl.CancelGoalService is vendor.action_msgs.srv.CancelGoal
+assert Go.Impl.GoalStatusMessage is vendor.action_msgs.msg.GoalStatusArray
+cancel = Go.Impl.CancelGoalService.Request()
+assert type(cancel).deserialize(cancel.serialize()) == cancel
 """
     assert prints(code, library, only_numpy) == []
 

@@ -15,9 +15,12 @@ import time
 
 import pytest
 
+from idlc.diagnostics.report import Report
+from idlc.project.lock import load_lock
 from tests.support.machine import GEN, another_user, running, tree
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n", "msg/B.msg": "int8 b\n"}
+NEWEST = {"msg/A.msg": "int32 a\n", "msg/C.msg": "A a\n", "srv/Gone.srv": "int8 a\n---\n"}
 NEW = {"msg/A.msg": "int16 a\n", "action/Come.action": "---\n---\n", "msg/B.msg": "int8 b\n"}
 
 
@@ -73,15 +76,44 @@ def test_killed_at_any_write(torn, before, machine, versions):
         machine.reset(start)
         assert machine.run(words, point=point, torn=torn)["status"] == -signal.SIGKILL
         for path, data in (machine.tree if (machine.folder / "out").exists() else {}).items():
-            backup = path.endswith(".bak")
-            assert backup or data in (old.get(path), new.get(path)), f"{path} at write {point}"
-            assert not backup or data in (b"mine\n", b"", b"to")
+            if path.endswith(".bak"):
+                assert data in (b"mine\n", b"", b"to")
+            elif path.endswith("idlc.lock"):
+                assert load_lock(machine.folder / "out/demo", "demo", Report())
+            else:
+                assert data in (old.get(path), new.get(path)), f"{path} at write {point}"
         again = machine.run(words)
         assert again["status"] == 0, f"after write {point}: {again['said']}"
         assert_new(machine, versions)
         if "--force" in words:
             kept = [data for path, data in machine.tree.items() if ".bak" in path]
             assert b"mine\n" in kept, f"the edit is lost after write {point}"
+
+
+@pytest.mark.long
+def test_killed_at_any_write_and_the_interfaces_changed_since(before, machine, versions):
+    """Not even the drafts are there, as after `git clean`; the lock has all that is needed."""
+    words, start = before
+    machine.write(NEWEST)
+    machine.reset(None)
+    assert machine.run()["status"] == 0
+    newest = machine.tree
+    machine.write(NEW)
+    machine.reset(start)
+    points = machine.run(words)["points"]
+    for point in range(1, points + 1, 2 if start else 13):
+        machine.write(NEW)
+        machine.reset(start)
+        assert machine.run(words, point=point, torn=True)["status"] == -signal.SIGKILL
+        for stage in machine.folder.rglob(".idlc-stage-*"):
+            shutil.rmtree(stage)
+        machine.write(NEWEST)
+        again = machine.run(words)
+        assert again["status"] == 0, f"after write {point}: {again['said']}"
+        files = {path: data for path, data in machine.tree.items() if ".bak" not in path}
+        assert files == newest
+        kept = [data for path, data in machine.tree.items() if ".bak" in path]
+        assert b"mine\n" in kept or "--force" not in words
 
 
 OTHERS = [
@@ -112,7 +144,8 @@ def test_every_write_from_some_point_on_fails(number, before, machine, versions)
             assert now == old, f"write {point}"
         elif "undoing failed as well" in found["said"]:
             for path, data in now.items():
-                assert data in (old.get(path), new.get(path)) or ".bak" in path
+                known = (old.get(path), new.get(path))
+                assert data in known or path.endswith("idlc.lock") or ".bak" in path
         else:
             assert "cannot write to `out/demo`" in found["said"]
             assert now == old
@@ -149,7 +182,8 @@ def test_folders_removed_meanwhile(where, machine, versions):
         assert found["status"] in (0, 2), found["said"]
         assert found["status"] == 0 or "IDL612" in found["said"]
         for path, data in (machine.tree if (machine.folder / "out").exists() else {}).items():
-            assert data in (tree(versions[0]).get(path), tree(versions[1]).get(path)), path
+            known = (tree(versions[0]).get(path), tree(versions[1]).get(path))
+            assert data in known or path.endswith("idlc.lock"), path
         machine.write(NEW)
         again = machine.run()
         assert again["status"] == 0, f"{point}: {again['said']}"
@@ -281,13 +315,13 @@ def test_two_runs_at_once(machine, versions, tmp_path):
 
 @pytest.mark.parametrize("options", [[], ["--vendor-deps"], ["--vendor-deps=beside"]])
 def test_a_run_waits_for_one_that_is_making_the_folders(options, tmp_path):
-    """The first made `out` and not yet `out/demo`; the second must see all of it or nothing."""
+    """The first made `out/demo` and nothing in it; the second must see all of it or nothing."""
     slow = (
         "import sys\nfrom pathlib import Path\nfrom idlc.cli.main import main\n"
         "real = Path.mkdir\n"
         "def mkdir(path, *args, **kwargs):\n"
         "    real(path, *args, **kwargs)\n"
-        "    if path.name == 'out':\n"
+        "    if path.name == 'demo':\n"
         "        print('made', flush=True)\n"
         "        sys.stdin.readline()\n"
         "Path.mkdir = mkdir\n"

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import pytest
 
+from idlc.documents.docs import LISTING
 from tests.support.machine import another_user, running, tree
 
 pytestmark = pytest.mark.long
@@ -115,10 +116,12 @@ class Scene:
     def now(self):
         return whole(self.work) if self.work.exists() else {}
 
-    def assert_whole(self, why):
+    def assert_whole(self, why, *, lost=False):
+        """Assert that each file is old or new, or the record of both; and there, unless `lost`."""
         for path, data in self.now.items():
-            assert data in (self.old.get(path), self.new.get(path)), f"{path}: {why}"
-        for path in self.old.keys() & self.new.keys():
+            known = (self.old.get(path), self.new.get(path))
+            assert data in known or path == LISTING, f"{path}: {why}"
+        for path in self.old.keys() & self.new.keys() if not lost else ():
             assert path in self.now, f"{path} is lost: {why}"
 
 
@@ -181,8 +184,7 @@ def test_the_folder_is_removed_meanwhile(scene):
         assert found["status"] in (0, 1, 2), found["said"]
         assert "Traceback" not in found["said"]
         assert "IDL901" not in found["said"]
-        for path, data in scene.now.items():
-            assert data in (scene.old.get(path), scene.new.get(path)), path
+        scene.assert_whole(f"removed at write {point}", lost=True)
 
 
 def test_without_permission(scene):

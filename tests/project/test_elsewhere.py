@@ -23,7 +23,6 @@ from idlc.cli import exit_status
 from idlc.cli.main import main
 from idlc.diagnostics import formats
 from idlc.project import atomic, lock
-from idlc.project import write as transaction
 from tests.support import programs
 from tests.support.files import write
 from tests.support.paths import ROOT
@@ -56,9 +55,8 @@ def test_a_run_waits_for_another_one(tmp_path):
 class Kernel:
     """The functions of Windows that idlc calls, for one process with several threads."""
 
-    def __init__(self, running=()):
+    def __init__(self):
         self.mutex = threading.Lock()
-        self.running = running
         self.calls = []
 
     def __getattr__(self, name):
@@ -72,12 +70,7 @@ class Kernel:
     def on_CreateMutexW(self, *_):  # noqa: N802
         return 1 << 40  # more than an int of C holds
 
-    def on_OpenProcess(self, _, __, number):  # noqa: N802
-        return 77 if number in self.running else None
-
     def on_WaitForSingleObject(self, handle, wait):  # noqa: N802
-        if handle.value == 77:
-            return 258
         assert handle.value == 1 << 40
         return 0 if self.mutex.acquire(timeout=wait / 1000) else 258
 
@@ -93,11 +86,9 @@ def kernel(monkeypatch):
     """A Windows for the writer."""
     if WINDOWS:
         pytest.skip("Windows itself is here, and other tests use it")
-    made = Kernel(running={5})
+    made = Kernel()
     monkeypatch.setattr(ctypes, "WinDLL", lambda *_, **__: made, raising=False)
-    monkeypatch.setattr(ctypes, "get_last_error", lambda: 87, raising=False)
-    for module in (atomic, transaction, atomic):
-        monkeypatch.setattr(module, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr(atomic, "sys", SimpleNamespace(platform="win32"))
     return made
 
 
@@ -119,13 +110,6 @@ def test_the_lock_of_windows(kernel, tmp_path):
     with contextlib.suppress(KeyError), atomic.exclusive(tmp_path):
         raise KeyError
     assert not kernel.mutex.locked()
-
-
-def test_what_a_killed_run_left_is_told_by_its_process(kernel, tmp_path):
-    for number in (5, 6):
-        (tmp_path / f"{transaction.STAGE}{number}").mkdir()
-    transaction.sweep(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == [f"{transaction.STAGE}5"]
 
 
 @pytest.mark.usefixtures("kernel")

@@ -33,13 +33,22 @@ def tree(folder: Path) -> dict[str, str]:
 def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False) -> bool:
     known = load_lock(out, "out", report)
     content = {path: text.encode() for path, text in files.items()}
-    planned = plan(out, "out", content, write.owned_files(out, known), report, force=force)
-    if planned is None:
-        return False
+    owned = write.owned_files(out, known.outputs if known else {})
+    planned = plan(out, "out", content, owned, report, record="idlc.lock", force=force)
+    return planned is not None and write.apply(planned, "out", report, recorded)
+
+
+def recorded(outputs: dict[str, str]) -> bytes:
     record = lock.Lock(
-        idlc="0", package="p", inputs={}, dependencies={}, types={}, outputs=planned.outputs
+        format=lock.FORMAT,
+        idlc="0",
+        package="p",
+        inputs={},
+        dependencies={},
+        types={},
+        outputs=outputs,
     )
-    return write.apply(planned, lock.encode(record), "out", report)
+    return lock.encode(record)
 
 
 def generated(out: Path) -> dict[str, str]:
@@ -128,7 +137,7 @@ def test_a_failed_first_run_leaves_no_folder(tmp_path, monkeypatch):
 
 def test_when_undoing_fails_too_the_report_says_which_files_are_new(out, monkeypatch):
     with monkeypatch.context() as patch:
-        Faulty(patch, "replace", set(range(3, 99)), OSError(errno.EIO, "I/O error"))
+        Faulty(patch, "replace", set(range(4, 99)), OSError(errno.EIO, "I/O error"))
         report = Report()
         assert not put(out, NEW, report)
     (problem,) = report
@@ -149,7 +158,7 @@ def test_killed_at_any_point_each_file_is_whole_and_the_next_run_recovers(
     for point in range(1, 100):
         assert put(out, OLD, Report())
         with monkeypatch.context() as patch:
-            patch.setattr("idlc.project.write._Transaction.undo", lambda _: [])
+            patch.setattr("idlc.project.write._Transaction._undo", lambda _: [])
             fault = Faulty(patch, operation, {point}, Killed())
             with contextlib.suppress(Killed):
                 put(out, NEW, Report())
@@ -172,18 +181,128 @@ def test_an_interrupt_undoes_and_goes_on(out, monkeypatch):
     assert generated(out) == OLD
 
 
-def test_the_lock_is_written_last(out, monkeypatch):
+def test_the_lock_comes_first_with_both_digests_and_last_with_the_new_ones(out, monkeypatch):
     moved = []
     real = os.replace
 
     def replace(path, target):
-        moved.append(Path(target).name)
+        moved.append((Path(target).name, Path(path).read_bytes()))
         return real(path, target)
 
     monkeypatch.setattr(os, "replace", replace)
     assert put(out, NEW, Report())
-    assert moved[-1] == "idlc.lock"
-    assert moved.count("idlc.lock") == 1
+    assert [number for number, (name, _) in enumerate(moved) if name == "idlc.lock"] == [
+        0,
+        len(moved) - 1,
+    ]
+    first, last = (lock.decode(moved[number][1]).outputs for number in (0, -1))
+    old, new = (
+        {path: lock.digest(text.encode()) for path, text in files.items()} for files in (OLD, NEW)
+    )
+    assert last == new
+    assert first == {
+        path: " ".join(filter(None, (new.get(path), old.get(path)))) for path in old | new
+    }
+
+
+def test_the_lock_is_on_the_disk_before_anything_moves(out, monkeypatch):
+    calls = []
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+
+        def call(*words, name=name, real=real):
+            calls.append((name, os.fstat(words[0]).st_ino if name == "fsync" else words[1]))
+            return real(*words)
+
+        monkeypatch.setattr(os, name, call)
+    assert put(out, NEW, Report())
+    kinds = [name for name, _ in calls]
+    assert kinds[:2] == ["fsync", "fsync"]
+    assert "fsync" not in kinds[2:]
+    assert calls[-1] == ("replace", str(out / "idlc.lock"))
+    assert calls[1][1] == (out / "idlc.lock").stat().st_ino
+
+
+@pytest.mark.parametrize("left", ["", "\0\0\0\0"])
+def test_a_file_that_lost_its_content_with_the_power_is_written_again(left, out):
+    for path in NEW:
+        if (out / path).is_file():
+            (out / path).write_text(left, encoding="utf-8")
+    assert put(out, NEW, Report())
+    assert generated(out) == NEW
+
+
+def test_an_edit_after_an_interrupted_run_is_refused(out, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("idlc.project.write._Transaction._undo", lambda _: [])
+        Faulty(patch, "replace", {3}, KeyboardInterrupt())
+        with pytest.raises(KeyboardInterrupt):
+            put(out, NEW, Report())
+    (out / "msg/__init__.py").write_text("mine\n", encoding="utf-8")
+    before, report = tree(out), Report()
+    assert not put(out, NEWER, report)
+    assert codes_of(report) == ["IDL613"]
+    assert tree(out) == before
+
+
+def test_an_edit_that_was_to_be_replaced_by_an_interrupted_run_stays_one(out, monkeypatch):
+    (out / "msg/__init__.py").write_text("mine\n", encoding="utf-8")
+    with monkeypatch.context() as patch:
+        patch.setattr("idlc.project.write._Transaction._undo", lambda _: [])
+        Faulty(patch, "replace", {2}, KeyboardInterrupt())
+        with pytest.raises(KeyboardInterrupt):
+            put(out, NEW, Report(), force=True)
+    report = Report()
+    assert not put(out, NEWER, report)
+    assert codes_of(report) == ["IDL613"]
+
+
+def test_an_undone_file_has_the_mode_that_it_had(out, monkeypatch):
+    (out / "_idlc/a.py").chmod(0o755)
+    with monkeypatch.context() as patch:
+        Faulty(patch, "replace", {3}, OSError(errno.EIO, "I/O error"))
+        assert not put(out, NEW, Report())
+    assert (out / "_idlc/a.py").stat().st_mode & 0o777 == 0o755
+
+
+def test_what_an_older_idlc_left_of_an_interrupted_run_is_understood(out):
+    """It kept the new digests in a folder of its drafts, named by its process."""
+    stage = out / ".idlc-stage-4194305"
+    stage.mkdir()
+    (stage / "0").write_text("2\n", encoding="utf-8")
+    (stage / "idlc.lock").write_bytes(
+        recorded({path: lock.digest(text.encode()) for path, text in NEW.items()})
+    )
+    (out / "msg/__init__.py").write_text(NEW["msg/__init__.py"], encoding="utf-8")
+    assert put(out, NEWER, Report())
+    assert generated(out) == NEWER
+
+
+@pytest.mark.parametrize("journal", ["[" * 100_000, "5", '{"outputs": 5}', '{"outputs": {"a": 5}}'])
+def test_a_damaged_journal_of_an_older_idlc_is_swept(journal, out):
+    stage = out / ".idlc-stage-4194305"
+    stage.mkdir()
+    (stage / "idlc.lock").write_text(journal, encoding="utf-8")
+    assert put(out, NEW, Report())
+    assert generated(out) == NEW
+
+
+def test_where_nothing_can_be_locked_a_run_goes_on_alone(out, monkeypatch):
+    import fcntl
+
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    assert put(out, NEW, Report())
+    assert generated(out) == NEW
+    (out / write.STAGE).mkdir()
+    before, report = tree(out), Report()
+    assert not put(out, OLD, report)
+    (problem,) = report
+    assert problem.code == "IDL612"
+    assert "another run" in problem.message
+    assert (tree(out), (out / write.STAGE).is_dir()) == (before, True)
 
 
 def test_edited_files_are_refused_with_a_difference_and_nothing_is_written(out):

@@ -77,8 +77,8 @@ def test_the_rehearsal_passes_on_what_is_published(published, tools, tmp_path):
     status, said = ended(tools, *words, cwd=published.root, environment=clean_environment())
     assert status == 0, said
     assert "still to do" not in said
-    assert said.count("ok  ") == 9
-    (wheel,) = (tmp_path / "dist").glob("*.whl")
+    assert said.count("ok  ") == 13
+    (wheel,) = (tmp_path / "dist").glob("idlc-*.whl")
     with zipfile.ZipFile(wheel) as inside:
         metadata = inside.read(f"idlc-{HERE.version}.dist-info/METADATA").decode()
     assert f"Project-URL: Repository, {REPOSITORY}\n" in metadata
@@ -208,10 +208,9 @@ def made_by_hand(folder, wheel_files, sdist_files):
 
 
 def test_a_missing_and_a_superfluous_file_are_noticed(tmp_path):
-    sources = HERE.sources()
-    about = [f"idlc-{HERE.version}.dist-info/{name}" for name in archives.ABOUT]
-    wheel = [*sources, *about]
-    sdist = [*sources.values(), *archives.BESIDE, *archives.ADDED]
+    asked = archives.Archives.__new__(archives.Archives)
+    asked.project = HERE
+    wheel, sdist = asked.in_wheel(), asked.in_sdist()
     made_by_hand(tmp_path, wheel, sdist).is_complete()
     lacking = made_by_hand(tmp_path, [one for one in wheel if one != "idlc/py.typed"], sdist)
     with pytest.raises(FailedError, match=r"a.whl lacks idlc/py.typed"):

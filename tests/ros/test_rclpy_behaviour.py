@@ -4,6 +4,7 @@ Each behaviour runs in a process of its own, because it might crash it.
 """
 
 import json
+import os
 import shutil
 import signal
 import sys
@@ -15,6 +16,7 @@ import pytest
 
 from tests.support import generated
 from tests.support.installed import SHARE, generate
+from tests.support.paths import ROOT
 
 QUIET = [
     "nothing_is_loaded_before_rclpy_asks",
@@ -59,6 +61,27 @@ def finish(process):
 @pytest.mark.parametrize("behaviour", QUIET)
 def test_behaviour(behaviour, start):
     assert finish(start(behaviour)) == ("", "")
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory) -> str:
+    """The same packages with `--runtime installed`, and a folder that has the runtime."""
+    folder = tmp_path_factory.mktemp("light")
+    for package in ("std_msgs", "std_srvs"):
+        generate(SHARE / package, folder / package, "--runtime", "installed")
+    return f"{folder}{os.pathsep}{ROOT / 'maintenance/runtime'}"
+
+
+@pytest.mark.parametrize(
+    "behaviour", ["rclpy_accepts_the_classes", "raw_latched_and_waited_for", "many_threads"]
+)
+def test_behaviour_with_an_installed_runtime(behaviour, start, light):
+    assert finish(start(behaviour, path=light)) == ("", "")
+
+
+def test_the_type_description_with_an_installed_runtime(start, light):
+    response = json.loads(finish(start("tells_its_type_description", path=light))[0])
+    assert response["successful"], response
 
 
 @pytest.mark.parametrize(

@@ -396,3 +396,11 @@ def test_what_comes_next_installs_pytest_if_need_be(is_there, package, capsys, m
     assert main(NODE) == 0
     hints = re.findall("next: .* -m (.*)", capsys.readouterr().out)
     assert hints == [*(() if is_there else ["pip install pytest"]), "pytest test/test_talker.py"]
+
+
+def test_only_what_is_spelled_out_is_imported(package):
+    words = ["--subscriber", "geometry_msgs/PoseStamped:pose"]
+    assert main(["scaffold", "node", "listener", *words]) == 0
+    text = (package / "demo/listener.py").read_text()
+    assert "from geometry_msgs.msg import PoseStamped\n" in text
+    assert "Quaternion" not in text

@@ -39,6 +39,7 @@ PERSON = ("--maintainer", "Ada", "--email", "ada@example.com")
 COMMANDS = [
     (".", ("gen", "demo", "-o", "out/demo")),
     (".", ("gen", "more", "-o", "out/more", "--vendor-deps")),
+    (".", ("gen", "demo", "-o", "light/demo", "--runtime", "installed")),
     (".", ("gen", "demo", "--ament", "prefix")),
     (".", ("gen", "bare", "--package", "bare", "--ament", "prefix")),
     (".", ("docs", "demo", "more", "-o", "site")),

@@ -3,8 +3,7 @@
 """The types of my_robot_controller, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"my_robot_controller"'
-    ',"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"my_robot_controller","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"my_robot_controller/action/Countdown":{"type_name":"my_robot_controller/action/Countdown","fields":[{"name":"goal","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Goal"},"default_value":""},{"name":"result","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Result"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Feedback"},"default_value":""},{"name":"send_goal_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_SendGoal"},"default_value":""},{"name":"get_result_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_GetResult"},"default_value":""},{"name":"feedback_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_FeedbackMessage"},"default_value":""}]}'
     ',"my_robot_controller/action/Countdown_Feedback":{"type_name":"my_robot_controller/action/Countdown_Feedback","fields":[{"name":"current_count","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"my_robot_controller/action/Countdown_FeedbackMessage":{"type_name":"my_robot_controller/action/Countdown_FeedbackMessage","fields":[{"name":"goal_id","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"unique_identifier_msgs/msg/UUID"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Feedback"},"default_value":""}]}'
@@ -38,8 +37,7 @@ JSON = (
     ',"my_robot_controller/srv/AddTwoInts_Response":{"type_name":"my_robot_controller/srv/AddTwoInts_Response","fields":[{"name":"sum","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"service_msgs/msg/ServiceEventInfo":{"type_name":"service_msgs/msg/ServiceEventInfo","fields":[{"name":"event_type","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamp","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"client_gid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"sequence_number","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"unique_identifier_msgs/msg/UUID":{"type_name":"unique_identifier_msgs/msg/UUID","fields":[{"name":"uuid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
-    "}"
-    ',"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
+    '},"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
     ',"my_robot_controller/action/Countdown":"RIHS01_f40e5e8fa2b70f70d1acf66772a57cf4f8fff3fd313b36af6dfafa6290dc0625"'
     ',"my_robot_controller/action/Countdown_Feedback":"RIHS01_fc5120d4ca6768946fcb1dfc6e2a3b3945a8982b16ee3fc4648a163150a0b315"'
     ',"my_robot_controller/action/Countdown_FeedbackMessage":"RIHS01_3e28b961f68fc3899717cd935022f2ae9c1fa0b1669dc3b0bbafedca8a249997"'
@@ -73,11 +71,8 @@ JSON = (
     ',"my_robot_controller/srv/AddTwoInts_Response":"RIHS01_22734a4ed94fb105af85715b259693ac3a36d3ff22036dd70a2126412544dc5a"'
     ',"service_msgs/msg/ServiceEventInfo":"RIHS01_41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"'
     ',"unique_identifier_msgs/msg/UUID":"RIHS01_1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437"'
-    "}"
-    ',"sources":{"my_robot_controller/action/Countdown":"int32 target_count  # Where to start counting down\\n---\\nint32 final_count  # The last number reached; 0 unless cancelled\\nbool success\\n---\\nint32 current_count\\n"'
+    '},"sources":{"my_robot_controller/action/Countdown":"int32 target_count  # Where to start counting down\\n---\\nint32 final_count  # The last number reached; 0 unless cancelled\\nbool success\\n---\\nint32 current_count\\n"'
     ',"my_robot_controller/action/ExecuteTask":"string task_name  # The task to execute, e.g. \\"dock\\"\\n---\\nbool success\\n---\\nstring current_status  # What the robot is doing now, for people to read\\n"'
     ',"my_robot_controller/msg/RobotCommand":"# A robot command: how fast to drive and turn until the next one arrives.\\n\\nstring STOP=\\"stop\\"\\nstring MOVE=\\"move\\"\\nstring TURN=\\"turn\\"\\n\\nstring command_type         # What to do: STOP, MOVE or TURN\\nfloat32 linear_velocity_x   # Forward speed, negative to reverse [m/s]\\nfloat32 angular_velocity_z  # Turn rate, counter-clockwise seen from above [rad/s]\\nstring frame_id             # The frame that the velocities are given in\\n"'
-    ',"my_robot_controller/srv/AddTwoInts":"int64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"'
-    "}"
-    "}"
+    ',"my_robot_controller/srv/AddTwoInts":"int64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"}}'
 )

@@ -61,7 +61,7 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         whole=_whole(package, files, scope.exclude),
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
-            GeneratedOutput(root.shown(at), record.package, record.inputs)
+            GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
             for at, record in locks.items()
         ),
         files={

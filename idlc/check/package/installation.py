@@ -14,6 +14,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
 from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
+from idlc.project.lock import Runtime
 from idlc.project.package_xml import Facts
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def check_setup(
     keys: Mapping[str, str],
     folders: Mapping[str, bool],
     others: tuple[Source | None, Source | None] | None = None,
+    runtime: Runtime = "carried",
 ) -> Report:
     """Return the problems that keep a setup.py from installing interfaces and their classes.
 
@@ -66,7 +68,7 @@ def check_setup(
     report.extend(unusable_entry(read, package))
     view = layout(read, *(others or (None, None)), folders)
     if view and (others or "packages" in read.arguments):
-        report.extend(_missing_packages(read, view, package, keys, folders))
+        report.extend(_missing_packages(read, view, package, keys, folders, runtime))
     return report
 
 
@@ -86,7 +88,8 @@ def installed(facts: Facts, model: Model, report: Report) -> None:
         )
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
-        report.extend(check_setup(setup.source, facts.name, keys, facts.folders, others))
+        problems = check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
+        report.extend(problems)
     elif setup is not None and (view := _layout(facts, setup)):
         report.extend(_absent_folders(setup, view, facts.name, (), facts.folders))
 
@@ -166,13 +169,19 @@ def _with_data_files(
 
 
 def _missing_packages(
-    setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
+    setup: Setup,
+    view: Layout,
+    package: str,
+    keys: Iterable[str],
+    folders: Mapping[str, bool],
+    runtime: Runtime,
 ) -> Iterator[Diagnostic]:
     """Yield the problem with generated packages that setuptools leaves out."""
     if view.installed is None or any(root.startswith(f"{package}.") for root in view.roots):
         return
     support = f"{package}._idlc"
-    needed = [package, *(f"{package}.{kind}" for kind in _kinds(keys)), support]
+    needed = [package, *(f"{package}.{kind}" for kind in _kinds(keys))]
+    needed += [support] if runtime == "carried" else []
     existing = view.packages(folders)
     generated = [support]
     if f"{package}._vendor" in existing:

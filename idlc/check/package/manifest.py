@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -15,6 +15,7 @@ from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
 from idlc.model.link import Model, own_sections
 from idlc.project.package_xml import DEPENDENCIES, RANK, Facts
+from idlc.version import RUNTIME
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
 #: Packages that rosidl adds by itself.
@@ -148,8 +149,29 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
         report.add(_with_lines(diagnostic, facts, [line for _, line in missing]))
 
 
+def needs_runtime(facts: Facts) -> bool:
+    """Return whether the classes import idlc-runtime, and no file of the package names it."""
+    files = (facts.setup_py, facts.setup_cfg, facts.pyproject, facts.manifest)
+    return facts.runtime == "installed" and not names_runtime(file.text for file in files if file)
+
+
+def names_runtime(texts: Iterable[str]) -> bool:
+    """Return whether one of some texts, such as requirements, names the distribution."""
+    return any(map(re.compile(r"\bidlc[-_.]runtime\b", re.IGNORECASE).search, texts))
+
+
 def declared_imports(facts: Facts, model: Model, report: Report) -> None:
-    """ROS packages that the nodes import are declared."""
+    """What the nodes and the generated classes import is declared."""
+    if needs_runtime(facts):
+        place = facts.setup_py or facts.pyproject or facts.manifest
+        report.add(
+            codes.UNDECLARED_IMPORT.at(
+                Span(place, 0, 0),
+                f"the classes import `idlc_runtime`, which `{place.path}` does not require",
+                hint=f"add `{RUNTIME}` to "
+                + ("`install_requires`" if place is facts.setup_py else "`dependencies`"),
+            )
+        )
     if not facts.modules:
         return
     from idlc.check.package.setup_py import imported_modules, span_of

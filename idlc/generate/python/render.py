@@ -28,6 +28,8 @@ from idlc.model.describe import IndividualDict
 from idlc.model.names import snake_case
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
+from idlc.runtime import PROTOCOL
+from idlc.version import RUNTIME, __version__
 from idlc.wire import plan
 
 
@@ -151,19 +153,20 @@ def type_data_source(model: link.Model, surroundings: Surroundings = ALONE) -> s
     return f"{head}\nJSON = (\n{lines})\n"
 
 
-def _parts(tables: TypesDict, around: str) -> Iterator[str]:
-    """Yield pieces that joined are the JSON text."""
-    yield f'{{"package":{_json(tables["package"])}'
+def _parts(tables: TypesDict, around: str) -> list[str]:
+    """Return pieces that joined are the JSON text, one for each entry."""
+    parts: list[str] = []
+    mark = f'{{"package":{_json(tables["package"])}'
     if around:
-        yield f',"around":{_json(around)}'
+        mark += f',"around":{_json(around)}'
     for key in ("descriptions", "hashes", "sources"):
-        mark = f',"{key}":{{'
+        mark += f',"{key}":{{'
         entries: dict[str, Any] = tables[key]
         for name, value in entries.items():
-            yield f"{mark}{_json(name)}:{_json(value)}"
+            parts.append(f"{mark}{_json(name)}:{_json(value)}")
             mark = ","
-        yield "}" if entries else mark + "}"
-    yield "}"
+        mark = "}" if entries else f"{mark}}}"
+    return [*parts[:-1], f"{parts[-1]}{mark}}}"]
 
 
 _json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
@@ -184,6 +187,7 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     codecs: tuple[CodecView, ...] = ()
     group: GroupView | None = None
     converts: bool = False
+    has_texts: bool = False
 
 
 class Module(NamedTuple):
@@ -226,6 +230,7 @@ def module_views(
         title=Text(f"The codecs of {interface.name}."),
         runtime=Code(surroundings.runtime),
         codecs=codecs,
+        has_texts=any("*" in line for codec in codecs for line in codec.constants),
     )
     path = f"{interface.name.kind}/{python_names.codec_module(homes.classes)}.py"
     yield Module("codec", path, view)
@@ -289,7 +294,7 @@ def template(name: str) -> jinja2.Template:
 
 
 @cache
-def runtime_files() -> tuple[RenderedFile, ...]:
+def carried_runtime() -> tuple[RenderedFile, ...]:
     """Return the support package, a verbatim copy of idlc.runtime."""
     runtime = PACKAGE / "runtime"
     return tuple(
@@ -298,6 +303,15 @@ def runtime_files() -> tuple[RenderedFile, ...]:
         )
         for path in sorted(runtime.rglob("*.py"))
     )
+
+
+def installed_runtime(package: str) -> tuple[RenderedFile]:
+    """Return the module that takes the runtime from the distribution idlc-runtime."""
+    required, version = Code(RUNTIME), Code(__version__)
+    text = template("message/runtime.py.jinja").render(
+        package=Code(package), required=required, version=version, protocol=PROTOCOL
+    )
+    return (RenderedFile("_idlc.py", text),)
 
 
 def module_files(
@@ -315,10 +329,13 @@ def module_files(
 
 
 def render_package(
-    model: link.Model, surroundings: Surroundings = ALONE
+    model: link.Model,
+    surroundings: Surroundings = ALONE,
+    runtime: Iterable[RenderedFile] | None = None,
 ) -> tuple[RenderedFile, ...]:
     """Return all files of a generated package but its lock, sorted by path.
 
+    `runtime` are the files of its `_idlc`, by default a copy of the runtime.
     The model must be without errors: no `Unknown` type, no missing one.
     """
     files = [
@@ -326,7 +343,7 @@ def render_package(
         # a package without it would lose to any other of its name, wherever that stands on the path
         RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'),
         RenderedFile("py.typed", ""),
-        *runtime_files(),
+        *(carried_runtime() if runtime is None else runtime),
     ]
     return tuple(sorted(files, key=lambda file: file.path))
 

@@ -471,9 +471,10 @@ def says_what_to_do(case):
     elif case == "layout":
         fastrtps._find = lambda *_: None
     elif case == "symbol":
-        fastrtps._VERSIONS = [one._replace(new="no_such_symbol") for one in fastrtps._VERSIONS]
+        for names, (_, *others) in fastrtps._VERSIONS.items():
+            fastrtps._VERSIONS[names] = ("no_such_symbol", *others)
     elif case == "fast cdr":
-        fastrtps._VERSIONS = (fastrtps._VERSIONS[1],)
+        del fastrtps._VERSIONS[next(iter(fastrtps._VERSIONS))]
     elif case == "tables":
         importlib.import_module("std_msgs._idlc.introspection")._TABLES = ((40, 128, 33),)
     elif case == "library":

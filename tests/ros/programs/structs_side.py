@@ -25,10 +25,11 @@ class Memory:
     """The functions of message memory, as rclpy calls them."""
 
     def __init__(self, support):
-        self.create = PYFUNCTYPE(c_void_p)(support.create)
-        self.destroy = PYFUNCTYPE(None, c_void_p)(support.destroy)
-        self.store = PYFUNCTYPE(c_bool, py_object, c_void_p)(support.convert_from_py)
-        self.fetch = PYFUNCTYPE(py_object, c_void_p)(support.convert_to_py)
+        create, destroy, store, fetch, self.handle = support
+        self.create = PYFUNCTYPE(c_void_p)(create)
+        self.destroy = PYFUNCTYPE(None, c_void_p)(destroy)
+        self.store = PYFUNCTYPE(c_bool, py_object, c_void_p)(store)
+        self.fetch = PYFUNCTYPE(py_object, c_void_p)(fetch)
 
 
 def rosidls(name):
@@ -53,13 +54,12 @@ def support_of(name):
 
 def look_at(name, values, official):
     cls = interface_of(name)
-    support = support_of(name)
-    memory = Memory(support)
-    parties = [Walker(support.handle)]
+    memory = Memory(support_of(name))
+    parties = [Walker(memory.handle)]
     makers, takers = [memory.create], [memory.destroy]
     if official:
         theirs = official_handle(name)
-        if table(members_of(support.handle)) != table(members_of(theirs)):
+        if table(members_of(memory.handle)) != table(members_of(theirs)):
             print(f"{name}: other introspection members than rosidl's")
         parties += [Walker(theirs), Official(name)]
         create, destroy = rosidls(name)
@@ -97,9 +97,8 @@ def resident():
 
 def look_at_memory(name, values):
     """Fill, read and drop much memory; only the first rounds may make the process grow."""
-    support = support_of(name)
-    memory = Memory(support)
-    walker = Walker(support.handle)
+    memory = Memory(support_of(name))
+    walker = Walker(memory.handle)
     message = values.build(name, values.invent(name))
     data = methods(message).serialize()[4:]
     sizes = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from .cdr import NATIVE
-from .names import name_of
+from .sequences import NUMBERS, NumberField
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -48,111 +48,46 @@ def converted(dtype: Any, size: int, values: Any) -> Any:
     raise ValueError(f"needs an array of {size} elements, not of shape {result.shape}")
 
 
-INT8 = np.dtype("int8")
-UINT8 = np.dtype("uint8")
-INT16 = np.dtype("int16")
-UINT16 = np.dtype("uint16")
-INT32 = np.dtype("int32")
-UINT32 = np.dtype("uint32")
-INT64 = np.dtype("int64")
-UINT64 = np.dtype("uint64")
-FLOAT32 = np.dtype("float32")
-FLOAT64 = np.dtype("float64")
+_DTYPES = [np.dtype(name.lower()) for name in NUMBERS]
+INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, FLOAT32, FLOAT64 = _DTYPES
 
 zeros = np.zeros
 
 
-class NumberArray(Generic[Element]):
-    """A field that reads as a `numpy.ndarray` and takes any sequence of `size` numbers.
-
-    In the class body it stands for the field; the metaclass puts a property in its place.
-    """
+class NumberArray(NumberField, Generic[Element]):
+    """A field of `size` numbers that reads as a `numpy.ndarray`."""
 
     dtype: Any
 
-    def __init_subclass__(cls, dtype: Any) -> None:
-        cls.dtype = dtype
-
     def __init__(self, size: int) -> None:
-        self.size = size
-
-    def property_of(self, slot: Any) -> property:
-        """Return the property over the slot member `slot`."""
-        dtype, size = self.dtype, self.size
-        name = name_of(slot)
-        store = slot.__set__
-
-        def setter(message: object, values: Any) -> None:
-            try:
-                store(message, converted(dtype, size, values))
-                return
-            except (TypeError, ValueError, OverflowError) as error:
-                failure = error
-            from .checked import refused
-
-            raise refused(name, dtype.name, size, values, failure) from None
-
-        return property(slot.__get__, setter)
+        self.convert = partial(converted, self.dtype, size)
 
     @classmethod
     def of(cls, values: tuple[float, ...]) -> NDArray[Element]:
         """Return what the field holds for some values."""
         return np.array(values, cls.dtype)
 
-    @classmethod
-    def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
-        """Return how pydantic checks and writes an array."""
-        from .conversions import numbers_schema
-
-        kind = float if cls.dtype.kind == "f" else int
-        return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
-
     if TYPE_CHECKING:
 
-        def __get__(
-            self, message: object, owner: type | None = None
-        ) -> NDArray[Element]: ...
+        def __get__(self, message: object, owner: Any = None) -> NDArray[Element]: ...
         def __set__(self, message: object, values: ArrayLike) -> None: ...
 
 
-class Int8Array(NumberArray["np.int8"], dtype=INT8):
-    """An array of int8."""
-
-
-class UInt8Array(NumberArray["np.uint8"], dtype=UINT8):
-    """An array of uint8, or of char."""
-
-
-class Int16Array(NumberArray["np.int16"], dtype=INT16):
-    """An array of int16."""
-
-
-class UInt16Array(NumberArray["np.uint16"], dtype=UINT16):
-    """An array of uint16."""
-
-
-class Int32Array(NumberArray["np.int32"], dtype=INT32):
-    """An array of int32."""
-
-
-class UInt32Array(NumberArray["np.uint32"], dtype=UINT32):
-    """An array of uint32."""
-
-
-class Int64Array(NumberArray["np.int64"], dtype=INT64):
-    """An array of int64."""
-
-
-class UInt64Array(NumberArray["np.uint64"], dtype=UINT64):
-    """An array of uint64."""
-
-
-class Float32Array(NumberArray["np.float32"], dtype=FLOAT32):
-    """An array of float32."""
-
-
-class Float64Array(NumberArray["np.float64"], dtype=FLOAT64):
-    """An array of float64."""
+if TYPE_CHECKING:
+    Int8Array: TypeAlias = NumberArray[np.int8]
+    UInt8Array: TypeAlias = NumberArray[np.uint8]
+    Int16Array: TypeAlias = NumberArray[np.int16]
+    UInt16Array: TypeAlias = NumberArray[np.uint16]
+    Int32Array: TypeAlias = NumberArray[np.int32]
+    UInt32Array: TypeAlias = NumberArray[np.uint32]
+    Int64Array: TypeAlias = NumberArray[np.int64]
+    UInt64Array: TypeAlias = NumberArray[np.uint64]
+    Float32Array: TypeAlias = NumberArray[np.float32]
+    Float64Array: TypeAlias = NumberArray[np.float64]
+else:
+    for (_name, _code), _dtype in zip(NUMBERS.items(), _DTYPES, strict=True):
+        _parts = {"code": _code, "dtype": _dtype}
+        globals()[f"{_name}Array"] = type(f"{_name}Array", (NumberArray,), _parts)
 
 
 def array_writer(order: str, name: str, size: int) -> Callable[[Any], bytes]:

@@ -23,13 +23,13 @@ import operator
 import os
 import struct
 import sys
-from base64 import b64decode
+from base64 import b85decode
 from collections.abc import Callable
 from ctypes import c_char_p, c_int, c_size_t, c_uint8, c_uint64, c_void_p, py_object
+from functools import cache
 from importlib import import_module
 from itertools import accumulate, repeat
-from types import FunctionType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
@@ -59,15 +59,16 @@ Sequence = structure("Sequence", "data", **_SIZES)
 #: A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before.
 FlaggedSequence = structure("FlaggedSequence", "data", **_SIZES, flags=c_uint64)
 
-# `rosidl_runtime_c__type_description__FieldType`, and so on
-FieldType = structure(
-    "FieldType",
+# `rosidl_runtime_c__type_description__Field`, with its FieldType, and so on
+Field = structure(
+    "Field",
+    name=String,
     type_id=c_uint8,
     capacity=c_uint64,
     string_capacity=c_uint64,
     nested_type_name=String,
+    default_value=String,
 )
-Field = structure("Field", name=String, type=FieldType, default_value=String)
 IndividualDescription = structure("Individual", type_name=String, fields=Sequence)
 Description = structure(
     "Description", type_description=IndividualDescription, referenced=Sequence
@@ -92,6 +93,10 @@ ActionTypeSupport = structure(
     "Action",
     "goal_service result_service cancel_service feedback_message status_message",
     about=About,
+)
+#: `service_type_support_callbacks_t`, and `ServiceMembers` of introspection, which has all three.
+ServiceMembers = structure(
+    "ServiceMembers", namespace=c_char_p, name=c_char_p, messages=c_void_p * 3
 )
 #: `rosidl_service_introspection_info_t`.
 EventInfo = structure(
@@ -142,16 +147,32 @@ def resolver(answers: dict[bytes, int]) -> int:
     return address(prototype(operator.getitem))
 
 
+#: What to do where ROS 2 is not found.
+ADVICE = (
+    "install ROS 2's rclpy and a middleware (for example `pip install ros-jazzy-rclpy "
+    "ros-jazzy-rmw-fastrtps-cpp`), or source your ROS 2 installation first"
+)
+
+
 def load_library(name: str) -> ctypes.CDLL:
     """Return a shared library of ROS 2; raises ImportError that says what to do."""
     try:
         return ctypes.CDLL(name)
     except OSError as error:
-        raise ImportError(
-            f"{name} cannot be loaded ({error}): install ROS 2's rclpy and a middleware "
-            "(for example `pip install ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp`), "
-            "or source your ROS 2 installation first"
-        ) from error
+        raise ImportError(f"{name} cannot be loaded ({error}): {ADVICE}") from error
+
+
+@cache
+def identifier(name: str) -> int:
+    """Return the address of a type support's own string: middlewares compare the pointers."""
+    library = load_library(f"lib{name}.so")
+    return c_void_p.in_dll(library, f"{name}__identifier").value or 0
+
+
+def namespace_and_name(type_name: str, separator: str) -> tuple[bytes, bytes]:
+    """Return what C calls a type."""
+    package, kind, short = type_name.encode().split(b"/")
+    return package + separator.encode() + kind, short
 
 
 _new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
@@ -211,19 +232,6 @@ def c_function(name: str) -> int:
     return address(getattr(ctypes.pythonapi, name))
 
 
-class MessageSupport(NamedTuple):
-    """The type support of a message class, and the functions of its memory.
-
-    All are addresses.
-    """
-
-    handle: int
-    create: int
-    destroy: int
-    convert_from_py: int
-    convert_to_py: int
-
-
 # functions in Python
 
 #: Arguments of the interpreter's RESUME instruction.
@@ -235,28 +243,21 @@ def callback(prototype: Any, function: Callable[..., object]) -> int:
     return address(prototype(deaf(function)))
 
 
-def deaf(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function, which begins with `try`, that no signal interrupts before that.
+def deaf(function: Any) -> Callable[..., Any]:
+    """Change a function, which begins with `try`, so that no signal interrupts before that.
 
     Signal handlers run on entry of a Python function, before its first `try`, and what
     they raise would be lost with the result. The interpreter does not look for signals
     where a function resumes inside a `yield from`, so the function is made to look like one.
     (Python 3.10 has no such instruction; it does not look before a leading `try` either.)
     """
-    assert isinstance(function, FunctionType)
-    code = function.__code__
-    raw = bytearray(code.co_code)
+    raw = bytearray(function.__code__.co_code)
     resume = opcode.opmap.get("RESUME")
     at = next((at for at in range(0, len(raw), 2) if raw[at] == resume), None)
     if at is not None and raw[at + 1] == _AT_START:
         raw[at + 1] = _IN_YIELD_FROM
-    return FunctionType(
-        code.replace(co_code=bytes(raw)),
-        function.__globals__,
-        function.__name__,
-        function.__defaults__,
-        function.__closure__,
-    )
+    function.__code__ = function.__code__.replace(co_code=bytes(raw))
+    return function  # type: ignore[no-any-return]
 
 
 def interrupted(error: BaseException) -> bool:
@@ -336,51 +337,48 @@ FUNCTIONS = {
     "structs": "empty create destroy convert_from_py convert_to_py "
     "finish resize length in_sequence in_array",
 }
-#: Their code by processor, in base 64, with spaces between them. A test assembles the text
+#: Their code by processor, in base 85, with spaces between them. A test assembles the text
 #: that is named and compares.
 CODE = {
     ("fastrtps", "x86_64"): (  # machine_code_fastrtps_x86_64.s
-        "8w8e+lNVQVRBVUiD7BgxwEiLHdEBAABIixwfSIXbdGRIAx3RAQAATIsrSIPDCEiLLaMBAABIAfVM"
-        "i2UASIsVnQEAAEiLFBZMKeJMOepyKk2F7XQcTInnSIszSItTCEkB1Ekp1f8VTgEAAEiDwxDr30yJ"
-        "ZQC4AQAAAEiDxBhBXUFcXVvDSIsVdQEAAEiLFBdIhdJ05UiLHW0BAABMiywaSYPtBEgDFU4BAABI"
-        "g8IESIkUJEyJbCQISInj6W////+Q 8w8e+lNIifNIiwUJAQAASIsEB0iD6ARIizUCAQAASIs0N0g"
-        "pxkiJx/8V0gAAAEiFwHQaSAMd9gAAAEiLO0iJA/8VwgAAALgBAAAAW8P/Fb0AAAAxwFvDkA== 8w"
-        "8e+kiLBcUAAABIiwQHSIXAdAtIAwXFAAAASIsAw0iLBcIAAABIiwQHSIXAdA9IixW6AAAASIsEEE"
-        "iD6ATDkA== 8w8e+sYHADHAw2YPH0QAAA== 8w8e+kiLFZ0AAABIiwJIhcB0IUiJ8USKAEQ6AXUQ"
-        "SP/ASP/BRYTAde1Ii0IIw0iDwhDr18MPHwA= 8w8e+kiLPW0AAAD/JW8AAAAPH4AAAAAA"
+        "^A8^SQ&mA!K~+eD>=-e?NQ)iO0RR9<iyR+Fh1+ywNCO?w0RR9@iz`Tj!w5)=Eu#Sd07wD#Op9dzNQ)"
+        "Jn0RR9<ixd`2DdJ2y>T)Vgh3#}4Oo``6i!(@zQwT``)JZAT{}oOF002mX!w~D=Oo?RxxB&nF07!$x7"
+        "(rb@TwPnkNQ)J90RR9<ixd|~h0=88NQ)h90RR9@i!2&RgY5)J0~JmI002mX!URZ(6eLWEY$OOsiR0;"
+        "S|NsAx ^A8^SQ%H&PNQ(st0RR9<iv$NqgXjcEi!}lP002mfG&e{o#z=|B{}s{z002mZz;qf&10D7N0"
+        "02mfJ4lHG{}sXj006iF00016!~Ye%0000nz+1zR ^A8^SNQ(u<0000;iv$Nqg}`(RNCO4M0000;ivY"
+        "t&iv_{}002mf1P4fkz;q8tixs*6002mf1Q1Ar=mf)% ^A8^S#s>f~z{6$_A4C8E ^A8^SNQ)Jn0000"
+        ";ivmc6z;q!<iSa~=07N<gbr4AZz)1hWMTEe0?MRD42*XH&!Vv4%!w(+- ^A8^SNQ*sf00030C2s%#0"
+        "1qF400000"
     ),
     ("fastrtps", "aarch64"): (  # machine_code_fastrtps_aarch64.s
-        "XyQD1f17vKnzUwGp9VsCqf0DAJFzDwBYE2hz+HMDALSCDwBYcwICi3aGQPgAAIBSFA4AWJQCAYuV"
-        "AkD54g0AWCJoYvhCABXLXwAW62MBAFQWAQC04AMVqmEKwai1AgKL1gICy3ALAFgAAj/W+f//F5UC"
-        "APkgAIBS81NBqfVbQqn9e8SowANf1oIMAFgCaGL4AACAUiL//7RDDABYVmhj+NYSANFjCwBYQgAD"
-        "i0IQAJHzwwCRYloAqd3//xcfIAPV XyQD1f17vqnzCwD5/QMAkfMDAariCABYAmhi+EIQANHBCAB"
-        "YAWhh+CEAAsvgAwKqUAcAWAACP9ZAAQC0YggAWHMCAothAkD5YAIA+eADAaqQBgBYAAI/1iAAgFI"
-        "EAAAUUAYAWAACP9YAAIBS8wtA+f17wqjAA1/W XyQD1SEGAFgBaGH4gQAAtEAGAFggaGD4wANf1i"
-        "EGAFgAaGH4gAAAtAEGAFgAaGH4ABAA0cADX9Y= XyQD1R8AADkAAIDSwANf1g== XyQD1SIFAFhD"
-        "AED5YwEAtOQDAaplFEA4hhRAOL8ABmuBAABUhf//NUAEQPnAA1/WQkAAkfX//xcAAIDSwANf1g=="
-        " XyQD1WADAFiQAwBYAAIf1g=="
+        "UnB$7{d>Hr^HTw-^;-g|{R04za}NMm6KHeza{~ahf)4;#a{>a3c7{Os004ke6b=AblmY>Zl>$Kd;tc"
+        ">;B4}dxLI4%ZUjP>CV*vnE76AaX-~$z^VG6;hwE_Z*)&c^{a0>uf00KYO`TzeHl>z|yAOL_;^HV{o^"
+        ";<%z{d>fyzyn{_f(!sy0%&6R004keBLDxiLks{|R%m1R))D~GV+#OSLI4AcLJ$Cv^TPm<Vp;&H-T(g"
+        "=A0PwO UnB$7{d>Nt^9um^{R04z^8*2@;s^j(0%&6RLJ$Da!3Y3Y0cc_PApio)-~$4xPzL~500KYOK"
+        "mh=>Vh8|Oa{>a3VFEz;U;+U7-~$1wkOlx)00KYOAOL_;1ONaOPzC^400KYO004ke^9w-v{d>Zwzyn{"
+        "_ UnB$7AqD_g0cc_PfdBxsKn4I<AZTFtzyn{_AqD_g0BB+OfB*or0R{kA0BB+O01yDtzyn{_ UnB$7"
+        "9{>P3004l}zyn{_ UnB$7A_V|gLjXYeV*voP<O2b!WfVX-h7>?JzW@enfdBwhh5!FGKm<Vfzyn{_LO"
+        "=kK_5c4D004l}zyn{_ UnB$7U;_YHkOKf%00JM@"
     ),
     ("structs", "x86_64"): (  # machine_code_structs_x86_64.s
-        "U1VBVEFVQVZBV0iD7AhJifxIix5IjW4ISIXbdGZMi20ATQHlTYnvTIt1CE2F9nUITYt9AE2LdRBI"
-        "g30YAHQaTYX2dBVMif9Ii3UY6LD///9MA30QSf/O6+ZIg30IAHUaSYt9ADH2/xVsAQAAMcBJiUUA"
-        "SYlFCEmJRRBIg8UgSP/L65VIg8QIQV9BXkFdQVxdW8NmDx9EAAA= 8w8e+r8BAAAASIs1YAEAADH"
-        "S/yUgAQAA 8w8e+lNIiftIizU5AQAA6Dz///9Iid9bMfb/JQgBAAA= 8w8e+lNVSIPsCEiJ+0iJ9"
-        "UiJ90iLNQ4BAADoEf///0iLPfoAAABIie5Iidr/Fd4AAACFwA+UwEiDxAhdW8NmkA== 8w8e+kiJ"
-        "/kiLPdIAAAD/JcQAAAAPH0AA 8w8e+kiLNcUAAADpyP7//w== 8w8e+lNVSIPsCEiJ+0iJ9UiLNb"
-        "EAAADorP7//7gBAAAASIXtdCdIie9IizWgAAAAMdL/FWAAAABIhcB0EEiJA0iJawhIiWsQuAEAAA"
-        "BIg8QIXVvDDx9AAA== 8w8e+kiLRwjDDx+AAAAAAA== 8w8e+kiLBV0AAABID6/GSAMHww8fRAAA"
-        " 8w8e+kiLBUUAAABID6/GSAH4ww8fRAAA"
+        "Q&mA!K~+IkL03qF><CGT{78!)NR4g?NQK*UW=xB108IhqO^NSJi**Q1h4ys_O^ba1O^bC9NP~SC0CX"
+        "Bnh4yq6Oo{(Ui**?2u>b%6OapxoN&n94=17Bm2mo~&NsD~|G4}rzYykiOF~CWQMF2^OMF>fWMG#1X#"
+        "UM!k%j=a$gTx3yUqN0$T|r!3Tf=4#A4C8E ^A8^SzX1RM07#29U;zLCG1C7fAOQdX ^A8^SQ%H&XNQ"
+        "*T&0RRB#JpcdyNQvKDG4}r@2mt^9 ^A8^SQ&mWV><CDS`$&oPNQw7Ii!}}b008I_|Ns9;i#_@P002m"
+        "d?nsH+{}tW<004!+50t=2gTx43Tf=6M ^A8^SNQwSPi#^f+0093b!~g&Q4<A4P ^A8^SNQ*Va0002#"
+        "$o~KT ^A8^SQ&mWV><CDS`$&oPNQ*VG0002!tp5N1xB&nF07!-HbSFrO??{U^pa1{>G1C7PU;qFBNQ"
+        "J<35J-swNQr9*NQr9@xB&nF07!$x2whvl4<A4P ^A8^SNQ*}Z!w(;T00000 ^A8^SNQ(ts0000;53j"
+        "~Z0|&zoA4C8E ^A8^SNQ(tU0000;53j~Z0r<lYA4C8E"
     ),
     ("structs", "aarch64"): (  # machine_code_structs_aarch64.s
-        "/Xu8qfNTAan1WwKp92MDqf0DAJHzAwCqNIRA+PUDAaq0AwC0tgJA+dYCE4v3AxaquAZA+XgAALXX"
-        "AkD52ApA+aEOQPkhAQC0GAEAtOADF6qhDkD56///l6AKQPn3AgCLGAcA0fn//xegBkD54AAAtcAC"
-        "QPkBAIDSkAsAWAACP9bffgCp3woA+bWCAJGUBgDR5P//F/NTQan1W0Kp92NDqf17xKjAA1/W XyQ"
-        "D1SAAgNJBCwBYAgCA0lAJAFgAAh/W XyQD1f17vqn9AwCR4AsA+cEJAFjL//+X4AtA+f17wqgBAI"
-        "DSMAgAWAACH9YfIAPV XyQD1f17vqn9AwCR4AcBqeADAaohCABYvv//l+IHQamABwBY8AYAWAACP"
-        "9YfAABx4BefGv17wqjAA1/WHyAD1Q== XyQD1eEDAKpABgBY8AUAWAACH9YfIAPV XyQD1eEFAFi"
-        "s//8XHyAD1Q== XyQD1f17vqn9AwCR4AcBqUEFAFil//+X4A9A+SABALQBBQBYAgCA0hADAFgAAj"
-        "/WoAAAtOELQakgCACpIggA+SAAgFL9e8KowANf1h8gA9U= XyQD1QAEQPnAA1/WHyAD1Q== XyQD"
-        "1eICAFgAAED5IAACm8ADX9YfIAPV XyQD1SICAFggAAKbwANf1g=="
+        "{d>Hr^HTw-^;-g|_hSR8{R04z^8)~?G=xC-^#cK_v;zRNwgN!;)&diY_X8HHxCTJ^cmM#k*8)KK*a|"
+        "@Tp$<U#Aproi7y$sZ-~$(`p$<U#>;M0kpb9|w_W}Tm7zY5+`TzeHpawws-~a%%zyd(|0RVu~kP84<0"
+        "0KYO-+ln8-wFWvwSoYVlm-CN<p2K{^HV{o^;<%z_hUn;{d>fyzyn{_ UnB$7AOL{UK??v_0sw&0Pze"
+        "B700JM@ UnB$7{d>Nt{R04z;0plx!3h9Z%m4qE;0r+c{d>Zw0RVu~FbDux00JM@A0PwO UnB$7{d>N"
+        "t{R04z;0FPz-~$1wAqW6izW@K1;s-&gfCm6r@CE=_00KYO9{>Px;1{17{d>Zwzyn{_A0PwO UnB$7;"
+        "R67wKn4I<@C5)^00JM@A0PwO UnB$7;ROI#tpEQPA0PwO UnB$7{d>Nt{R04z;0FPzK?ML<rT_nz;1"
+        "59gAOQfh0R;e90sw&05CZ^M00KYOpa1~0;R`{jAP4}dA_xHaAOL_;{d>Zwzyn{_A0PwO UnB$700cn"
+        "!zyn{_A0PwO UnB$7;sO9z002PwAOHfJzyn{_A0PwO UnB$7A_4$dAOHfJzyn{_"
     ),
 }
 
@@ -405,7 +403,7 @@ def machine_code(kind: str, words: dict[str, int]) -> dict[str, int]:
 
 def linked(kind: str, machine: str) -> tuple[bytes, dict[str, int]]:
     """Return all code for a processor, and the offset of each function in it."""
-    parts = [b64decode(code) for code in CODE[kind, machine].split()]
+    parts = [b85decode(code) for code in CODE[kind, machine].split()]
     offsets = accumulate(map(len, parts), initial=0)
     names = FUNCTIONS[kind].split()
     return b"".join(parts), dict(zip(names, offsets, strict=False))
@@ -419,16 +417,13 @@ def _executable(code: bytes) -> int:
     library = ctypes.CDLL(None, use_errno=True)
     library.mmap.restype = ctypes.c_ssize_t
     library.mmap.argtypes = (c_void_p, c_size_t, c_int, c_int, c_int, ctypes.c_ssize_t)
+    permissions = (_READ_AND_EXECUTE, _MAP_PRIVATE)
     try:
-        file = os.memfd_create("idlc")
+        with os.fdopen(os.memfd_create("idlc"), "wb", 0) as file:
+            file.write(code)
+            start = library.mmap(None, len(code), *permissions, file.fileno(), 0)
+        if start == -1:
+            raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
     except (AttributeError, OSError) as error:
         raise RefusedError(f"this system does not allow it ({error})") from error
-    try:
-        os.write(file, code)
-        start = library.mmap(None, len(code), _READ_AND_EXECUTE, _MAP_PRIVATE, file, 0)
-    finally:
-        os.close(file)
-    if start == -1:
-        reason = os.strerror(ctypes.get_errno())
-        raise RefusedError(f"this system does not allow it ({reason})")
     return int(start)

@@ -19,7 +19,7 @@ from .names import DecodeError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
     from typing import Any, TypeAlias, TypeVar
 
     BySize: TypeAlias = dict[int, Callable[..., bytes]]
@@ -52,33 +52,25 @@ def layout(
 
     It ends with the padding that a following value of `align` bytes needs.
     """
-    parts = [order]
-    at = start
-    for count, code in _tokens(fields):
+    parts, at, count = [order], start, ""
+    for code in fields:
+        if code.isdigit():
+            count += code
+            continue
         if code == "*":
-            code, size, padding = f"{text}sx", text + 1, 0
+            part, size, padding = f"{text}sx", text + 1, 0
         elif code in "sx":
-            code, size, padding = count + code, int(count or 1), 0
+            part, size, padding = count + code, int(count or 1), 0
         else:
             unit = calcsize("<" + code)
             padding = (4 - at) % unit
             size = unit * int(count or 1)
-            code = f"{size}s" if count else code
-        parts.append("x" * padding + code)
+            part = f"{size}s" if count else code
+        parts.append("x" * padding + part)
         at += padding + size
+        count = ""
     parts.append("x" * ((4 - at) % align))
     return Struct("".join(parts))
-
-
-def _tokens(fields: str) -> Iterator[tuple[str, str]]:
-    """Yield the count, perhaps empty, and the character of each part of a layout."""
-    count = ""
-    for character in fields:
-        if character.isdigit():
-            count += character
-        else:
-            yield count, character
-            count = ""
 
 
 def phases(order: str, fields: str, align: int = 1) -> tuple[Struct, ...]:
@@ -279,9 +271,8 @@ def counter(order: str, size: int | None, bound: int | None) -> Callable[[int], 
 
 def wide_text(order: str) -> Callable[[str], bytes]:
     """Return a function that writes a wstring's UTF-16 units, four bytes each."""
-    utf16, utf32 = (
-        ("utf-16-le", "utf-32-le") if order == "<" else ("utf-16-be", "utf-32-be")
-    )
+    end = "le" if order == "<" else "be"
+    utf16, utf32 = f"utf-16-{end}", f"utf-32-{end}"
     gap = b"\x00\x00"
 
     def write(value: str) -> bytes:

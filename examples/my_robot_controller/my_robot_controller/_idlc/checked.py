@@ -24,9 +24,6 @@ from .names import (
     owner_of,
 )
 from .typeinfo import (
-    ARRAY,
-    PRIMITIVES,
-    SEQUENCE,
     FieldInfo,
     Primitive,
     Structure,
@@ -97,22 +94,19 @@ def validate_element(
     path = path or field.public
     if field.nested:
         _message(value, field.nested, path, wire_only)
-    elif field.text:
-        _text(value, field, path, wire_only)
-    else:
-        assert field.primitive is not None
+    elif field.primitive is not None:
         _primitive(value, field.primitive, path)
-
-
-def _text(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
-    if not isinstance(value, str):
+    elif not isinstance(value, str):
         raise ValidationError(path, "a str", value)
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise ValidationError(path, "a str without lone surrogates", value) from None
-    if not wire_only and field.text_bound is not None and len(value) > field.text_bound:
-        _too_many(path, "character", len(value), field.text_bound, value)
+    else:
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            allowed = "a str without lone surrogates"
+            raise ValidationError(path, allowed, value) from None
+        bound = None if wire_only else field.text_bound
+        if bound is not None and len(value) > bound:
+            _too_many(path, "character", len(value), bound, value)
 
 
 def _too_many(path: str, what: str, count: int, bound: int, value: object) -> None:
@@ -122,65 +116,47 @@ def _too_many(path: str, what: str, count: int, bound: int, value: object) -> No
 
 def _primitive(value: Any, primitive: Primitive, path: str) -> None:
     if primitive.code == "?":
-        number = isinstance(value, (int, float)) and value in (0, 1)
-        if not number and type(value).__name__ not in {"bool_", "bool"}:
-            raise ValidationError(path, primitive.allowed, value)
+        right = isinstance(value, (int, float)) and value in (0, 1)
+        right = right or type(value).__name__ in {"bool_", "bool"}
     elif primitive.code == "c":
-        if not isinstance(value, bytes) or len(value) != 1:
-            raise ValidationError(path, primitive.allowed, value)
-    elif primitive.code in "fd":
-        _float(value, primitive, path)
+        right = isinstance(value, bytes) and len(value) == 1
     else:
-        _integer(value, primitive, path)
-
-
-def _integer(value: Any, primitive: Primitive, path: str) -> None:
-    try:
-        number = value.__index__()
-    except (AttributeError, TypeError):
-        raise ValidationError(path, primitive.allowed, value) from None
-    assert primitive.low is not None
-    assert primitive.high is not None
-    if not primitive.low <= number <= primitive.high:
+        right = _is_in_range(value, primitive, path)
+    if not right:
         raise ValidationError(path, primitive.allowed, value)
 
 
-def _float(value: Any, primitive: Primitive, path: str) -> None:
-    try:
-        number = float(value) if not isinstance(value, (str, bytes)) else None
-    except (TypeError, ValueError, OverflowError):
-        number = None
-    if number is None:
-        raise ValidationError(path, f"a number ({primitive.name})", value)
-    if primitive.high is None or not math.isfinite(number):
-        return
-    if abs(number) > primitive.high:
-        raise ValidationError(path, primitive.allowed, value)
+def _is_in_range(value: Any, primitive: Primitive, path: str) -> bool:
+    if primitive.code not in "fd":
+        try:
+            number = value.__index__()
+        except (AttributeError, TypeError):
+            return False
+    else:
+        try:
+            number = float("" if isinstance(value, (str, bytes)) else value)
+        except (TypeError, ValueError, OverflowError):
+            allowed = f"a number ({primitive.name})"
+            raise ValidationError(path, allowed, value) from None
+        if not math.isfinite(number):
+            return True
+    return primitive.high is None or bool(primitive.low <= number <= primitive.high)
 
 
-def refused(
-    name: str, kind: str, size: int | None, values: Any, error: Exception
-) -> ValidationError:
+def refused(message: Any, name: str, values: Any, error: Exception) -> ValidationError:
     """Return the error for values that a field of numbers does not take.
 
-    `kind` is the name of their type, or its code in `struct`. `error` is what Python or
-    numpy said, and one of its kind is returned: rosidl's classes raise that.
+    `error` is what Python or numpy said, and one of its kind is returned: rosidl's classes
+    raise that.
     """
-    base, primitive = next(
-        (base, candidate)
-        for base, candidate in PRIMITIVES.items()
-        if kind in (candidate.code, candidate.name)
-    )
-    shape = 48 * (SEQUENCE if size is None else ARRAY)
-    type_ = {"type_id": base + shape, "capacity": size, "string_capacity": 0}
-    field = FieldInfo({"name": name, "default_value": "", "type": type_}, None)
-    failure = ValidationError(
-        name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
-    )
-    if isinstance(values, (bytes, bytearray)) and size is None:
-        problem = (
-            f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
-        )
+    fields = structure_of(type(message)).fields
+    field = next(field for field in fields if field.public == name)
+    assert field.primitive is not None
+    kind = field.primitive.name
+    failure = ValidationError(name, f"numbers ({kind})", values, f"{error} ({kind})")
+    if isinstance(values, (bytes, bytearray)) and field.is_sequence:
+        size = field.primitive.size
+        problem = f"has {counted(len(values), 'byte')}, needs a multiple of {size}"
         failure = ValidationError(name, "whole numbers of bytes", values, problem)
     elif (
         isinstance(values, (list, tuple))
@@ -214,7 +190,7 @@ def construct(
     TypeError for an unknown keyword and for a first field of another type: ROS's tools try
     `type(field)(value)`, and go over the fields of a dictionary only after a TypeError.
     """
-    kind = type(message)
+    kind: Any = type(message)
     unknown = [name for name in options if name != "check_fields"]
     check = bool(options.get("check_fields"))
     fields = structure_of(kind).fields
@@ -226,11 +202,22 @@ def construct(
         )
         error = FieldNameError if check else FieldTypeError
         raise error("", "absent", options[unknown[0]], problem)
-    if check:
-        _assign(message, fields, arguments)
-    elif fields:
-        _check_first(owner_of(kind), fields[0], arguments[fields[0].public])
-    return check
+    owner: Any = owner_of(kind)
+    defaults = owner.__init__.__defaults__ or ()
+    if not check:
+        if fields:
+            _check_first(owner, fields[0], arguments[fields[0].public])
+        return False
+    default = owner(check_fields=False)
+    message.__class__ = checked_class(kind)
+    for field, without in zip(fields, defaults, strict=True):
+        value = arguments[field.public]
+        if value is None and without is None:
+            value = getattr(default, field.slot)
+        elif field.is_sequence and field.is_numeric:
+            value = array(field.primitive.code, value)  # type: ignore[union-attr]
+        setattr(message, field.public, value)
+    return True
 
 
 def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
@@ -243,31 +230,6 @@ def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
         check(value, field, field.public, wire_only=True)
     except ValidationError as error:
         raise error.at(error.path, FieldTypeError) from None
-
-
-def _assign(
-    message: Any, fields: tuple[FieldInfo, ...], arguments: dict[str, Any]
-) -> None:
-    kind: Any = type(message)
-    owner = owner_of(kind)
-    default = owner(check_fields=False)
-    message.__class__ = checked_class(kind)
-    for field, without in zip(fields, owner.__init__.__defaults__ or (), strict=True):
-        value = arguments[field.public]
-        if value is None and without is None:
-            value = getattr(default, field.slot)
-        elif field.is_sequence and field.is_numeric:
-            value = array(field.primitive.code, value)  # type: ignore[union-attr]
-        setattr(message, field.public, value)
-
-
-def become_checked(message: Any, check: bool) -> None:
-    """Let a message check its fields from now on, or no longer."""
-    kind: Any = type(message)
-    if check and not issubclass(kind, Checked):
-        message.__class__ = checked_class(kind)
-    elif not check and issubclass(kind, Checked):
-        message.__class__ = kind.__base__
 
 
 class Checked:
@@ -330,9 +292,7 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
         return value if isinstance(value, array) else array(field.primitive.code, value)
     import numpy as np
 
-    if isinstance(value, np.ndarray):
-        return value
-    return np.array(value, field.primitive.name)
+    return np.asanyarray(value, field.primitive.name)
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:
@@ -382,19 +342,17 @@ def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -
 def _refusal_of_primitive(value: Any, primitive: Primitive, *, listed: bool) -> str:
     code = primitive.code
     if code == "?":
-        return "" if isinstance(value, bool) else primitive.allowed
-    if code == "c":
+        right = isinstance(value, bool)
+    elif code == "c":
         types: Any = bytes if listed else (bytes, bytearray)
         right = isinstance(value, types) and (listed or len(value) == 1)
-        return "" if right else primitive.allowed
-    if code in "fd":
+    elif code in "fd":
         if not isinstance(value, float):
             return f"a float ({primitive.name})"
-        far = code == "f" and abs(value) > _FLOAT32 and not math.isinf(value)
-        limited = primitive._replace(low=-_FLOAT32, high=_FLOAT32)
-        return limited.allowed if far else ""
-    assert primitive.low is not None
-    assert primitive.high is not None
-    if isinstance(value, int) and primitive.low <= value <= primitive.high:
-        return ""
-    return primitive.allowed
+        right = code == "d" or not _FLOAT32 < abs(value) < math.inf
+        primitive = primitive._replace(low=-_FLOAT32, high=_FLOAT32)
+    else:
+        assert primitive.low is not None
+        assert primitive.high is not None
+        right = isinstance(value, int) and primitive.low <= value <= primitive.high
+    return "" if right else primitive.allowed

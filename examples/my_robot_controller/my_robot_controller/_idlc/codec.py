@@ -15,8 +15,8 @@ from .names import DecodeError, ValidationError, owner_of
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
-    from functools import partial
-    from typing import Any, Protocol, TypeAlias
+    from functools import partial as partial
+    from typing import Any, TypeAlias
 
     from .conversions import Join
 
@@ -25,13 +25,8 @@ if TYPE_CHECKING:
     #: `serialize(message, byteorder="little")` and `deserialize(buffer, copy=True)`.
     Functions: TypeAlias = tuple[Callable[..., bytes], Callable[..., Any]]
 
-    class Codecs(Protocol):
-        """Gives the codec of a byte order, making it on first use."""
-
-        def __call__(self, order: str, reading: Reading = ...) -> Codec:
-            """Return the codec whose `decode` makes values as `reading` says."""
-            ...
-
+    #: Gives the codec of a byte order, whose `decode` makes values as a `Reading` says.
+    Codecs: TypeAlias = Callable[..., "Codec"]
 else:
     # functools takes longer to import than all that is here
     from _functools import partial
@@ -124,17 +119,8 @@ def functions(kind: type) -> Functions:
     """
     owner = owner_of(kind)
     pair: Functions | None = owner.__dict__.get("_functions_")
-    if pair is None:
-        pair = owner._functions_ = _functions(owner)
-        serialize, deserialize = pair
-        methods = {"serialize": serialize, "deserialize": staticmethod(deserialize)}
-        for name, function in methods.items():
-            if name not in owner.__dict__:
-                setattr(owner, name, function)
-    return pair
-
-
-def _functions(owner: Any) -> Functions:
+    if pair is not None:
+        return pair
     codecs = owner._codec_
     little = codecs("<")
     encode, decode = little.encode, little.decode
@@ -153,13 +139,23 @@ def _functions(owner: Any) -> Functions:
             if type(buffer) is bytes and buffer[1] == 1 and not buffer[0] and copy:
                 return decode(buffer)
             return read(codecs, buffer, copy)
-        except FAILURES as error:
-            failure = error
-        return recover(owner, buffer, failure)
+        except DecodeError:
+            raise
+        except FAILURES:
+            pass
+        # middlewares take some of what is not right
+        from .typeinfo import read_carefully
+
+        return read_carefully(owner, bytes(buffer), maker)
 
     base = owner.__mro__[1]
     serialize.__doc__ = base.serialize.__doc__
     deserialize.__doc__ = base.deserialize.__doc__
+    owner._functions_ = serialize, deserialize
+    methods = {"serialize": serialize, "deserialize": staticmethod(deserialize)}
+    for name, function in methods.items():
+        if name not in owner.__dict__:
+            setattr(owner, name, function)
     return serialize, deserialize
 
 
@@ -185,25 +181,6 @@ def deserialize(kind: Any, buffer: Any, *, copy: bool = True) -> Any:
     for slot in owner.__slots__:
         setattr(result, slot, getattr(message, slot))
     return result
-
-
-def extended(owner: Any) -> None:
-    """Let a generated class read messages of any class that extends it.
-
-    Until there is one, its `deserialize` is a static method, which is faster.
-    """
-    if "deserialize" not in owner._fields_and_field_types:
-        owner.deserialize = classmethod(deserialize)
-
-
-def recover(kind: type, buffer: Any, failure: Exception) -> Any:
-    """Return the message after all, if a middleware would; raise DecodeError otherwise."""
-    if isinstance(failure, DecodeError):
-        raise failure
-    from .typeinfo import read_carefully
-
-    data = bytes(buffer)
-    return read_carefully(kind, data, maker)
 
 
 def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
@@ -245,23 +222,21 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
 
 def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]:
     """Return the message of each buffer; raise DecodeError that names the buffer by its index."""
-    owner = owner_of(kind)
-    codecs = owner._codec_
+    if owner_of(kind) is not kind:
+        return [
+            _indexed(kind, buffer, copy, index) for index, buffer in enumerate(buffers)
+        ]
+    codecs = kind._codec_
     decode = codecs("<", READINGS[bytes.decode, copy]).decode
     result: list[Any] = []
     put = result.append
-    rest = iter(buffers)
-    if kind is owner:
-        for buffer in rest:
-            try:
-                if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
-                    put(decode(buffer))
-                else:
-                    put(read(codecs, buffer, copy))
-            except FAILURES:
-                put(_indexed(kind, buffer, copy, len(result)))
-    else:
-        for buffer in rest:
+    for buffer in buffers:
+        try:
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                put(decode(buffer))
+            else:
+                put(read(codecs, buffer, copy))
+        except FAILURES:
             put(_indexed(kind, buffer, copy, len(result)))
     return result
 
@@ -315,10 +290,3 @@ def maker(kind: Any) -> Callable[[], Any]:
         return message
 
     return make
-
-
-def is_checked(kind: type) -> bool:
-    """Return whether the instances of a class check their fields."""
-    # only what has imported that module has such instances
-    module = f"{__package__}.checked"
-    return any(base.__module__ == module for base in kind.__mro__)

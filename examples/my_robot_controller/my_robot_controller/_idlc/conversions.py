@@ -6,7 +6,7 @@ Also the names that only annotations use: whoever evaluates these comes here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, get_type_hints
 
 from .checked import validate, validate_count, validate_element
@@ -43,30 +43,24 @@ def to_dict(message: Any) -> dict[str, Any]:
 
 
 def _to_dict(message: Any, structure: Structure) -> dict[str, Any]:
-    return {
-        field.name: _plain(getattr(message, field.slot), field)
-        for field in structure.fields
-    }
+    values = {}
+    for field in structure.fields:
+        value = getattr(message, field.slot)
+        if not field.is_list:
+            value = _plain(value, field)
+        elif field.is_numeric and hasattr(value, "tolist"):
+            value = value.tolist()
+        else:
+            value = [_plain(element, field) for element in value]
+        values[field.name] = value
+    return values
 
 
 def _plain(value: Any, field: FieldInfo) -> Any:
-    if not field.is_list:
-        return _plain_element(value, field)
-    if field.is_numeric and hasattr(value, "tolist"):
-        return value.tolist()
-    return [_plain_element(element, field) for element in value]
-
-
-def _plain_element(value: Any, field: FieldInfo) -> Any:
     if field.nested:
         return _to_dict(value, field.nested)
-    if (
-        field.primitive is not None
-        and field.primitive.code == "c"
-        and isinstance(value, bytes)
-    ):
-        return value[0]
-    return value
+    is_byte = field.primitive is not None and field.primitive.code == "c"
+    return value[0] if is_byte and isinstance(value, bytes) else value
 
 
 def from_dict(kind: type, values: dict[str, Any]) -> Any:
@@ -89,25 +83,22 @@ def _from_dict(kind: Any, structure: Structure, values: Any, path: str) -> Any:
             hint = spelling_hint(str(key), list(fields))
             problem = f"{structure.name} has no such field{hint}"
             raise ValidationError(inner_path(path, key), "absent", value, problem)
-        made = _value(value, field, inner_path(path, field.public))
+        place = inner_path(path, field.public)
+        made = value
+        if not field.is_list:
+            made = _element(value, field, place)
+        elif not field.is_numeric:
+            if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
+                raise ValidationError(place, "a list", value)
+            made = [
+                _element(element, field, f"{place}[{index}]")
+                for index, element in enumerate(value)
+            ]
         try:
             setattr(message, field.public, made)
         except ValidationError as error:
             raise error.at(inner_path(path, error.path), ValidationError) from None
     return message
-
-
-def _value(value: Any, field: FieldInfo, path: str) -> Any:
-    if not field.is_list:
-        return _element(value, field, path)
-    if field.is_numeric:
-        return value
-    if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
-        raise ValidationError(path, "a list", value)
-    return [
-        _element(element, field, f"{path}[{index}]")
-        for index, element in enumerate(value)
-    ]
 
 
 def _element(value: Any, field: FieldInfo, path: str) -> Any:
@@ -168,7 +159,7 @@ def _fields(owner: Any) -> Iterator[tuple[str, Any, dataclasses.Field[Any]]]:
         types = owner.__annotations__
     for name, wire, default in names:
         field: Any = (
-            dataclasses.field(default_factory=_fresh(owner, slot_name(wire)))
+            dataclasses.field(default_factory=partial(_fresh, owner, slot_name(wire)))
             if default is None
             else dataclasses.field(default=default)
         )
@@ -176,10 +167,7 @@ def _fields(owner: Any) -> Iterator[tuple[str, Any, dataclasses.Field[Any]]]:
 
 
 def _fresh(owner: Any, slot: str) -> Any:
-    def make() -> Any:
-        return getattr(owner(), slot)
-
-    return make
+    return getattr(owner(), slot)
 
 
 # pydantic: a `CoreSchema` is made of dictionaries

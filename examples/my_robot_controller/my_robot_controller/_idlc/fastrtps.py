@@ -19,11 +19,10 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from collections.abc import Callable
 from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from struct import pack
-from typing import Any, NamedTuple
+from typing import Any
 
 from . import c, introspection
 from .c import RefusedError
@@ -48,35 +47,22 @@ _NEW_CDR = f"{_CDR}C1ERNS0_10FastBufferENS1_10EndiannessE"
 _LITTLE_ENDIAN = 1
 
 
-class _Names(NamedTuple):
-    """The names that a version of Fast CDR has for the needed functions."""
-
-    libraries: tuple[str, ...]
-    new: str
-    plain: int  #: the constructor's value for plain CDR
-    append: str
-    position: str
-    begin: str
-
-
-_VERSIONS = (
-    _Names(
-        ("libfastcdr.so.2", "libfastcdr.2.dylib"),
+#: By the libraries of a version of Fast CDR: the constructor of a `Cdr`, what it takes for plain
+#: CDR, and the methods that append bytes and return the position.
+_VERSIONS = {
+    ("libfastcdr.so.2", "libfastcdr.2.dylib"): (
         f"{_NEW_CDR}NS0_10CdrVersionE",
         2,
         f"{_CDR}15serialize_arrayEPKcm",
         f"{_CDR}20get_current_positionEv",
-        f"{_CDR}18get_buffer_pointerEv",
     ),
-    _Names(  # ROS 2 Humble
-        ("libfastcdr.so.1", "libfastcdr.1.dylib"),
+    ("libfastcdr.so.1", "libfastcdr.1.dylib"): (  # ROS 2 Humble
         f"{_NEW_CDR}NS1_7CdrTypeE",
         1,
         f"{_CDR}14serializeArrayEPKcm",
         f"{_CDR}18getCurrentPositionEv",
-        f"{_CDR}16getBufferPointerEv",
     ),
-)
+}
 #: Generous room for the C++ objects (200 and 40 bytes in Fast CDR 2.2).
 _OBJECT_SIZE = 4096
 _WORDS = 64
@@ -86,22 +72,15 @@ _ADVICE = (
 )
 
 
-class FastCdr(NamedTuple):
-    """The pointers in a `Cdr`: indices of machine words in it."""
-
-    position: int
-    end: int
-
-
-def _load() -> tuple[ctypes.CDLL, _Names]:
+def _load() -> tuple[ctypes.CDLL, tuple[str, int, str, str]]:
     """Return the Fast CDR that the middleware has already loaded, never another one."""
-    names = [(name, version) for version in _VERSIONS for name in version.libraries]
-    for name, version in names:
-        try:
-            return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY), version
-        except OSError:
-            continue
-    tried = " or ".join(name for name, _ in names)
+    for names, version in _VERSIONS.items():
+        for name in names:
+            try:
+                return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY), version
+            except OSError:
+                continue
+    tried = " or ".join(name for names in _VERSIONS for name in names)
     raise ImportError(f"the middleware has not loaded {tried}. {_ADVICE}")
 
 
@@ -113,21 +92,21 @@ def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int 
 
 
 @cache
-def fast_cdr() -> FastCdr:
-    """Return how to use the loaded Fast CDR; raises ImportError if that cannot be found out."""
-    library, names = _load()
+def fast_cdr() -> tuple[int, int]:
+    """Return where a `Cdr` has the position and the end of its buffer, as indices of words.
 
-    def method(name: str, result: Any, *arguments: Any) -> Any:
-        return PYFUNCTYPE(result, *arguments)((name, library))
+    Raises ImportError if that cannot be found out.
+    """
+    library, (constructor, plain, append_name, position_name) = _load()
+
+    def method(name: str, *arguments: Any) -> Any:
+        return PYFUNCTYPE(c_void_p, *arguments)((name, library))
 
     try:
-        new_buffer = method(_NEW_BUFFER, None, c_void_p, c_void_p, c_size_t)
-        new_cdr = method(
-            names.new, None, c_void_p, c_void_p, ctypes.c_int, ctypes.c_int
-        )
-        append = method(names.append, c_void_p, c_void_p, c_void_p, c_size_t)
-        position_of = method(names.position, c_void_p, c_void_p)
-        begin_of = method(names.begin, c_void_p, c_void_p)
+        new_buffer = method(_NEW_BUFFER, c_void_p, c_void_p, c_size_t)
+        new_cdr = method(constructor, c_void_p, c_void_p, ctypes.c_int, ctypes.c_int)
+        append = method(append_name, c_void_p, c_void_p, c_size_t)
+        position_of = method(position_name, c_void_p)
     except AttributeError as error:
         raise ImportError(f"this Fast CDR is unknown: {error}. {_ADVICE}") from error
 
@@ -136,26 +115,19 @@ def fast_cdr() -> FastCdr:
     buffer, cdr = (ctypes.create_string_buffer(_OBJECT_SIZE) for _ in range(2))
     here = ctypes.addressof(cdr)
     new_buffer(buffer, begin, size)
-    new_cdr(cdr, buffer, _LITTLE_ENDIAN, names.plain)
+    new_cdr(cdr, buffer, _LITTLE_ENDIAN, plain)
     indices = set()
     for text in (b"\1\2\3", b"\4\5"):
-        append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))
+        append(here, text, len(text))
         position = position_of(here)
         words = c.WORDS[here >> 3 : (here >> 3) + _WORDS].tolist()
         indices.add(_find(words, begin, (position, begin, begin + size)))
     index = indices.pop()
-    if (
-        indices
-        or index is None
-        or begin_of(here) != begin
-        or data.value != b"\1\2\3\4\5"
-    ):
-        raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    layout = FastCdr(index + 1, index + 5)
-    c.WORDS[(here >> 3) + layout.position] = begin + 1
-    if position_of(here) != begin + 1:
-        raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    return layout
+    if not indices and index is not None and data.value == b"\1\2\3\4\5":
+        c.WORDS[(here >> 3) + index + 1] = begin + 1
+        if position_of(here) == begin + 1:
+            return index + 1, index + 5
+    raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
 
 
 # message memory
@@ -164,7 +136,7 @@ def fast_cdr() -> FastCdr:
 class Memory:
     """Message memory: `message @ memory` encodes into it, `+memory` is the message."""
 
-    __slots__ = ("body", "message", "received", "spans")
+    __slots__ = ("body", "message", "received", "size", "spans")
 
     #: The encoded message with header; the parts of a large one, which are not copied.
     body: Any
@@ -173,6 +145,8 @@ class Memory:
     spans: bytes
     #: The message that `body` was made from.
     message: Any
+    #: The size of `body`, where functions in Python read it.
+    size: int
     #: What was received, with header; no attribute in a memory that is sent.
     received: bytes
 
@@ -192,10 +166,12 @@ class Memory:
         return size
 
 
-def _memory_type(name: str, cls: Any, *, apart: bool = True) -> type[Memory]:
-    """Return the memory of a message class; `apart`: large ones may stay in parts."""
+def _memory_type(name: str, cls: Any, *, native: bool) -> type[Memory]:
+    """Return the memory of a message class; `native`: for machine code, which takes parts."""
     codec = cls._codec_(NATIVE)
-    encode, bulk = codec.encode, codec.bulk and apart
+    encode, decode, bulk = codec.encode, codec.decode, codec.bulk and native
+    _, decode_any = functions(cls)
+    native_order = HEADERS[NATIVE][1]
     join = b"".join
     true = c.TRUE
     large = False
@@ -211,11 +187,26 @@ def _memory_type(name: str, cls: Any, *, apart: bool = True) -> type[Memory]:
                 large = bulk and len(body) >= _LARGE
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
+        if not native:
+            memory.body = memory.body[_HEADER:]
+            memory.size = len(memory.body)
         memory.message = message
         return true
 
-    namespace = {"__slots__": (), "__rmatmul__": store, "__pos__": _taker(name, cls)}
-    return type("Memory", (Memory,), namespace)
+    def taken(memory: Any) -> Any:
+        try:
+            data = memory.received
+        except AttributeError:
+            return memory.message
+        if data[1] == native_order and not data[0]:
+            try:
+                return decode(data)
+            except Exception:  # noqa: S110 (the careful decoder reports it)
+                pass
+        return decode_any(data)
+
+    methods = {"__rmatmul__": store, "__pos__": c.taking(name, taken)}
+    return type("Memory", (Memory,), {"__slots__": (), **methods})
 
 
 def _offset(owner: object, word: int) -> int:
@@ -267,31 +258,9 @@ def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
         for word in (id(c.keep(identifier)) + c.BYTES_OFFSET, handle)
     ]
     answered = ctypes.addressof(c.keep((c_size_t * (len(table) + 1))(*table)))
-    words = {**_words(), "answers": answered, "memory": id(c.keep(memory))}
-    return c.machine_code(
-        "fastrtps", words | {"make": c.c_function("PyObject_CallNoArgs")}
-    )
-
-
-def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
-    """Return the function that gives the message in a memory, or `None` for garbage."""
-    decode = cls._codec_(NATIVE).decode
-    _, decode_any = functions(cls)
-    native = HEADERS[NATIVE][1]
-
-    def taken(memory: Any) -> Any:
-        try:
-            data = memory.received
-        except AttributeError:
-            return memory.message
-        if data[1] == native and not data[0]:
-            try:
-                return decode(data)
-            except Exception:  # noqa: S110 (the careful decoder reports it)
-                pass
-        return decode_any(data)
-
-    return c.taking(name, taken)
+    make = c.c_function("PyObject_CallNoArgs")
+    words = {"answers": answered, "memory": id(c.keep(memory)), "make": make}
+    return c.machine_code("fastrtps", _words() | words)
 
 
 @cache
@@ -337,26 +306,12 @@ def _python_functions() -> dict[str, int]:
         return 0
 
     bounds = ctypes.POINTER(ctypes.c_char)
-    functions: dict[str, tuple[Any, Callable[..., object]]] = {
-        "serialize": (PYFUNCTYPE(c_bool, py_object, c_void_p), serialize),
-        "deserialize": (PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize),
-        "serialized_size": (PYFUNCTYPE(c_size_t, py_object), size),
-        "maximum_size": (PYFUNCTYPE(c_size_t, bounds), maximum),
+    return {
+        "serialize": c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize),
+        "deserialize": c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize),
+        "serialized_size": c.callback(PYFUNCTYPE(c_size_t, py_object), size),
+        "maximum_size": c.callback(PYFUNCTYPE(c_size_t, bounds), maximum),
     }
-    return {name: c.callback(*function) for name, function in functions.items()}
-
-
-def _plain_memory_type(base: type) -> type:
-    """Return a type of memory that knows what the functions here could not find out."""
-    store: Any = base.__dict__["__rmatmul__"]
-
-    def store_plain(memory: Any, message: Any) -> object:
-        done = store(memory, message)
-        memory.body = memory.body[_HEADER:]
-        memory.size = len(memory.body)
-        return done
-
-    return type("Memory", (base,), {"__slots__": ("size",), "__rmatmul__": store_plain})
 
 
 #: `message_type_support_callbacks_t`.
@@ -364,72 +319,37 @@ _Callbacks = c.structure(
     "Callbacks",
     namespace=c_char_p,
     name=c_char_p,
-    cdr_serialize=c_void_p,
-    cdr_deserialize=c_void_p,
-    get_serialized_size=c_void_p,
-    max_serialized_size=c_void_p,
-    key_callbacks=c_void_p,
-    # what later versions read: three words so far, zero for "none of it"
-    later=c_void_p * 9,
-)
-#: `service_type_support_callbacks_t`.
-_ServiceCallbacks = c.structure(
-    "ServiceCallbacks",
-    namespace=c_char_p,
-    name=c_char_p,
-    request=c_void_p,
-    response=c_void_p,
+    functions=c_void_p * 4,  # serialize, deserialize, and two about sizes
+    later=c_void_p * 10,  # what later versions read: zero for "none of it"
 )
 
 
-@cache
-def _identifier() -> int:
-    library = c.load_library(f"lib{IDENTIFIER}.so")
-    return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
-
-
-def message(cls: Any, structure: Structure) -> c.MessageSupport:
-    """Return what rclpy needs to publish and take messages of a class."""
+def message(cls: Any, structure: Structure) -> tuple[int, ...]:
+    """Return the addresses that rclpy reads from a message class, in their order."""
     name = structure.name
-    package, kind, short = name.split("/")
-    support = c.keep(c.MessageTypeSupport(_identifier()))
+    support = c.keep(c.MessageTypeSupport(c.identifier(IDENTIFIER)))
     answers = {
         IDENTIFIER.encode(): ctypes.addressof(support),
         introspection.IDENTIFIER.encode(): introspection.handle(structure, False),
     }
-    memory = _memory_type(name, cls)
     try:
-        functions = _native(answers, memory)
+        functions = _native(answers, _memory_type(name, cls, native=True))
     except RefusedError:
-        memory = _plain_memory_type(_memory_type(name, cls, apart=False))
+        memory = _memory_type(name, cls, native=False)
         create = c.address(PYFUNCTYPE(py_object)(memory))
         resolve = c.resolver(answers)
-        functions = {**_python_functions(), "create": create, "resolve": resolve}
-    support.data = c.pointer(
-        _Callbacks(
-            f"{package}::{kind}".encode(),
-            short.encode(),
-            functions["serialize"],
-            functions["deserialize"],
-            functions["serialized_size"],
-            functions["maximum_size"],
-        )
-    )
-    support.func = functions["resolve"]
+        functions = {**_python_functions(), "resolve": resolve, "create": create}
+    *callbacks, resolve, create = functions.values()
+    type_names = c.namespace_and_name(name, "::")
+    support.data = c.pointer(_Callbacks(*type_names, (c_void_p * 4)(*callbacks)))
+    support.func = resolve
     support.about = about(structure)
-    return c.MessageSupport(
-        ctypes.addressof(support),
-        functions["create"],
-        c.c_function("Py_DecRef"),
-        c.c_function("PyNumber_MatrixMultiply"),
-        c.c_function("PyNumber_Positive"),
-    )
+    names = ("Py_DecRef", "PyNumber_MatrixMultiply", "PyNumber_Positive")
+    return create, *map(c.c_function, names), ctypes.addressof(support)
 
 
-def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001
+def service(name: str, request: int, response: int, *_: int) -> tuple[int, int]:
     """Return identifier and data of a service's type support, from its messages' handles."""
-    package, kind, short = name.split("/")
-    functions = _ServiceCallbacks(
-        f"{package}::{kind}".encode(), short.encode(), request, response
-    )
-    return _identifier(), c.pointer(functions)
+    handles = (c_void_p * 3)(request, response)
+    data = c.ServiceMembers(*c.namespace_and_name(name, "::"), handles)
+    return c.identifier(IDENTIFIER), c.pointer(data)

@@ -12,14 +12,16 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from contextlib import closing
 from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
 from functools import cache
+from itertools import product
 from pathlib import Path
 from struct import unpack_from
 from typing import Any, NamedTuple
 
 from . import c
-from .typeinfo import ARRAY, BOUNDED_SEQUENCE, SCALAR, FieldInfo, Structure
+from .typeinfo import FieldInfo, Structure
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 
@@ -31,15 +33,13 @@ def references(structure: Structure) -> frozenset[Structure]:
     return frozenset(direct.union(*map(references, direct)))
 
 
-def _field(field: FieldInfo) -> Any:
-    nested = c.string(field.nested.name if field.nested else "")
-    kind = c.FieldType(field.type_id, field.capacity, field.text_bound or 0, nested)
-    return c.Field(c.string(field.name), kind, c.string(field.default))
-
-
 @cache
 def _individual(structure: Structure) -> Any:
-    fields = [_field(field) for field in structure.members]
+    fields = []
+    for field in structure.members:
+        nested = c.string(field.nested.name if field.nested else "")
+        kind = (field.type_id, field.capacity, field.text_bound or 0, nested)
+        fields.append(c.Field(c.string(field.name), *kind, c.string(field.default)))
     name = c.string(structure.name)
     return c.IndividualDescription(name, c.sequence(fields, c.Field))
 
@@ -63,11 +63,6 @@ def _source(structure: Structure) -> Any:
     return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
 
 
-def _type_hash(structure: Structure) -> Any:
-    digest = bytes.fromhex(structure.hash.removeprefix("RIHS01_"))
-    return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
-
-
 @cache
 def about(structure: Structure) -> Any:
     """Return functions that never fail and never return NULL, as rcl demands."""
@@ -75,7 +70,8 @@ def about(structure: Structure) -> Any:
     individuals = c.sequence(list(map(_individual, others)), c.IndividualDescription)
     description = c.Description(_individual(structure), individuals)
     sources = c.sequence(list(map(_source, (structure, *others))), c.Source)
-    values = (_type_hash(structure), description, sources)
+    digest = bytes.fromhex(structure.hash.removeprefix("RIHS01_"))
+    values = (c.TypeHash(1, (c_uint8 * 32)(*digest)), description, sources)
     return c.About(*(c.constant(c.pointer(value)) for value in values))
 
 
@@ -109,30 +105,23 @@ _TABLES = ((32, 112, 32), (40, 112, 33), (40, 120, 33))
 _SEQUENCES = (24, 32)
 
 
-class _Member(NamedTuple):
-    """A field: its name, the id of its type, and its size; a sequence has none."""
-
-    name: bytes
-    type_id: int
-    size: int = 0
-
-
 _STRING = 16
-#: Messages of rcl_interfaces that have been the same ever since.
+#: Messages of rcl_interfaces that have been the same ever since: the id of each field's type, and
+#: its size; a sequence has none.
 _MESSAGES = {
-    "ParameterValue": (
-        _Member(b"type", 8, 1),
-        _Member(b"bool_value", 6, 1),
-        _Member(b"integer_value", 15, 8),
-        _Member(b"double_value", 2, 8),
-        _Member(b"string_value", _STRING, 24),
-        _Member(b"byte_array_value", 7),
-        _Member(b"bool_array_value", 6),
-        _Member(b"integer_array_value", 15),
-        _Member(b"double_array_value", 2),
-        _Member(b"string_array_value", _STRING),
-    ),
-    "ListParametersResult": (_Member(b"names", _STRING), _Member(b"prefixes", _STRING)),
+    "ParameterValue": {
+        b"type": (8, 1),
+        b"bool_value": (6, 1),
+        b"integer_value": (15, 8),
+        b"double_value": (2, 8),
+        b"string_value": (_STRING, 24),
+        b"byte_array_value": (7, 0),
+        b"bool_array_value": (6, 0),
+        b"integer_array_value": (15, 0),
+        b"double_array_value": (2, 0),
+        b"string_array_value": (_STRING, 0),
+    },
+    "ListParametersResult": {b"names": (_STRING, 0), b"prefixes": (_STRING, 0)},
 }
 
 
@@ -141,16 +130,10 @@ class _UnknownError(Exception):
 
 
 class _Reader:
-    """Reads memory that may not be there.
-
-    The system copies it into a pipe, and refuses where the process would be ended.
-    """
+    """Reads memory that may not be there: the system copies it into a pipe, or refuses."""
 
     def __init__(self) -> None:
         self._out, self._in = os.pipe()
-        self._write = ctypes.CDLL(None, use_errno=True).write
-        self._write.argtypes = (ctypes.c_int, c_void_p, ctypes.c_size_t)
-        self._write.restype = ctypes.c_ssize_t
 
     def close(self) -> None:
         os.close(self._out)
@@ -158,13 +141,13 @@ class _Reader:
 
     def read(self, address: int, size: int) -> bytes:
         """Return memory; raises _UnknownError where there is none."""
-        if not address or address >> 63 or self._write(self._in, address, 1) != 1:
-            raise _UnknownError(f"no memory at {address:#x}")
-        os.read(self._out, 1)
-        written = self._write(self._in, address, size)
-        data = os.read(self._out, written) if written > 0 else b""
+        try:
+            written = os.write(self._in, c.MEMORY[address : address + size])
+            data = os.read(self._out, written)
+        except OSError:
+            data = b""
         if len(data) != size:
-            raise _UnknownError(f"no memory at {address + size:#x}")
+            raise _UnknownError(f"no memory at {address + len(data):#x}")
         return data
 
     def words(self, address: int, count: int) -> tuple[int, ...]:
@@ -190,22 +173,17 @@ def measure(*handles: int) -> Abi:
     of ListParametersResult. Raises ImportError if they are not exactly as one of the known
     layouts has them.
     """
-    reader = _Reader()
     reasons, layouts = [], []
-    try:
+    with closing(_Reader()) as reader:
         for table in _TABLES:
             try:
                 offsets = [
-                    _offsets(reader, handle, name, fields, *table)
-                    for handle, (name, fields) in zip(
-                        handles, _MESSAGES.items(), strict=True
-                    )
+                    _offsets(reader, handle, name, *table)
+                    for handle, name in zip(handles, _MESSAGES, strict=True)
                 ]
                 layouts.append(Abi(*table, *_sequences(offsets)))
             except _UnknownError as reason:
                 reasons.append(f"{'/'.join(map(str, table))}: {reason}")
-    finally:
-        reader.close()
     if len(layouts) != 1:
         seen = "; ".join(reasons) or "several layouts fit"
         raise ImportError(f"{_ADVICE} (introspection tables, {seen})")
@@ -213,73 +191,63 @@ def measure(*handles: int) -> Abi:
 
 
 def _offsets(
-    reader: _Reader,
-    handle: int,
-    message: str,
-    fields: tuple[_Member, ...],
-    members: int,
-    member: int,
-    is_array: int,
+    reader: _Reader, handle: int, message: str, members: int, member: int, is_array: int
 ) -> list[int]:
     """Return where a message's fields begin, and its size, if its tables fit a layout."""
+    fields = _MESSAGES[message]
     identifier, data, function = reader.words(handle, 3)
     reader.demand_text(identifier, IDENTIFIER.encode())
-    reader.read(function, 1)
     namespace, name, count, size, *rest = reader.words(data, members // 8 + 3)
     reader.demand_text(namespace, b"rcl_interfaces__msg")
     reader.demand_text(name, message.encode())
     _demand(count & 0xFFFF_FFFF, len(fields), "the number of members")
     *key, rows, init, fini = rest
     _demand(any(key), False, "whether there is a key")
-    for code in (init, fini):
+    for code in (function, init, fini):
         reader.read(code, 1)
     table = reader.read(rows, member * len(fields))
     parts = [table[at : at + member] for at in range(0, len(table), member)]
-    for part, field in zip(parts, fields, strict=True):
-        _check_member(reader, part, field, is_array)
+    for part, field in zip(parts, fields.items(), strict=True):
+        _check_member(reader, part, *field, is_array)
     return [*(unpack_from("=I", part, 52)[0] for part in parts), size]
 
 
-def _check_member(reader: _Reader, part: bytes, field: _Member, is_array: int) -> None:
+def _check_member(
+    reader: _Reader, part: bytes, field: bytes, kind: tuple[int, int], is_array: int
+) -> None:
     """Raise _UnknownError unless a member says what is known of its field."""
-    name, _, bound, nested = unpack_from("=4Q", part)
-    reader.demand_text(name, field.name)
-    _demand(part[8], field.type_id, f"the type of {field.name!r}")
-    _demand((bound, nested), (0, 0), f"bound and type of {field.name!r}")
+    type_id, size = kind
+    name, _, text_bound, nested = unpack_from("=4Q", part)
+    reader.demand_text(name, field)
     flags = bytearray(8)
-    flags[is_array - 32] = not field.size
-    _demand(part[32:40], bytes(flags), f"whether {field.name!r} is an array")
-    size, bounded = unpack_from("=QB", part, 40)
+    flags[is_array - 32] = not size
+    bound, is_bounded = unpack_from("=QB", part, 40)
     default, *functions = unpack_from("=7Q", part, 56)
-    _demand((size, bounded, default), (0, 0, 0), f"the bounds of {field.name!r}")
-    if field.size:
-        _demand(any(functions), False, f"whether {field.name!r} has functions")
-    for function in functions:
-        if function:
-            reader.read(function, 1)
+    actual = (part[8], text_bound, nested, part[32:40], bound, is_bounded, default)
+    _demand(actual, (type_id, 0, 0, bytes(flags), 0, 0, 0), f"member {field!r}")
+    if size:
+        _demand(any(functions), False, f"whether {field!r} has functions")
+    for function in filter(None, functions):
+        reader.read(function, 1)
     if len(part) > 112:  # whether it may be a buffer of another kind
-        _demand(part[112] in (0, 1), True, f"whether {field.name!r} has a flag")
+        _demand(part[112] in (0, 1), True, f"whether {field!r} has a flag")
 
 
 def _sequences(offsets: list[list[int]]) -> tuple[int, int]:
     """Return the sizes of both kinds of sequences, by which fields begin where they do."""
-    for sequence in _SEQUENCES:
-        for strings in _SEQUENCES:
-            expected = [
-                _laid_out(fields, sequence, strings) for fields in _MESSAGES.values()
-            ]
-            if expected == offsets:
-                return sequence, strings
+    for sequence, strings in product(_SEQUENCES, repeat=2):
+        if offsets == [_laid_out(name, sequence, strings) for name in _MESSAGES]:
+            return sequence, strings
     raise _UnknownError(f"fields begin at {offsets}")
 
 
-def _laid_out(fields: tuple[_Member, ...], sequence: int, strings: int) -> list[int]:
+def _laid_out(message: str, sequence: int, strings: int) -> list[int]:
     """Return where fields begin, and where the last one ends."""
     offsets, end = [], 0
-    for field in fields:
-        end += -end % min(field.size or 8, 8)
+    for type_id, size in _MESSAGES[message].values():
+        end += -end % min(size or 8, 8)
         offsets.append(end)
-        end += field.size or (strings if field.type_id == _STRING else sequence)
+        end += size or (strings if type_id == _STRING else sequence)
     return [*offsets, end]
 
 
@@ -298,31 +266,17 @@ def abi() -> Abi:
 @cache
 def has_hashes() -> bool:
     """Return whether this ROS 2 knows type hashes, and with them events of services."""
-    runtime = c.load_library("librosidl_runtime_c.so")
-    return hasattr(runtime, "rosidl_stringify_type_hash")
+    library = c.load_library("librosidl_runtime_c.so")
+    return hasattr(library, "rosidl_stringify_type_hash")
 
 
 # C structures of messages, laid out as rosidl's C generator lays them out
 
-#: Type id in descriptions -> (type id in introspection, C type of one element).
-_ELEMENTS: dict[int, tuple[int, Any]] = {
-    2: (9, ctypes.c_int8),
-    3: (8, ctypes.c_uint8),
-    4: (11, ctypes.c_int16),
-    5: (10, ctypes.c_uint16),
-    6: (13, ctypes.c_int32),
-    7: (12, ctypes.c_uint32),
-    8: (15, ctypes.c_int64),
-    9: (14, ctypes.c_uint64),
-    10: (1, ctypes.c_float),
-    11: (2, ctypes.c_double),
-    15: (6, ctypes.c_bool),
-    16: (7, ctypes.c_uint8),
-    17: (16, c.String),
-    18: (17, c.String),
-    21: (16, c.String),
-    22: (17, c.String),
-}
+#: Type ids in introspection by those in descriptions: int8 to float64, then bool, byte, texts.
+_TYPE_IDS = dict(enumerate((9, 8, 11, 10, 13, 12, 15, 14, 1, 2), 2))
+_TYPE_IDS |= {15: 6, 16: 7, 17: _STRING, 18: 17, 21: _STRING, 22: 17}
+#: Numbers by their size; an array of them is aligned like one.
+_NUMBERS = {1: c_uint8, 2: ctypes.c_uint16, 4: c_uint32, 8: ctypes.c_uint64}
 _MESSAGE = 18
 
 
@@ -336,34 +290,34 @@ def c_structure(structure: Structure) -> type[ctypes.Structure]:
 
 def element_type(field: FieldInfo) -> Any:
     """Return the C type of one element of a field."""
-    return c_structure(field.nested) if field.nested else _ELEMENTS[field.base][1]
+    if field.nested:
+        return c_structure(field.nested)
+    return _NUMBERS[field.primitive.size] if field.primitive else c.String
 
 
 def _c_type(field: FieldInfo) -> Any:
-    if field.shape == SCALAR:
-        return element_type(field)
-    if field.shape == ARRAY:
-        return element_type(field) * field.capacity
+    if not field.is_sequence:
+        return element_type(field) * field.size if field.size else element_type(field)
     if field.nested:
         return c.Sequence
-    size = abi().strings if element_type(field) is c.String else abi().sequence
+    size = abi().strings if field.text else abi().sequence
     return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
 
 
 def placed_fields(structure: Structure) -> list[tuple[FieldInfo, int]]:
     """Return a message's fields and where each begins in the C structure."""
     kind = c_structure(structure)
-    offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
-    return list(zip(structure.members, offsets, strict=True))
+    fields = enumerate(structure.members)
+    return [(field, getattr(kind, f"f{i}").offset) for i, field in fields]
 
 
 # members
 
 
 @cache
-def _member_type() -> Any:
-    """Return `rosidl_typesupport_introspection_c__MessageMember` of this ROS 2."""
-    return c.structure(
+def _types() -> tuple[Any, Any]:
+    """Return MessageMember and MessageMembers of this ROS 2's introspection."""
+    member = c.structure(
         "MessageMember",
         name=c_char_p,
         type_id=c_uint8,
@@ -375,20 +329,10 @@ def _member_type() -> Any:
         is_upper_bound=c_bool,
         offset=c_uint32,
         default_value=c_void_p,
-        size_function=c_void_p,
-        get_const_function=c_void_p,
-        get_function=c_void_p,
-        fetch_function=c_void_p,
-        assign_function=c_void_p,
-        resize_function=c_void_p,
+        functions=c_void_p * 6,  # size, get_const, get, fetch, assign, resize
         later=c_uint8 * (abi().member - 112),  # whether it is a buffer
     )
-
-
-@cache
-def _members_type() -> Any:
-    """Return `rosidl_typesupport_introspection_c__MessageMembers` of this ROS 2."""
-    return c.structure(
+    members = c.structure(
         "MessageMembers",
         namespace=c_char_p,
         name=c_char_p,
@@ -399,67 +343,37 @@ def _members_type() -> Any:
         init_function=c_void_p,
         fini_function=c_void_p,
     )
+    return member, members
 
 
 @cache
-def library() -> tuple[int, int, int]:
-    """Return addresses in the libraries that define what introspection is.
-
-    The identifier is rosidl's own string, because middlewares compare the pointers. The functions
-    for messages and for services answer with the handle itself if the identifier fits.
-    """
-    introspection = c.load_library(f"lib{IDENTIFIER}.so")
+def same_handle(kind: str) -> int:
+    """Return the function that answers with the handle itself if the identifier fits."""
     runtime = c.load_library("librosidl_runtime_c.so")
-    return (
-        c_void_p.in_dll(introspection, f"{IDENTIFIER}__identifier").value or 0,
-        c.address(runtime.get_message_typesupport_handle_function),
-        c.address(runtime.get_service_typesupport_handle_function),
-    )
+    return c.address(getattr(runtime, f"get_{kind}_typesupport_handle_function"))
 
 
 def _member(field: FieldInfo, offset: int, functional: bool) -> Any:
     """Return the member that describes a field to the middleware."""
-    member = _member_type()(
+    member = _types()[0](
         name=field.name.encode(),
-        type_id=_MESSAGE if field.nested else _ELEMENTS[field.base][0],
+        type_id=_MESSAGE if field.nested else _TYPE_IDS[field.base],
         string_upper_bound=field.text_bound or 0,
-        is_array=field.shape != SCALAR,
+        members=handle(field.nested, functional) if field.nested else None,
+        is_array=field.is_list,
         array_size=field.capacity,
-        is_upper_bound=field.shape == BOUNDED_SEQUENCE,
+        is_upper_bound=field.bound is not None,
         offset=offset,
     )
-    if field.nested:
-        member.members = handle(field.nested, functional)
-    if field.shape != SCALAR and functional:
+    if field.is_list and functional:
         size = ctypes.sizeof(element_type(field))
-        functions = elements(size, element_content(field))
-        if field.shape == ARRAY:
-            member.get_function = functions["in_array"]
-        else:
-            member.size_function = functions["length"]
-            member.get_function = functions["in_sequence"]
-            member.resize_function = functions["resize"]
-        member.get_const_function = member.get_function
+        functions = memory_functions(size, element_content(field))
+        get = functions["in_array" if field.size else "in_sequence"]
+        member.functions[1:3] = get, get
+        if field.is_sequence:
+            member.functions[0] = functions["length"]
+            member.functions[5] = functions["resize"]
     return member
-
-
-def members(structure: Structure, functional: bool) -> Any:
-    """Return a message's members."""
-    placed = placed_fields(structure)
-    table = [_member(field, offset, functional) for field, offset in placed]
-    size = ctypes.sizeof(c_structure(structure))
-    finish = elements(size, content(structure))["finish"] if functional else None
-    package, kind, short = structure.name.split("/")
-    return c.keep(
-        _members_type()(
-            namespace=f"{package}__{kind}".encode(),
-            name=short.encode(),
-            count=len(table),
-            size_of=size,
-            members=c.sequence(table, _member_type()).data,
-            fini_function=finish,
-        )
-    )
 
 
 @cache
@@ -468,27 +382,34 @@ def handle(structure: Structure, functional: bool) -> int:
 
     `functional`: with the functions by which message memory is written and read.
     """
-    identifier, same_handle, _ = library()
-    data = ctypes.addressof(members(structure, functional))
-    support = c.MessageTypeSupport(identifier, data, same_handle, about(structure))
-    return c.pointer(support)
+    identifier, find = c.identifier(IDENTIFIER), same_handle("message")
+    placed = placed_fields(structure)
+    table = [_member(field, offset, functional) for field, offset in placed]
+    size = ctypes.sizeof(c_structure(structure))
+    functions = memory_functions(size, content(structure)) if functional else {}
+    namespace, name = c.namespace_and_name(structure.name, "__")
+    member_type, members_type = _types()
+    members = members_type(
+        namespace=namespace,
+        name=name,
+        count=len(table),
+        size_of=size,
+        members=c.sequence(table, member_type).data,
+        fini_function=functions.get("finish"),
+    )
+    support = (identifier, c.pointer(members), find, about(structure))
+    return c.pointer(c.MessageTypeSupport(*support))
 
 
 # message memory
 
 
 @cache
-def elements(size: int, content: int) -> dict[str, int]:
-    """Return functions for all elements of a size and with a content to free."""
-    return memory_functions(size, content, None)
+def memory_functions(size: int, table: int, converter: object = None) -> dict[str, int]:
+    """Return functions, by name, for elements of a size that have a table of what to free.
 
-
-def memory_functions(size: int, content: int, converter: object) -> dict[str, int]:
-    """Return addresses of new functions, which live as long as the process, by their names.
-
-    They know one type of message, and its sequences and arrays. `convert_from_py` and
-    `convert_to_py` are the only ones that need Python: they call `converter[address] = message`
-    and `converter[address]`.
+    `convert_from_py` and `convert_to_py` are the only ones that need Python: they call
+    `converter[address] = message` and `converter[address]`.
     """
     words = {
         "allocate": allocator().zero_allocate,
@@ -496,8 +417,8 @@ def memory_functions(size: int, content: int, converter: object) -> dict[str, in
         "set_item": c.c_function("PySequence_SetItem"),
         "get_item": c.c_function("PySequence_GetItem"),
         "converter": id(c.keep(converter)),
-        "plan": content or _table(),
-        "sequence": _table((0, 0, size, content)),
+        "plan": table or _table(),
+        "sequence": _table((0, 0, size, table)),
         "size": size,
     }
     return c.machine_code("structs", words)
@@ -519,6 +440,7 @@ def allocator() -> Any:
 # table of an element (none: there is nothing to free in it).
 
 
+@cache
 def _table(*entries: tuple[int, int, int, int]) -> int:
     words = [len(entries), *(word for entry in entries for word in entry)]
     return ctypes.addressof(c.keep((c_size_t * len(words))(*words)))
@@ -530,8 +452,8 @@ def content(structure: Structure) -> int:
     entries = []
     for field, offset in placed_fields(structure):
         inner = element_content(field)
-        count = {SCALAR: 1, ARRAY: field.capacity}.get(field.shape, 0)
-        if inner or not count:
+        if inner or field.is_sequence:
+            count = 0 if field.is_sequence else field.size or 1
             size = ctypes.sizeof(element_type(field))
             entries.append((offset, count, size, inner))
     return _table(*entries) if entries else 0
@@ -541,10 +463,4 @@ def element_content(field: FieldInfo) -> int:
     """Return the table of one element of a field, 0 if there is nothing to free in it."""
     if field.nested:
         return content(field.nested)
-    return _text() if element_type(field) is c.String else 0
-
-
-@cache
-def _text() -> int:
-    """Return the table of a string."""
-    return _table((0, 0, 0, 0))
+    return _table((0, 0, 0, 0)) if field.text else 0

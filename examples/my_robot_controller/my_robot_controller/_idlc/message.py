@@ -12,12 +12,7 @@ import sys
 from array import array
 
 from . import codec
-from .names import (
-    owner_of,
-    public_name,
-    slot_name,
-    wire_name,
-)
+from .names import owner_of, public_name, slot_name, wire_name
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -89,16 +84,18 @@ _of_numpy: set[type] = set()
 
 
 def equal(message: Any, other: Any) -> bool:
-    """Compare a message with what is not of its class: a copy of it has the same fields."""
-    if hasattr(type(type(other)), "_message"):
+    """Compare a message with one of its class or of a copy of that, which has the same fields."""
+    owner = owner_of(type(message))
+    if not isinstance(other, owner):
+        if not hasattr(type(type(other)), "_message"):
+            return NotImplemented  # type: ignore[no-any-return]
         from .typeinfo import is_copy
 
-        if is_copy(type(message), type(other)):
-            slots: list[str] = owner_of(type(message)).__slots__
-            return all(
-                same(getattr(message, slot), getattr(other, slot)) for slot in slots
-            )
-    return NotImplemented  # type: ignore[no-any-return]
+        if not is_copy(owner, type(other)):
+            return NotImplemented  # type: ignore[no-any-return]
+    return all(
+        same(getattr(message, slot), getattr(other, slot)) for slot in owner.__slots__
+    )
 
 
 def same(mine: Any, other: Any) -> bool:
@@ -301,16 +298,28 @@ class Message(metaclass=MessageMeta):
         __dataclass_fields__ = OnDemand("conversions", "dataclass_fields")
         __dataclass_params__ = OnDemand("conversions", "dataclass_params")
 
+        def __replace__(self, /, **changes):
+            """Return a copy with other values for some fields, for `copy.replace`."""
+            from dataclasses import replace
+
+            return replace(self, **changes)
+
     @property
     def _check_fields(self) -> bool:
         """True if the message checks each value at its assignment, as in rosidl."""
-        return codec.is_checked(type(self))
+        # only what has imported that module has such instances
+        module = f"{__package__}.checked"
+        return any(base.__module__ == module for base in type(self).__mro__)
 
     @_check_fields.setter
     def _check_fields(self, check: bool) -> None:
-        from .checked import become_checked
+        from .checked import Checked, checked_class
 
-        become_checked(self, check)
+        kind: Any = type(self)
+        if check and not issubclass(kind, Checked):
+            self.__class__ = checked_class(kind)
+        elif not check and issubclass(kind, Checked):
+            self.__class__ = kind.__base__
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
@@ -417,14 +426,6 @@ class Message(metaclass=MessageMeta):
         message: typing_extensions.Self = from_dict(cls, values)
         return message
 
-    if not TYPE_CHECKING:
-
-        def __replace__(self, /, **changes):
-            """Return a copy with other values for some fields, for `copy.replace`."""
-            from dataclasses import replace
-
-            return replace(self, **changes)
-
     __copy__ = copied
     __deepcopy__ = deeply_copied
     _repr_pretty_ = pretty
@@ -471,39 +472,30 @@ def _subclass(
 ) -> Any:
     """Return the subclass; its `deserialize` and `==` are of its own kind."""
     if "__slots__" in namespace:
-        fields = {field for base in bases for field in _field_names(base)}
-        namespace["__slots__"] = _without_fields(fields, namespace["__slots__"])
+        # fields have slots, which second ones would hide: dataclass(slots=True) asks for them
+        fields = {
+            name for base in bases for name in getattr(base, "__match_args__", ())
+        }
+        slots = namespace["__slots__"]
+        if isinstance(slots, dict):
+            slots = {name: doc for name, doc in slots.items() if name not in fields}
+        elif not isinstance(slots, str):
+            slots = tuple(name for name in slots if name not in fields)
+        namespace["__slots__"] = slots
         namespace.pop("__weakref__", None)  # dataclass() of Python 3.10 forgets it
     created: Any = type.__new__(metaclass, name, bases, namespace, **options)
     owner = metaclass._message
     if owner is not None:
-        codec.extended(owner)
-        if created.__eq__ is owner.__eq__ and _holds_numbers(owner):
+        # until now it was a static method, which is faster
+        if "deserialize" not in owner._fields_and_field_types:
+            owner.deserialize = classmethod(codec.deserialize)
+        # a property may hold a `numpy.ndarray`, compared element by element
+        holders = (vars(owner)[name] for name in owner.__match_args__)
+        if created.__eq__ is owner.__eq__ and any(
+            isinstance(holder, property) for holder in holders
+        ):
             created.__eq__ = _equal
     return created
-
-
-def _field_names(kind: type) -> tuple[str, ...]:
-    return getattr(kind, "__match_args__", ())
-
-
-def _without_fields(fields: set[str], slots: Any) -> Any:
-    """Return slots without those of fields, which have theirs: a second one would hide them.
-
-    `dataclass(slots=True)` asks for them.
-    """
-    if isinstance(slots, str):
-        return slots
-    if isinstance(slots, dict):
-        return {name: doc for name, doc in slots.items() if name not in fields}
-    return tuple(name for name in slots if name not in fields)
-
-
-def _holds_numbers(owner: Any) -> bool:
-    """Return whether a field may hold a `numpy.ndarray`, compared element by element."""
-    return any(
-        isinstance(owner.__dict__[name], property) for name in _field_names(owner)
-    )
 
 
 def _equal(self: Any, other: Any) -> Any:
@@ -518,25 +510,21 @@ def _equal(self: Any, other: Any) -> Any:
     return owner.__eq__(self, other) and all(
         same(getattr(self, name), getattr(other, name))
         for name, field in kind.__dataclass_fields__.items()
-        if field.compare and name not in _field_names(owner)
+        if field.compare and name not in owner.__match_args__
     )
 
 
 # services and actions
 
 
-def _getter(group: Any, prefix: str) -> Callable[[str], Any]:
-    """Return a module's `__getattr__`, which finds what ROS 2 adds to a service or action."""
+def _find_added(group: Any, name: str) -> Any:
+    """Return what ROS 2 adds to a service or action, as its module's `__getattr__`."""
     module = group.__module__
-
-    def get(name: str) -> Any:
-        if name.startswith(prefix):
-            getattr(group, group._added)
-            if name in vars(sys.modules[module]):
-                return vars(sys.modules[module])[name]
-        raise AttributeError(f"module {module!r} has no attribute {name!r}")
-
-    return get
+    if name.startswith(f"{wire_name(group.__name__)}_"):
+        getattr(group, group._added)
+        if name in vars(sys.modules[module]):
+            return vars(sys.modules[module])[name]
+    raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
 
 class _GroupMeta(InterfaceMeta):
@@ -545,6 +533,8 @@ class _GroupMeta(InterfaceMeta):
     _interface: ClassVar[Any] = None
     #: The attribute that stands for what ROS 2 adds, in a class that is not itself part of it.
     _added: ClassVar[str]
+    #: The function of `typesupport` that sets its capsule.
+    _import: ClassVar[str]
 
     def __new__(
         cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
@@ -556,8 +546,15 @@ class _GroupMeta(InterfaceMeta):
         metaclass._interface = created
         if cls._added not in namespace and len(created.__mro__) == 3:
             module: Any = sys.modules[created.__module__]
-            module.__getattr__ = _getter(created, f"{wire_name(name)}_")
+            module.__getattr__ = codec.partial(_find_added, created)
         return created
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the capsule that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        getattr(typesupport, cls._import)(cls._interface)
 
     def __call__(cls, *_values: object, **_named: object) -> Any:
         raise NotImplementedError(
@@ -569,26 +566,14 @@ class ServiceMeta(_GroupMeta):
     """The metaclass of services."""
 
     _added = "Event"
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        """Set the capsule that rclpy reads from this metaclass."""
-        from . import typesupport
-
-        typesupport.import_service(cls._interface)
+    _import = "import_service"
 
 
 class ActionMeta(_GroupMeta):
     """The metaclass of actions."""
 
     _added = "Impl"
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        """Set the capsule that rclpy reads from this metaclass."""
-        from . import typesupport
-
-        typesupport.import_action(cls._interface)
+    _import = "import_action"
 
 
 class Service(metaclass=ServiceMeta):

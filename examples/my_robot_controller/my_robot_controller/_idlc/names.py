@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-#: Class attributes that look like the slot of a field.
-RESERVED_SLOTS = frozenset({"_fields_and_field_types"})
-
-
 def public_name(name: str) -> str:
     """Return what a field is called as attribute and argument, or a type as class."""
     return name + "_" if iskeyword(name) else name
@@ -27,7 +23,8 @@ def public_name(name: str) -> str:
 def slot_name(field: str) -> str:
     """Return the slot that holds a field's value, named as rosidl names it."""
     slot = "_" + field
-    return slot + "_" if slot in RESERVED_SLOTS else slot
+    # an attribute of classes has this name
+    return slot + "_" if slot == "_fields_and_field_types" else slot
 
 
 def name_of(slot: Any) -> str:
@@ -152,6 +149,10 @@ class importing:
         self, _kind: object, error: BaseException | None, _trace: object
     ) -> None:
         if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
+            return
+        if (
+            error.name == "idlc_runtime"
+        ):  # a package says itself that it lacks its runtime
             return
         package = (error.name or "").partition(".")[0] or "another package"
         raise MissingPackageError(

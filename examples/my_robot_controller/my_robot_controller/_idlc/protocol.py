@@ -15,10 +15,10 @@ from struct import pack
 from types import FunctionType
 
 from . import codec
-from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
-from .message import Message, OnDemand, Service, define, equal, same
-from .names import importing, owner_of, public_name, wire_name
-from .sequences import ListOf, sequence_reader, sequence_writer
+from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, order_of, wide_text
+from .message import Message, OnDemand, Service, define, equal
+from .names import owner_of, public_name, wire_name
+from .sequences import ListOf, sequence_writer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -64,20 +64,21 @@ class ActionImpl:
     GoalStatusMessage = OnDemand("protocol", "import_goal_status")
 
 
-def import_cancel_goal(_impl: type) -> Any:
+def import_cancel_goal(impl: type) -> Any:
     """Return the service that cancels goals of any action."""
-    with importing():
-        return __import__("action_msgs.srv", fromlist=["srv"]).CancelGoal
+    from .typeinfo import types_of
+
+    return types_of(impl).find_class("action_msgs/srv/CancelGoal")
 
 
-def import_goal_status(_impl: type) -> Any:
+def import_goal_status(impl: type) -> Any:
     """Return the message in which an action server publishes the states of goals."""
-    with importing():
-        return __import__("action_msgs.msg", fromlist=["msg"]).GoalStatusArray
+    from .typeinfo import types_of
+
+    return types_of(impl).find_class("action_msgs/msg/GoalStatusArray")
 
 
-# What the composed messages are made of: their fields as type checkers see them, constructors
-# and docstrings
+# the fields of composed messages, as type checkers see them, constructors and docstrings
 
 
 @define
@@ -200,7 +201,9 @@ def event_of(service: Any) -> Any:
         if "Event" not in vars(service):
             composition = _Composition(service, service.Request)
             call = f"a call of {composition.name}"
-            service.Event = composition.add_event(composition.name, call)
+            service.Event = composition.add_message(
+                f"{composition.name}_Event", ServiceEvent, call
+            )
     return service.Event
 
 
@@ -229,16 +232,17 @@ class _Composition:
         self.added: dict[str, Any] = {}
 
     def add_impl(self) -> Any:
-        """Add all that an action gets."""
         goal = f"a {self.name} goal"
         sending, getting = f"{self.name}_SendGoal", f"{self.name}_GetResult"
         feedback = f"{self.name}_FeedbackMessage"
         self.add_message(f"{sending}_Request", SendGoalRequest, goal)
         self.add_message(f"{sending}_Response", SendGoalResponse, goal)
-        self.add_event(sending, f"a call that starts {goal}")
+        self.add_message(f"{sending}_Event", ServiceEvent, f"a call that starts {goal}")
         self.add_message(f"{getting}_Request", GetResultRequest, goal)
         self.add_message(f"{getting}_Response", GetResultResponse, goal)
-        self.add_event(getting, "a call that waits for a result")
+        self.add_message(
+            f"{getting}_Event", ServiceEvent, "a call that waits for a result"
+        )
         parts = {
             "FeedbackMessage": self.add_message(feedback, FeedbackMessage, goal),
             "SendGoalService": self.add_service(sending, f"Starts {goal}"),
@@ -259,14 +263,9 @@ class _Composition:
             type(Service), name, Service, f"{purpose}. Added by ROS 2.", parts
         )
 
-    def add_event(self, service: str, call: str) -> Any:
-        """Add the event of a service."""
-        return self.add_message(f"{service}_Event", ServiceEvent, call)
-
     def add(
         self, make: Any, name: str, base: type, doc: str, parts: dict[str, Any]
     ) -> Any:
-        """Add a class."""
         name = public_name(name)
         place = {"__module__": self.module, "__qualname__": name, "__doc__": doc}
         self.scope[name] = self.added[name] = made = make(name, (base,), place | parts)
@@ -281,7 +280,7 @@ class _Composition:
             "__match_args__": tuple(hints),
             "__annotations__": hints,
             "__init__": self.constructor(shape.__init__, name, hints),
-            "__eq__": _equal,
+            "__eq__": equal,
             "_fill": _fill,
             "_usual": type(defaults[0]),
             "_makers": {
@@ -317,7 +316,6 @@ class _Composition:
         return bound
 
     def hint(self, field: FieldInfo) -> str:
-        """Return the annotation of a field."""
         if field.nested is None:
             return _plain(field).__name__
         kind, _, short = field.nested.name.rpartition("/")
@@ -331,7 +329,6 @@ class _Composition:
         return hint
 
     def maker(self, field: FieldInfo) -> Callable[[], Any]:
-        """Return a function that makes the default of a field."""
         if field.is_list:
             return list
         if field.nested is None:
@@ -366,17 +363,7 @@ def _fill(self: Any, options: Any, *values: Any) -> None:
         setattr(self, name, make() if value is None else value)
 
 
-def _equal(self: Any, other: Any) -> Any:
-    owner = owner_of(type(self))
-    if not isinstance(other, owner):
-        return equal(self, other)
-    return all(
-        same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
-    )
-
-
 def _plain(field: FieldInfo) -> type:
-    """Return the Python type of a field of numbers."""
     return bool if _spell(field) == "bool" else int
 
 
@@ -395,20 +382,18 @@ def _spell(field: FieldInfo, boolean: str = "bool", listed: str = "{}[<={}]") ->
 
 def field_codecs(kind: type) -> codec.Codecs:
     """Return codecs that read and write a message field by field, as the type data has them."""
-    from .typeinfo import read_carefully, structure_of
+    from functools import cache
+
+    from .typeinfo import CarefulReader, structure_of
 
     owner = owner_of(kind)
     structure = structure_of(owner)
 
+    @cache
+    def maker_of(other: Structure) -> Any:
+        return codec.maker(owner if other is structure else other.find_class())
+
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
-        def numbers(message: Any, field: Any, raw: Any) -> Any:
-            if field.is_sequence:
-                reading_of = reading.of(type(message))
-                return sequence_reader(order, field.primitive.code, reading_of)(raw)
-            from .arrays import array_reader
-
-            return array_reader(order, field.primitive.name, field.size, reading)(raw)
-
         def encode(message: Any, join: Any) -> Any:
             writer = _Writer(order)
             writer.message(message, structure)
@@ -417,7 +402,10 @@ def field_codecs(kind: type) -> codec.Codecs:
         def decode(data: Any) -> Any:
             if not reading.copy:
                 data = memoryview(data)
-            return read_carefully(owner, data, codec.maker, numbers)
+            reader = CarefulReader(
+                data, order_of(data), lambda other: maker_of(other)(), reading
+            )
+            return reader.message(structure, "")
 
         return codec.Codec(encode, decode, bulk=True)
 
@@ -439,7 +427,6 @@ class _Writer:
         self.at += padding + len(raw)
 
     def message(self, message: Any, structure: Structure) -> None:
-        """Write a structure."""
         if not structure.fields:
             self.put(b"\0", 1)
         for field in structure.fields:
@@ -471,7 +458,6 @@ class _Writer:
             self.put(raw, primitive.size)
 
     def element(self, value: Any, field: FieldInfo) -> None:
-        """Write one value."""
         if field.nested:
             self.message(value, field.nested)
         elif field.primitive is not None:

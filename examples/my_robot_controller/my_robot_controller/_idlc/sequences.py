@@ -15,7 +15,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from functools import partial
-    from typing import Any, Generic, TypeVar
+    from typing import Any, Generic, TypeAlias, TypeVar
 
     from .codec import Reading
 
@@ -67,94 +67,83 @@ def converted(code: str, values: Any) -> Any:
     return result
 
 
-class NumberSequence(Generic[Number]):
-    """A field that reads as an `array.array` and takes any sequence of numbers.
+class NumberField:
+    """A field that takes any sequence of numbers and reads as what `convert` makes of it.
 
     In the class body it stands for the field; the metaclass puts a property in its place.
     """
 
+    convert: Callable[[Any], Any]
+    #: The type of an element in `struct`.
     code: str
-
-    def __init_subclass__(cls, code: str) -> None:
-        cls.code = code
 
     def property_of(self, slot: Any) -> property:
         """Return the property over the slot member `slot`."""
-        code = self.code
+        convert = self.convert
         name = name_of(slot)
         store = slot.__set__
 
         def setter(message: object, values: Any) -> None:
             try:
-                store(message, converted(code, values))
+                store(message, convert(values))
                 return
             except (TypeError, ValueError, OverflowError) as error:
                 failure = error
             from .checked import refused
 
-            raise refused(name, code, None, values, failure) from None
+            raise refused(message, name, values, failure) from None
 
         return property(slot.__get__, setter)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
+        """Return how pydantic checks and writes the numbers."""
+        from .conversions import numbers_schema
+
+        kind = float if cls.code in "fd" else int
+        return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
+
+
+class NumberSequence(NumberField, Generic[Number]):
+    """A field that reads as an `array.array`."""
+
+    def __init__(self) -> None:
+        self.convert = partial(converted, self.code)
 
     @classmethod
     def of(cls, values: tuple[Number, ...]) -> array[Number]:
         """Return what the field holds for some values."""
         return array(cls.code, values)
 
-    @classmethod
-    def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
-        """Return how pydantic checks and writes a sequence."""
-        from .conversions import numbers_schema
-
-        kind = float if cls.code in "fd" else int
-        return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
-
     if TYPE_CHECKING:
 
-        def __get__(
-            self, message: object, owner: type | None = None
-        ) -> array[Number]: ...
+        def __get__(self, message: object, owner: Any = None) -> array[Number]: ...
         def __set__(self, message: object, values: Iterable[Number]) -> None: ...
 
 
-class Int8Sequence(NumberSequence[int], code="b"):
-    """A sequence of int8."""
-
-
-class UInt8Sequence(NumberSequence[int], code="B"):
-    """A sequence of uint8, or of char."""
-
-
-class Int16Sequence(NumberSequence[int], code="h"):
-    """A sequence of int16."""
-
-
-class UInt16Sequence(NumberSequence[int], code="H"):
-    """A sequence of uint16."""
-
-
-class Int32Sequence(NumberSequence[int], code="i"):
-    """A sequence of int32."""
-
-
-class UInt32Sequence(NumberSequence[int], code="I"):
-    """A sequence of uint32."""
-
-
-class Int64Sequence(NumberSequence[int], code="q"):
-    """A sequence of int64."""
-
-
-class UInt64Sequence(NumberSequence[int], code="Q"):
-    """A sequence of uint64."""
-
-
-class Float32Sequence(NumberSequence[float], code="f"):
-    """A sequence of float32."""
-
-
-class Float64Sequence(NumberSequence[float], code="d"):
-    """A sequence of float64."""
+#: The codes of numbers, by what the names of their classes begin with.
+NUMBERS = dict(
+    zip(
+        "Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Float32 Float64".split(),
+        "bBhHiIqQfd",
+        strict=True,
+    )
+)
+if TYPE_CHECKING:
+    Int8Sequence: TypeAlias = NumberSequence[int]
+    UInt8Sequence: TypeAlias = NumberSequence[int]
+    Int16Sequence: TypeAlias = NumberSequence[int]
+    UInt16Sequence: TypeAlias = NumberSequence[int]
+    Int32Sequence: TypeAlias = NumberSequence[int]
+    UInt32Sequence: TypeAlias = NumberSequence[int]
+    Int64Sequence: TypeAlias = NumberSequence[int]
+    UInt64Sequence: TypeAlias = NumberSequence[int]
+    Float32Sequence: TypeAlias = NumberSequence[float]
+    Float64Sequence: TypeAlias = NumberSequence[float]
+else:
+    for _name, _code in NUMBERS.items():
+        _name += "Sequence"
+        globals()[_name] = type(_name, (NumberSequence,), {"code": _code})
 
 
 def to_list(
@@ -203,9 +192,7 @@ class ListOf(Generic[Element]):
 
     if TYPE_CHECKING:
 
-        def __get__(
-            self, message: object, owner: type | None = None
-        ) -> list[Element]: ...
+        def __get__(self, message: object, owner: Any = None) -> list[Element]: ...
         def __set__(self, message: object, values: Iterable[Element]) -> None: ...
 
     else:

@@ -13,10 +13,12 @@ from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from .cdr import NATIVE, order_of
+from .codec import COPYING, Reading
 from .names import DecodeError, importing, public_name, slot_name, wire_name
+from .sequences import sequence_reader
 
 
 class Primitive(NamedTuple):
@@ -56,8 +58,6 @@ PRIMITIVES = {
     16: Primitive("byte", 1, "c"),
 }
 SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
-STRING_IDS = {17, 18, 21, 22}
-WIDE_IDS = {18, 22}
 DUMMY = "structure_needs_at_least_one_member"
 
 
@@ -79,8 +79,8 @@ class FieldInfo:
         self.shape, self.base = divmod(self.type_id, 48)
         self.nested = nested
         self.primitive = PRIMITIVES.get(self.base)
-        self.text = self.base in STRING_IDS
-        self.wide = self.base in WIDE_IDS
+        self.text = self.base in {17, 18, 21, 22}
+        self.wide = self.base in {18, 22}
         self.size = self.capacity if self.shape == ARRAY else None
         self.is_sequence = self.shape > ARRAY
         self.bound = self.capacity if self.shape == BOUNDED_SEQUENCE else None
@@ -88,10 +88,6 @@ class FieldInfo:
         self.public = public_name(self.name)
         self.is_list = self.shape != SCALAR
         self.is_numeric = self.primitive is not None and self.primitive.code not in "?c"
-
-
-#: Makes the value of a field of a message, from the bytes of numbers.
-Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
@@ -182,7 +178,17 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-_types_of = cache(Types)
+_types_in = cache(Types)
+
+
+def types_of(kind: type) -> Types:
+    """Return what the package of a generated class says of types."""
+    home, _, _ = kind.__module__.rsplit(".", 2)
+    try:
+        data = import_module(f"{home}._type_data")
+    except ModuleNotFoundError:
+        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
+    return _types_in(data)
 
 
 def structure_of(kind: type) -> Structure:
@@ -195,12 +201,8 @@ def structure_of(kind: type) -> Structure:
 
 @cache
 def _structure_of(owner: type) -> Structure:
-    home, kind, _ = owner.__module__.rsplit(".", 2)
-    try:
-        data = import_module(f"{home}._type_data")
-    except ModuleNotFoundError:
-        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    types = _types_of(data)
+    types = types_of(owner)
+    kind = owner.__module__.rsplit(".", 2)[1]
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
@@ -276,16 +278,12 @@ def counted(count: int, what: str) -> str:
 
 
 def read_carefully(
-    kind: type,
-    data: Any,
-    maker: Callable[[Any], Callable[[], Any]],
-    numbers: Numbers | None = None,
+    kind: type, data: bytes, maker: Callable[[Any], Callable[[], Any]]
 ) -> Any:
     """Return the message in `data`; raise DecodeError naming the field and the byte.
 
     It takes what middlewares take although it is not right: text that is not UTF-8, text without
-    its terminating zero. `maker` returns the function that makes empty messages of a class,
-    `numbers` makes the value of a numeric array or sequence of its bytes.
+    its terminating zero. `maker` returns the function that makes empty messages of a class.
     """
     structure = structure_of(kind)
 
@@ -293,7 +291,7 @@ def read_carefully(
         # what a constructor makes may be larger than the buffer
         return maker(kind if other is structure else other.find_class())()
 
-    return CarefulReader(data, order_of(data), make, numbers).message(structure, "")
+    return CarefulReader(data, order_of(data), make).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:
@@ -314,12 +312,12 @@ class CarefulReader:
         data: Any,
         order: str,
         make: Callable[[Structure], Any],
-        numbers: Numbers | None = None,
+        reading: Reading = COPYING,
     ) -> None:
         self.data = data
         self.order = order
         self.make = make
-        self.numbers = numbers or self.copied
+        self.reading = reading
         self.at = 4
 
     def message(self, structure: Structure, path: str) -> Any:
@@ -349,17 +347,16 @@ class CarefulReader:
             return self.numbers(message, field, raw)
         return [self.element(field, f"{path}[{index}]") for index in range(count)]
 
-    def copied(self, _message: Any, field: FieldInfo, raw: bytes) -> Any:
-        """Return an array of numbers."""
+    def numbers(self, message: Any, field: FieldInfo, raw: Any) -> Any:
+        """Return the value of a numeric array or sequence."""
         assert field.primitive is not None
-        result = array(field.primitive.code, raw)
-        if self.order != NATIVE:
-            result.byteswap()
         if field.is_sequence:
-            return result
-        import numpy as np
+            reading = self.reading.of(type(message))
+            return sequence_reader(self.order, field.primitive.code, reading)(raw)
+        from .arrays import array_reader
 
-        return np.array(result, field.primitive.name)
+        name, size = field.primitive.name, field.capacity
+        return array_reader(self.order, name, size, self.reading)(raw)
 
     def element(self, field: FieldInfo, path: str) -> Any:
         """Read one value."""

@@ -3,8 +3,7 @@
 """The types of comments_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"comments_msgs"'
-    ',"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"comments_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"comments_msgs/action/Fill":{"type_name":"comments_msgs/action/Fill","fields":[{"name":"goal","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Goal"},"default_value":""},{"name":"result","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Result"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Feedback"},"default_value":""},{"name":"send_goal_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_SendGoal"},"default_value":""},{"name":"get_result_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_GetResult"},"default_value":""},{"name":"feedback_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_FeedbackMessage"},"default_value":""}]}'
     ',"comments_msgs/action/Fill_Feedback":{"type_name":"comments_msgs/action/Fill_Feedback","fields":[{"name":"level","type":{"type_id":10,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"comments_msgs/action/Fill_FeedbackMessage":{"type_name":"comments_msgs/action/Fill_FeedbackMessage","fields":[{"name":"goal_id","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"unique_identifier_msgs/msg/UUID"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Feedback"},"default_value":""}]}'
@@ -25,8 +24,7 @@ JSON = (
     ',"comments_msgs/srv/Reset_Response":{"type_name":"comments_msgs/srv/Reset_Response","fields":[{"name":"ok","type":{"type_id":15,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"service_msgs/msg/ServiceEventInfo":{"type_name":"service_msgs/msg/ServiceEventInfo","fields":[{"name":"event_type","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamp","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"client_gid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"sequence_number","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"unique_identifier_msgs/msg/UUID":{"type_name":"unique_identifier_msgs/msg/UUID","fields":[{"name":"uuid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
-    "}"
-    ',"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
+    '},"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
     ',"comments_msgs/action/Fill":"RIHS01_de8c24cb4c330b6fd4cf650beb8280b7e8441f05989a0de9b1844252a10d0fee"'
     ',"comments_msgs/action/Fill_Feedback":"RIHS01_ee1061b664f048681542149eb918c15a437a2f4021ac1c628686dc5451149a27"'
     ',"comments_msgs/action/Fill_FeedbackMessage":"RIHS01_d05136e4272d3ff24cfeea64ba1fb13efd8f73fcdf6cef4b4339cf754566b9b4"'
@@ -47,10 +45,7 @@ JSON = (
     ',"comments_msgs/srv/Reset_Response":"RIHS01_08a2e56832b8dc9ed65ee0d705456cfe5f2b40b2d3b4295bac125e220fd4ef3a"'
     ',"service_msgs/msg/ServiceEventInfo":"RIHS01_41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"'
     ',"unique_identifier_msgs/msg/UUID":"RIHS01_1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437"'
-    "}"
-    ',"sources":{"comments_msgs/action/Fill":"# Fills a gauge.\\nfloat32 level  # to here [l]\\n---\\nfloat32 reached  # [l]\\n---\\nfloat32 level\\n"'
+    '},"sources":{"comments_msgs/action/Fill":"# Fills a gauge.\\nfloat32 level  # to here [l]\\n---\\nfloat32 reached  # [l]\\n---\\nfloat32 level\\n"'
     ',"comments_msgs/msg/Gauge":"# The state of a gauge, \\"quoted\\" and with a \\\\\\\\ backslash.\\n# \\"\\"\\" ends no docstring, {{ nothing }} is filled in.\\n#\\n#   Indented, for who reads it.\\n\\n# How often it is read [Hz]\\nfloat32 rate 10.0\\nuint8 level     # 0 is empty\\nuint8 EMPTY=0   # nothing [l]\\nuint8 FULL=255\\nstring<=20 label \\"it\'s \\\\\\\\\\"full\\\\\\\\\\"\\"  # what stands on it\\nstring[<=3] notes [\\"a\\", \\"it\'s\\"]   # at most three, in a comment that goes on for so long that the line has to be broken somewhere\\nint16[] samples [-1, 0, 1]\\nfloat64[9] covariance  # row by row [m^2]\\nbyte flags 7\\n"'
-    ',"comments_msgs/srv/Reset":"# Sets a gauge back.\\nstring reason  # why\\n---\\n# Whether it worked.\\nbool ok\\n"'
-    "}"
-    "}"
+    ',"comments_msgs/srv/Reset":"# Sets a gauge back.\\nstring reason  # why\\n---\\n# Whether it worked.\\nbool ok\\n"}}'
 )

@@ -3,8 +3,7 @@
 """The types of lyrical_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"lyrical_msgs"'
-    ',"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"lyrical_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"lyrical_msgs/msg/Lists":{"type_name":"lyrical_msgs/msg/Lists","fields":[{"name":"names","type":{"type_id":161,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"(\'a\', \'b\')"},{"name":"words","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"lyrical_msgs/msg/Words"},"default_value":""},{"name":"three","type":{"type_id":49,"capacity":3,"string_capacity":0,"nested_type_name":"lyrical_msgs/msg/Words"},"default_value":""},{"name":"flags","type":{"type_id":111,"capacity":4,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"raw","type":{"type_id":64,"capacity":2,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"wide","type":{"type_id":66,"capacity":2,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"str","type":{"type_id":113,"capacity":2,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"position","type":{"type_id":58,"capacity":3,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"data","type":{"type_id":147,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"texts_in_a_long_field_name","type":{"type_id":161,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"lyrical_msgs/msg/Words":{"type_name":"lyrical_msgs/msg/Words","fields":[{"name":"text","type":{"type_id":17,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"none"},{"name":"count","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"-1"},{"name":"raw","type":{"type_id":16,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"list","type":{"type_id":15,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"d","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.5"}]}'
     ',"lyrical_msgs/srv/Run":{"type_name":"lyrical_msgs/srv/Run","fields":[{"name":"request_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"lyrical_msgs/srv/Run_Request"},"default_value":""},{"name":"response_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"lyrical_msgs/srv/Run_Response"},"default_value":""},{"name":"event_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"lyrical_msgs/srv/Run_Event"},"default_value":""}]}'
@@ -12,8 +11,7 @@ JSON = (
     ',"lyrical_msgs/srv/Run_Request":{"type_name":"lyrical_msgs/srv/Run_Request","fields":[{"name":"args","type":{"type_id":161,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"wait","type":{"type_id":15,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"lyrical_msgs/srv/Run_Response":{"type_name":"lyrical_msgs/srv/Run_Response","fields":[{"name":"status","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"-1"},{"name":"stamps","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""}]}'
     ',"service_msgs/msg/ServiceEventInfo":{"type_name":"service_msgs/msg/ServiceEventInfo","fields":[{"name":"event_type","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamp","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"client_gid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"sequence_number","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
-    "}"
-    ',"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
+    '},"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
     ',"lyrical_msgs/msg/Lists":"RIHS01_5e460f842fa67e351fa16d0cacb439c60c5320d5dba9df9176f6412b2e291a07"'
     ',"lyrical_msgs/msg/Words":"RIHS01_c2ddc632e2a9843a326b7600b64a9716379ec879ea22f4945fdfc4af8be9838d"'
     ',"lyrical_msgs/srv/Run":"RIHS01_0ccd4ab6b37e321665f35aa114823b7b00de062efe29e67170757c07b8707475"'
@@ -21,10 +19,7 @@ JSON = (
     ',"lyrical_msgs/srv/Run_Request":"RIHS01_3c053b864d0222c75b14ef9b944e100a605df56919b3072ffb4c0abe7caeaa35"'
     ',"lyrical_msgs/srv/Run_Response":"RIHS01_2bfd2f3c0674dc1c2b27649f4a57c8be1a7ffa019561abe84e5b91cfa7d4d76d"'
     ',"service_msgs/msg/ServiceEventInfo":"RIHS01_41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"'
-    "}"
-    ',"sources":{"lyrical_msgs/msg/Lists":"string[] names [\\"a\\", \\"b\\"]\\nlyrical_msgs/Words[] words\\nWords[3] three\\nbool[<=4] flags\\nbyte[2] raw\\nwstring[2] wide\\nstring[<=2] str\\nfloat32[3] position\\nuint8[] data\\nstring[] texts_in_a_long_field_name\\n"'
+    '},"sources":{"lyrical_msgs/msg/Lists":"string[] names [\\"a\\", \\"b\\"]\\nlyrical_msgs/Words[] words\\nWords[3] three\\nbool[<=4] flags\\nbyte[2] raw\\nwstring[2] wide\\nstring[<=2] str\\nfloat32[3] position\\nuint8[] data\\nstring[] texts_in_a_long_field_name\\n"'
     ',"lyrical_msgs/msg/Words":"string text \\"none\\"\\nint32 count -1\\nbyte raw\\nbool list\\nfloat64 d 0.5\\n"'
-    ',"lyrical_msgs/srv/Run":"string[] args\\nbool wait\\n---\\nint32 status -1\\nbuiltin_interfaces/Time[] stamps\\n"'
-    "}"
-    "}"
+    ',"lyrical_msgs/srv/Run":"string[] args\\nbool wait\\n---\\nint32 status -1\\nbuiltin_interfaces/Time[] stamps\\n"}}'
 )

@@ -3,8 +3,7 @@
 """The types of names_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"names_msgs"'
-    ',"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"names_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"geometry_msgs/msg/Point":{"type_name":"geometry_msgs/msg/Point","fields":[{"name":"x","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"y","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"z","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"geometry_msgs/msg/Pose":{"type_name":"geometry_msgs/msg/Pose","fields":[{"name":"position","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"geometry_msgs/msg/Point"},"default_value":""},{"name":"orientation","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"geometry_msgs/msg/Quaternion"},"default_value":""}]}'
     ',"geometry_msgs/msg/Quaternion":{"type_name":"geometry_msgs/msg/Quaternion","fields":[{"name":"x","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.0"},{"name":"y","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.0"},{"name":"z","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.0"},{"name":"w","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"1.0"}]}'
@@ -20,8 +19,7 @@ JSON = (
     ',"names_msgs/srv/None_Request":{"type_name":"names_msgs/srv/None_Request","fields":[{"name":"structure_needs_at_least_one_member","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"names_msgs/srv/None_Response":{"type_name":"names_msgs/srv/None_Response","fields":[{"name":"structure_needs_at_least_one_member","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"service_msgs/msg/ServiceEventInfo":{"type_name":"service_msgs/msg/ServiceEventInfo","fields":[{"name":"event_type","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamp","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"client_gid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"sequence_number","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
-    "}"
-    ',"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
+    '},"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
     ',"geometry_msgs/msg/Point":"RIHS01_6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881"'
     ',"geometry_msgs/msg/Pose":"RIHS01_d501954e9476cea2996984e812054b68026ae0bfae789d9a10b23daf35cc90fa"'
     ',"geometry_msgs/msg/Quaternion":"RIHS01_8a765f66778c8ff7c8ab94afcc590a2ed5325a1d9a076ffff38fbce36f458684"'
@@ -37,15 +35,12 @@ JSON = (
     ',"names_msgs/srv/None_Request":"RIHS01_54982df23bf29dcbf523e249c966f33db72e9399f645f87e77fa87f2f34e0b1e"'
     ',"names_msgs/srv/None_Response":"RIHS01_cee5cdbfe64b672db1401b2198d2900e322a8ac05476259cd1990ccc477ac447"'
     ',"service_msgs/msg/ServiceEventInfo":"RIHS01_41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"'
-    "}"
-    ',"sources":{"names_msgs/msg/Any":"geometry_msgs/Pose pose\\n"'
+    '},"sources":{"names_msgs/msg/Any":"geometry_msgs/Pose pose\\n"'
     ',"names_msgs/msg/FOOBar":"FooBar inner\\n"'
     ',"names_msgs/msg/FooBar":"int32 a\\n"'
     ',"names_msgs/msg/Hiding":"# Fields that are called like methods.\\nPoint validate\\nuint8 serialize 1\\nfloat32[] deserialize\\nint32[3] from_dict\\nstring[] to_dict\\n"'
     ',"names_msgs/msg/Odd":"int32 class\\nint32 serialize 3\\nint32 self\\nint32 fields_and_field_types\\nint32 int 4\\nstring list\\nbyte bytes\\nbool bool\\nfloat32 float\\nstring[] str [\\"a\\", \'b \\"c\\"\']\\nint32 message\\nint32 data\\nint32 at\\nPoint[] item\\nPoint array\\nint32[3] order [1, 2, 3]\\n"'
     ',"names_msgs/msg/Point":"float64 x\\nfloat64 y\\n"'
     ',"names_msgs/msg/Text":"geometry_msgs/Point other\\nPoint own\\nAny[<=2] any\\n"'
-    ',"names_msgs/srv/None":"---\\n"'
-    "}"
-    "}"
+    ',"names_msgs/srv/None":"---\\n"}}'
 )

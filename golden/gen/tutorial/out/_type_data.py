@@ -3,8 +3,7 @@
 """The types of tutorial_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"tutorial_msgs"'
-    ',"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"tutorial_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"service_msgs/msg/ServiceEventInfo":{"type_name":"service_msgs/msg/ServiceEventInfo","fields":[{"name":"event_type","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamp","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"client_gid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"sequence_number","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"tutorial_msgs/action/Countdown":{"type_name":"tutorial_msgs/action/Countdown","fields":[{"name":"goal","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_Goal"},"default_value":""},{"name":"result","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_Result"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_Feedback"},"default_value":""},{"name":"send_goal_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_SendGoal"},"default_value":""},{"name":"get_result_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_GetResult"},"default_value":""},{"name":"feedback_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_FeedbackMessage"},"default_value":""}]}'
     ',"tutorial_msgs/action/Countdown_Feedback":{"type_name":"tutorial_msgs/action/Countdown_Feedback","fields":[{"name":"current_count","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
@@ -38,8 +37,7 @@ JSON = (
     ',"tutorial_msgs/srv/AddTwoInts_Request":{"type_name":"tutorial_msgs/srv/AddTwoInts_Request","fields":[{"name":"a","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"b","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"tutorial_msgs/srv/AddTwoInts_Response":{"type_name":"tutorial_msgs/srv/AddTwoInts_Response","fields":[{"name":"sum","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"unique_identifier_msgs/msg/UUID":{"type_name":"unique_identifier_msgs/msg/UUID","fields":[{"name":"uuid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
-    "}"
-    ',"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
+    '},"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
     ',"service_msgs/msg/ServiceEventInfo":"RIHS01_41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"'
     ',"tutorial_msgs/action/Countdown":"RIHS01_6679a98879e901e445b14ecdc72cb033887494f1fd42cf2cf3daac444b83d6e5"'
     ',"tutorial_msgs/action/Countdown_Feedback":"RIHS01_7377fdc16f36dae5646df46fbf12b24f6d5a422187fde671adca8079f11c1ffd"'
@@ -73,11 +71,8 @@ JSON = (
     ',"tutorial_msgs/srv/AddTwoInts_Request":"RIHS01_c115e634c66f13606e2ee9a637588676cf31ac0b94d96754640924f1f78a3cd6"'
     ',"tutorial_msgs/srv/AddTwoInts_Response":"RIHS01_37f4f3f23093969896e815bea39fd14fc73f370b6df0db7d35c0d86cafc3a92f"'
     ',"unique_identifier_msgs/msg/UUID":"RIHS01_1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437"'
-    "}"
-    ',"sources":{"tutorial_msgs/action/Countdown":"# Where to start counting down.\\nint32 target_count\\n---\\nint32 final_count  # The last number reached; 0 unless cancelled\\nbool success\\n---\\nint32 current_count\\n"'
+    '},"sources":{"tutorial_msgs/action/Countdown":"# Where to start counting down.\\nint32 target_count\\n---\\nint32 final_count  # The last number reached; 0 unless cancelled\\nbool success\\n---\\nint32 current_count\\n"'
     ',"tutorial_msgs/action/ExecuteTask":"string task_name  # The task to execute, e.g. \\"dock\\"\\n---\\nbool success\\n---\\nstring current_status  # What the robot is doing now, for people to read\\n"'
     ',"tutorial_msgs/msg/RobotCommand":"# A simple robot command: how fast to drive and turn until the next one arrives.\\n#\\n# Sent by the operator, obeyed by the controller node.\\n\\nstring STOP=\\"stop\\"\\nstring MOVE=\\"move\\"\\nstring TURN=\\"turn\\"\\n\\nstring command_type        # What to do: STOP, MOVE or TURN\\nfloat32 linear_velocity_x  # Forward speed, negative to reverse [m/s]\\nfloat32 angular_velocity_z # Turn rate, counter-clockwise seen from above [rad/s]\\nstring frame_id            # The frame that the velocities are given in\\n"'
-    ',"tutorial_msgs/srv/AddTwoInts":"# The service of the ROS 2 tutorials.\\nint64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"'
-    "}"
-    "}"
+    ',"tutorial_msgs/srv/AddTwoInts":"# The service of the ROS 2 tutorials.\\nint64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"}}'
 )
