@@ -15,7 +15,7 @@ from .names import DecodeError, ValidationError, owner_of
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
-    from functools import partial as partial
+    from functools import partial
     from typing import Any, TypeAlias
 
     from .conversions import Join

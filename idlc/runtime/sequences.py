@@ -122,13 +122,8 @@ class NumberSequence(NumberField, Generic[Number]):
 
 
 #: The codes of numbers, by what the names of their classes begin with.
-NUMBERS = dict(
-    zip(
-        "Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Float32 Float64".split(),
-        "bBhHiIqQfd",
-        strict=True,
-    )
-)
+_NAMES = "Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Float32 Float64"
+NUMBERS = dict(zip(_NAMES.split(), "bBhHiIqQfd", strict=True))
 if TYPE_CHECKING:
     Int8Sequence: TypeAlias = NumberSequence[int]
     UInt8Sequence: TypeAlias = NumberSequence[int]
@@ -239,14 +234,20 @@ def sequence_copier(order: str, code: str) -> Callable[[Any], Any]:
     return copy
 
 
+def view_reader(order: str, name: str) -> Callable[[Any], Any]:
+    """Return a function that makes a numpy array over a buffer, in whichever byte order that is."""
+    import numpy as np
+
+    dtype: Any = np.dtype(name)
+    return partial(np.frombuffer, dtype=dtype.newbyteorder(order))
+
+
 def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], Any]:
     """Return a function that turns a buffer in the wire's byte order into a field's value.
 
     That is a new `array.array`, or a `numpy.ndarray` over the buffer itself.
     """
     if not reading.copy:
-        from .arrays import view_reader
-
         return view_reader(order, code)
     new = array(code).__copy__  # half of what `array(code)` takes
 

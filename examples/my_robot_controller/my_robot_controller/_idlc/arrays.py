@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from .cdr import NATIVE
-from .sequences import NUMBERS, NumberField
+from .sequences import NUMBERS, NumberField, view_reader
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -118,12 +118,6 @@ def buffer_writer(order: str, name: str, size: int) -> Callable[[Any], Any]:
         return write(values)
 
     return native if order == NATIVE or dtype.itemsize == 1 else write
-
-
-def view_reader(order: str, name: str) -> Callable[[Any], Any]:
-    """Return a function that makes an array over a buffer, in whichever byte order that is."""
-    dtype: Any = np.dtype(name)
-    return partial(np.frombuffer, dtype=dtype.newbyteorder(order))
 
 
 def array_reader(

@@ -18,6 +18,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from dataclasses import Field
+    from functools import partial
     from typing import Any, ClassVar, Literal, TypeVar
 
     import typing_extensions
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
         return kind
 
 else:
+    from _functools import partial
 
     def define(kind):
         """Return a generated class as it is."""
@@ -546,7 +548,7 @@ class _GroupMeta(InterfaceMeta):
         metaclass._interface = created
         if cls._added not in namespace and len(created.__mro__) == 3:
             module: Any = sys.modules[created.__module__]
-            module.__getattr__ = codec.partial(_find_added, created)
+            module.__getattr__ = partial(_find_added, created)
         return created
 
     @classmethod
