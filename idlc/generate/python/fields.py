@@ -27,10 +27,14 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
 
     `file` is the one that defines it, within its package.
     """
-    line, *more = _lines(structure.comment) or [purpose]
+    place, hidden = _place(structure, file), _hidden(structure)
+    comment = _lines(structure.comment)
+    if not comment and not hidden and place:
+        return Docstring(Text(f"{purpose.removesuffix('.')}, defined in {place}."))
+    line, *more = comment or [purpose]
     if more and not more[0]:
         del more[0]
-    for paragraph in (_hidden(structure), _place(structure, file)):
+    for paragraph in (hidden, [f"Defined in {place}"] if place else []):
         if paragraph:
             more += ["", *paragraph] if more else paragraph
     return Docstring(literals.between_quotes(line), tuple(map(Text, more)))
@@ -66,8 +70,8 @@ def _hidden(structure: ir.Message) -> list[str]:
     ]
 
 
-def _place(structure: ir.Message, file: str) -> list[str]:
-    """Return in which file and line a structure begins; nothing if nobody wrote any of it.
+def _place(structure: ir.Message, file: str) -> str:
+    """Return the file and line in which a structure begins; empty if nobody wrote any of it.
 
     Later sections have no line: it would change with each field of those before, and people review
     what one more field changes.
@@ -75,11 +79,11 @@ def _place(structure: ir.Message, file: str) -> list[str]:
     described: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
     spans = [definition.name_span for definition in described if definition.name_span]
     if not spans:
-        return []
+        return ""
     first = min(spans, key=lambda span: span.start)
     if "\n---" in f"\n{first.source.text[: first.start]}":
-        return [f"Defined in {file}"]
-    return [f"Defined in {file}:{first.source.position(first.start)[0]}"]
+        return file
+    return f"{file}:{first.source.position(first.start)[0]}"
 
 
 def attribute(described: ir.Field | ir.Constant, file: str) -> Docstring:

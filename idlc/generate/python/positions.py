@@ -295,6 +295,9 @@ def function(body: tuple[Statement, ...], indent: int, again: tuple[str, ...]) -
             case _:
                 pass
         result += text_of((statement,), indent)
+    if not begun and not again:
+        parts = Group("", tuple(put.part for put in waiting), brackets="[]")
+        return result + layout_lines(Group("join", (parts,)), indent, "return ")
     if waiting:
         flush(last=True)
     return result + _joined(again, indent)

@@ -187,6 +187,7 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     codecs: tuple[CodecView, ...] = ()
     group: GroupView | None = None
     converts: bool = False
+    has_texts: bool = False
 
 
 class Module(NamedTuple):
@@ -229,6 +230,7 @@ def module_views(
         title=Text(f"The codecs of {interface.name}."),
         runtime=Code(surroundings.runtime),
         codecs=codecs,
+        has_texts=any("*" in line for codec in codecs for line in codec.constants),
     )
     path = f"{interface.name.kind}/{python_names.codec_module(homes.classes)}.py"
     yield Module("codec", path, view)

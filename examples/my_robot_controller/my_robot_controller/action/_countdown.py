@@ -11,10 +11,7 @@ TYPE_CHECKING = False  # to import it would take longer than this module does
 
 @_idlc.define
 class Countdown_Goal(_idlc.Message):  # noqa
-    """The goal of the action my_robot_controller/action/Countdown.
-
-    Defined in action/Countdown.action:1
-    """
+    """The goal of the action my_robot_controller/action/Countdown, defined in action/Countdown.action:1."""
 
     __match_args__ = ("target_count",)
     _fields_and_field_types = {
@@ -46,10 +43,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class Countdown_Result(_idlc.Message):  # noqa
-    """The result of the action my_robot_controller/action/Countdown.
-
-    Defined in action/Countdown.action
-    """
+    """The result of the action my_robot_controller/action/Countdown, defined in action/Countdown.action."""
 
     __match_args__ = (
         "final_count",
@@ -91,10 +85,7 @@ class Countdown_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class Countdown_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action my_robot_controller/action/Countdown.
-
-    Defined in action/Countdown.action
-    """
+    """The feedback of the action my_robot_controller/action/Countdown, defined in action/Countdown.action."""
 
     __match_args__ = ("current_count",)
     _fields_and_field_types = {

@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of my_robot_controller/action/Countdown."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def countdown_goal_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
@@ -29,13 +22,12 @@ def countdown_goal_codec(
     read_target_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._target_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_goal()
@@ -45,11 +37,7 @@ def countdown_goal_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_result_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
@@ -58,14 +46,13 @@ def countdown_result_codec(
     read_final_count = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._final_count,
                 truths[message._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_result()
@@ -78,11 +65,7 @@ def countdown_result_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_feedback_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
@@ -90,13 +73,12 @@ def countdown_feedback_codec(
     read_current_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._current_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_feedback()
@@ -106,11 +88,7 @@ def countdown_feedback_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_send_goal_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._countdown import Countdown_Goal
@@ -130,14 +108,13 @@ def countdown_send_goal_request_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 goal._target_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_send_goal_request()
@@ -155,11 +132,7 @@ def countdown_send_goal_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_get_result_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Response in one byte order."""
     from ._countdown import Countdown_Result
 
@@ -172,15 +145,14 @@ def countdown_get_result_response_codec(
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 result._final_count,
                 truths[result._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_get_result_response()
@@ -196,11 +168,7 @@ def countdown_get_result_response_codec(
     return _idlc.Codec(encode, decode)
 
 
-def countdown_feedback_message_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def countdown_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._countdown import Countdown_Feedback
@@ -220,14 +188,13 @@ def countdown_feedback_message_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 feedback._current_count,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_countdown_feedback_message()

@@ -11,10 +11,7 @@ TYPE_CHECKING = False  # to import it would take longer than this module does
 
 @_idlc.define
 class ExecuteTask_Goal(_idlc.Message):  # noqa
-    """The goal of the action my_robot_controller/action/ExecuteTask.
-
-    Defined in action/ExecuteTask.action:1
-    """
+    """The goal of the action my_robot_controller/action/ExecuteTask, defined in action/ExecuteTask.action:1."""
 
     __match_args__ = ("task_name",)
     _fields_and_field_types = {
@@ -46,10 +43,7 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class ExecuteTask_Result(_idlc.Message):  # noqa
-    """The result of the action my_robot_controller/action/ExecuteTask.
-
-    Defined in action/ExecuteTask.action
-    """
+    """The result of the action my_robot_controller/action/ExecuteTask, defined in action/ExecuteTask.action."""
 
     __match_args__ = ("success",)
     _fields_and_field_types = {
@@ -81,10 +75,7 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class ExecuteTask_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action my_robot_controller/action/ExecuteTask.
-
-    Defined in action/ExecuteTask.action
-    """
+    """The feedback of the action my_robot_controller/action/ExecuteTask, defined in action/ExecuteTask.action."""
 
     __match_args__ = ("current_status",)
     _fields_and_field_types = {

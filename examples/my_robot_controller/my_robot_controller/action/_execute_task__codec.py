@@ -17,11 +17,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def execute_task_goal_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
@@ -32,14 +28,13 @@ def execute_task_goal_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         task_name = message._task_name.encode()
         task_name_size = len(task_name)
-        parts = [
+        return join([
             write_head[task_name_size](
                 encapsulation,
                 task_name_size + 1,
                 task_name,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_goal()
@@ -53,11 +48,7 @@ def execute_task_goal_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_result_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
@@ -66,13 +57,12 @@ def execute_task_result_codec(
     read_success = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 truths[message._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_result()
@@ -82,11 +72,7 @@ def execute_task_result_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_feedback_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
@@ -97,14 +83,13 @@ def execute_task_feedback_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         current_status = message._current_status.encode()
         current_status_size = len(current_status)
-        parts = [
+        return join([
             write_head[current_status_size](
                 encapsulation,
                 current_status_size + 1,
                 current_status,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_feedback()
@@ -118,11 +103,7 @@ def execute_task_feedback_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_send_goal_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._execute_task import ExecuteTask_Goal
@@ -145,15 +126,14 @@ def execute_task_send_goal_request_codec(
         goal = message._goal
         goal_task_name = goal._task_name.encode()
         goal_task_name_size = len(goal_task_name)
-        parts = [
+        return join([
             write_head[goal_task_name_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 goal_task_name_size + 1,
                 goal_task_name,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_send_goal_request()
@@ -175,11 +155,7 @@ def execute_task_send_goal_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_get_result_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Response in one byte order."""
     from ._execute_task import ExecuteTask_Result
 
@@ -192,14 +168,13 @@ def execute_task_get_result_response_codec(
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 truths[result._success],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_get_result_response()
@@ -214,11 +189,7 @@ def execute_task_get_result_response_codec(
     return _idlc.Codec(encode, decode)
 
 
-def execute_task_feedback_message_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def execute_task_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._execute_task import ExecuteTask_Feedback
@@ -241,15 +212,14 @@ def execute_task_feedback_message_codec(
         feedback = message._feedback
         feedback_current_status = feedback._current_status.encode()
         feedback_current_status_size = len(feedback_current_status)
-        parts = [
+        return join([
             write_head[feedback_current_status_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 feedback_current_status_size + 1,
                 feedback_current_status,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_execute_task_feedback_message()

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def robot_command_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def robot_command_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads RobotCommand in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*ff", align=4)
@@ -34,7 +30,7 @@ def robot_command_codec(
         command_type_size = len(command_type)
         frame_id = message._frame_id.encode()
         frame_id_size = len(frame_id)
-        parts = [
+        return join([
             write_head[command_type_size](
                 encapsulation,
                 command_type_size + 1,
@@ -46,8 +42,7 @@ def robot_command_codec(
                 frame_id_size + 1,
                 frame_id,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_robot_command()

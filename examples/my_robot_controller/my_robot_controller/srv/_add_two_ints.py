@@ -11,10 +11,7 @@ TYPE_CHECKING = False  # to import it would take longer than this module does
 
 @_idlc.define
 class AddTwoInts_Request(_idlc.Message):  # noqa
-    """The request of the service my_robot_controller/srv/AddTwoInts.
-
-    Defined in srv/AddTwoInts.srv:1
-    """
+    """The request of the service my_robot_controller/srv/AddTwoInts, defined in srv/AddTwoInts.srv:1."""
 
     __match_args__ = (
         "a",
@@ -56,10 +53,7 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
 
 @_idlc.define
 class AddTwoInts_Response(_idlc.Message):  # noqa
-    """The response of the service my_robot_controller/srv/AddTwoInts.
-
-    Defined in srv/AddTwoInts.srv
-    """
+    """The response of the service my_robot_controller/srv/AddTwoInts, defined in srv/AddTwoInts.srv."""
 
     __match_args__ = ("sum",)
     _fields_and_field_types = {

@@ -3,9 +3,6 @@
 # fmt: off
 """The codecs of my_robot_controller/srv/AddTwoInts."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -15,11 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def add_two_ints_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def add_two_ints_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sqq").pack
@@ -27,14 +20,13 @@ def add_two_ints_request_codec(
     read_a = _idlc.layout(order, "qq", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._a,
                 message._b,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_add_two_ints_request()
@@ -47,11 +39,7 @@ def add_two_ints_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def add_two_ints_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def add_two_ints_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sq").pack
@@ -59,13 +47,12 @@ def add_two_ints_response_codec(
     read_sum = _idlc.layout(order, "q", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._sum,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_add_two_ints_response()

@@ -46,10 +46,7 @@ class Fill_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class Fill_Result(_idlc.Message):  # noqa
-    """The result of the action comments_msgs/action/Fill.
-
-    Defined in action/Fill.action
-    """
+    """The result of the action comments_msgs/action/Fill, defined in action/Fill.action."""
 
     __match_args__ = ("reached",)
     _fields_and_field_types = {
@@ -81,10 +78,7 @@ class Fill_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class Fill_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action comments_msgs/action/Fill.
-
-    Defined in action/Fill.action
-    """
+    """The feedback of the action comments_msgs/action/Fill, defined in action/Fill.action."""
 
     __match_args__ = ("level",)
     _fields_and_field_types = {

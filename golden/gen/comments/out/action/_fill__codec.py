@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of comments_msgs/action/Fill."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def fill_goal_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
@@ -29,13 +22,12 @@ def fill_goal_codec(
     read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_goal()
@@ -45,11 +37,7 @@ def fill_goal_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_result_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
@@ -57,13 +45,12 @@ def fill_result_codec(
     read_reached = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._reached,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_result()
@@ -73,11 +60,7 @@ def fill_result_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_feedback_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
@@ -85,13 +68,12 @@ def fill_feedback_codec(
     read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_feedback()
@@ -101,11 +83,7 @@ def fill_feedback_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_send_goal_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._fill import Fill_Goal
@@ -125,14 +103,13 @@ def fill_send_goal_request_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 goal._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_send_goal_request()
@@ -150,11 +127,7 @@ def fill_send_goal_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_get_result_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_GetResult_Response in one byte order."""
     from ._fill import Fill_Result
 
@@ -166,14 +139,13 @@ def fill_get_result_response_codec(
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 result._reached,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_get_result_response()
@@ -188,11 +160,7 @@ def fill_get_result_response_codec(
     return _idlc.Codec(encode, decode)
 
 
-def fill_feedback_message_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def fill_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._fill import Fill_Feedback
@@ -212,14 +180,13 @@ def fill_feedback_message_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
                 feedback._level,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_fill_feedback_message()

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def reset_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def reset_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Reset_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
@@ -30,14 +26,13 @@ def reset_request_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         reason = message._reason.encode()
         reason_size = len(reason)
-        parts = [
+        return join([
             write_head[reason_size](
                 encapsulation,
                 reason_size + 1,
                 reason,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_reset_request()
@@ -51,11 +46,7 @@ def reset_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def reset_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def reset_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Reset_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
@@ -64,13 +55,12 @@ def reset_response_codec(
     read_ok = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 truths[message._ok],
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_reset_response()

@@ -20,10 +20,7 @@ with _idlc.importing():
 
 @_idlc.define
 class Everything(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Everything.
-
-    Defined in msg/Everything.msg:1
-    """
+    """layouts_msgs/msg/Everything, defined in msg/Everything.msg:1."""
 
     __match_args__ = (
         "flag",

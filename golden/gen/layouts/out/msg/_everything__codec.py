@@ -17,11 +17,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def everything_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Everything in one byte order."""
     from .._idlc import arrays as _arrays
     from ._inner import Inner

@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class Inner(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Inner.
-
-    Defined in msg/Inner.msg:1
-    """
+    """layouts_msgs/msg/Inner, defined in msg/Inner.msg:1."""
 
     __match_args__ = (
         "a",

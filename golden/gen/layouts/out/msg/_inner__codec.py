@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def inner_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def inner_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Inner in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
@@ -34,7 +30,7 @@ def inner_codec(
         c = message._c.encode()
         c_size = len(c)
         d = wide_text(message._d)
-        parts = [
+        return join([
             write_head[c_size](
                 encapsulation,
                 message._a,
@@ -44,8 +40,7 @@ def inner_codec(
                 len(d) // 4,
             ),
             d,
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class Pair(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Pair.
-
-    Defined in msg/Pair.msg:1
-    """
+    """layouts_msgs/msg/Pair, defined in msg/Pair.msg:1."""
 
     __match_args__ = (
         "key",

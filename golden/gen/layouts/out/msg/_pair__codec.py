@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def pair_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def pair_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Pair in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*", align=4)
@@ -33,7 +29,7 @@ def pair_codec(
         key_size = len(key)
         value = message._value.encode()
         value_size = len(value)
-        parts = [
+        return join([
             write_head[key_size](
                 encapsulation,
                 key_size + 1,
@@ -43,8 +39,7 @@ def pair_codec(
                 value_size + 1,
                 value,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_pair()

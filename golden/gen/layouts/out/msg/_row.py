@@ -10,10 +10,7 @@ from .._idlc import arrays as _arrays
 
 @_idlc.define
 class Row(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Row.
-
-    Defined in msg/Row.msg:1
-    """
+    """layouts_msgs/msg/Row, defined in msg/Row.msg:1."""
 
     __match_args__ = (
         "a",

@@ -3,9 +3,6 @@
 # fmt: off
 """The codecs of layouts_msgs/msg/Row."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -15,11 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def row_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def row_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Row in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -31,15 +24,14 @@ def row_codec(
     read_a = _idlc.layout(order, "IH3B", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._a,
                 message._b,
                 bytes_of_uint8_3(message._c),
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_row()

@@ -11,10 +11,7 @@ from ._titled import Titled
 
 @_idlc.define
 class Texts(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Texts.
-
-    Defined in msg/Texts.msg:1
-    """
+    """layouts_msgs/msg/Texts, defined in msg/Texts.msg:1."""
 
     __match_args__ = (
         "pairs",

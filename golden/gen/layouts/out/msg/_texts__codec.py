@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def texts_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def texts_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Texts in one byte order."""
     from ._pair import Pair
     from ._titled import Titled

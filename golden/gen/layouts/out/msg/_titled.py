@@ -10,10 +10,7 @@ from ._pair import Pair
 
 @_idlc.define
 class Titled(_idlc.Message):  # noqa
-    """layouts_msgs/msg/Titled.
-
-    Defined in msg/Titled.msg:1
-    """
+    """layouts_msgs/msg/Titled, defined in msg/Titled.msg:1."""
 
     __match_args__ = (
         "level",

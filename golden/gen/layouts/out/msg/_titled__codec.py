@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def titled_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def titled_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Titled in one byte order."""
     from ._pair import Pair
 
@@ -61,7 +57,7 @@ def titled_codec(
         at = (title_size + 16 & -4) + 4
         pairs_block = write_rows(pairs_rows)
         at = at + len(pairs_block)
-        parts = [
+        return join([
             write_head[title_size](
                 encapsulation,
                 message._level,
@@ -71,8 +67,7 @@ def titled_codec(
             ),
             pairs_block,
             write_number_at[at & 7].pack(message._number),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

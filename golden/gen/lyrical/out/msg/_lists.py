@@ -14,10 +14,7 @@ from ._words import Words
 
 @_idlc.define
 class Lists(_idlc.Message):  # noqa
-    """lyrical_msgs/msg/Lists.
-
-    Defined in msg/Lists.msg:1
-    """
+    """lyrical_msgs/msg/Lists, defined in msg/Lists.msg:1."""
 
     __match_args__ = (
         "names",

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def lists_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Lists in one byte order."""
     from .._idlc import arrays as _arrays
     from ._words import Words

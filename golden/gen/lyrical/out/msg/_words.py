@@ -11,10 +11,7 @@ from .. import _idlc
 
 @_idlc.define
 class Words(_idlc.Message):  # noqa
-    """lyrical_msgs/msg/Words.
-
-    Defined in msg/Words.msg:1
-    """
+    """lyrical_msgs/msg/Words, defined in msg/Words.msg:1."""
 
     __match_args__ = (
         "text",

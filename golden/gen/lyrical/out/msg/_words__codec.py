@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def words_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def words_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Words in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
@@ -32,7 +28,7 @@ def words_codec(
     def encode(message: Any, join: _idlc.Join) -> Any:
         text_ = message._text.encode()
         text_size = len(text_)
-        parts = [
+        return join([
             write_head[text_size](
                 encapsulation,
                 text_size + 1,
@@ -42,8 +38,7 @@ def words_codec(
                 truths[message._list],
                 message._d,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_words()

@@ -16,10 +16,7 @@ TYPE_CHECKING = False  # to import it would take longer than this module does
 
 @_idlc.define
 class Run_Request(_idlc.Message):  # noqa
-    """The request of the service lyrical_msgs/srv/Run.
-
-    Defined in srv/Run.srv:1
-    """
+    """The request of the service lyrical_msgs/srv/Run, defined in srv/Run.srv:1."""
 
     __match_args__ = (
         "args",
@@ -65,10 +62,7 @@ class Run_Request(_idlc.Message):  # noqa
 
 @_idlc.define
 class Run_Response(_idlc.Message):  # noqa
-    """The response of the service lyrical_msgs/srv/Run.
-
-    Defined in srv/Run.srv
-    """
+    """The response of the service lyrical_msgs/srv/Run, defined in srv/Run.srv."""
 
     __match_args__ = (
         "status",

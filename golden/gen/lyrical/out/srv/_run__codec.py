@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of lyrical_msgs/srv/Run."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def run_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def run_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Run_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4s", align=4).pack
@@ -36,12 +29,11 @@ def run_request_codec(
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         args = write_args(message._args)
-        parts = [
+        return join([
             write_head(encapsulation),
             args,
             write_wait(truths[message._wait]),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_run_request()
@@ -53,11 +45,7 @@ def run_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def run_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def run_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Run_Response in one byte order."""
     with _idlc.importing():
         from builtin_interfaces.msg import Time
@@ -80,15 +68,14 @@ def run_response_codec(
             )
             for stamps_item in stamps
         ])
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 message._status,
                 len(stamps),
             ),
             stamps_block,
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

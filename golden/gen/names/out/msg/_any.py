@@ -14,10 +14,7 @@ with _idlc.importing():
 
 @_idlc.define
 class Any(_idlc.Message):  # noqa
-    """names_msgs/msg/Any.
-
-    Defined in msg/Any.msg:1
-    """
+    """names_msgs/msg/Any, defined in msg/Any.msg:1."""
 
     __match_args__ = ("pose",)
     _fields_and_field_types = {

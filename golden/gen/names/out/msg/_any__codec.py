@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of names_msgs/msg/Any."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def any_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def any_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Any in one byte order."""
     with _idlc.importing():
         from geometry_msgs.msg import (
@@ -42,7 +35,7 @@ def any_codec(
         pose = message._pose
         pose_position = pose._position
         pose_orientation = pose._orientation
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 pose_position._x,
@@ -53,8 +46,7 @@ def any_codec(
                 pose_orientation._z,
                 pose_orientation._w,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_any()

@@ -10,10 +10,7 @@ from ._foo_bar_2 import FooBar
 
 @_idlc.define
 class FOOBar(_idlc.Message):  # noqa
-    """names_msgs/msg/FOOBar.
-
-    Defined in msg/FOOBar.msg:1
-    """
+    """names_msgs/msg/FOOBar, defined in msg/FOOBar.msg:1."""
 
     __match_args__ = ("inner",)
     _fields_and_field_types = {

@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class FooBar(_idlc.Message):  # noqa
-    """names_msgs/msg/FooBar.
-
-    Defined in msg/FooBar.msg:1
-    """
+    """names_msgs/msg/FooBar, defined in msg/FooBar.msg:1."""
 
     __match_args__ = ("a",)
     _fields_and_field_types = {

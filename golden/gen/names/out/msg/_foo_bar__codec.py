@@ -3,9 +3,6 @@
 # fmt: off
 """The codecs of names_msgs/msg/FOOBar."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -15,11 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def foo_bar_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads FOOBar in one byte order."""
     from ._foo_bar_2 import FooBar
 
@@ -31,13 +24,12 @@ def foo_bar_codec(
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         inner = message._inner
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 inner._a,
             ),
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         message = new_foo_bar()

@@ -3,9 +3,6 @@
 # fmt: off
 """The codecs of names_msgs/msg/Hiding."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -15,11 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def hiding_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def hiding_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Hiding in one byte order."""
     from .._idlc import arrays as _arrays
     from ._point import Point

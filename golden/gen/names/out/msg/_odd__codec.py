@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def odd_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def odd_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Odd in one byte order."""
     from .._idlc import arrays as _arrays
     from ._point import Point

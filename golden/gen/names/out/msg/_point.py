@@ -9,10 +9,7 @@ from .. import _idlc
 
 @_idlc.define
 class Point(_idlc.Message):  # noqa
-    """names_msgs/msg/Point.
-
-    Defined in msg/Point.msg:1
-    """
+    """names_msgs/msg/Point, defined in msg/Point.msg:1."""
 
     __match_args__ = (
         "x",

@@ -16,10 +16,7 @@ with _idlc.importing():
 
 @_idlc.define
 class Text(_idlc.Message):  # noqa
-    """names_msgs/msg/Text.
-
-    Defined in msg/Text.msg:1
-    """
+    """names_msgs/msg/Text, defined in msg/Text.msg:1."""
 
     __match_args__ = (
         "other",

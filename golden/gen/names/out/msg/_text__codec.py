@@ -5,9 +5,6 @@
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
 """The codecs of names_msgs/msg/Text."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -17,11 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def text_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def text_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Text in one byte order."""
     from ._any import Any as names_msgs_Any
     from ._point import Point as names_msgs_Point
@@ -65,7 +58,7 @@ def text_codec(
             )
             for any_item in any_
         ])
-        parts = [
+        return join([
             write_head(
                 encapsulation,
                 other._x,
@@ -77,8 +70,7 @@ def text_codec(
             ),
             pad8[0] if any_ else b"",
             any_block,
-        ]
-        return join(parts)
+        ])
 
     def decode(data: Any) -> Any:
         limit = len(data)

@@ -3,9 +3,6 @@
 # fmt: off
 """The codecs of names_msgs/srv/None."""
 
-# A layout such as "4sI*ff" has a letter for each value, as in `struct`: `4s` is the
-# header, `*` a text and its zero. The padding between values follows from the layout.
-
 from __future__ import annotations
 
 from .. import _idlc
@@ -15,11 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def none_request_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def none_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads None_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
@@ -27,8 +20,7 @@ def none_request_codec(
     read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation)]
-        return join(parts)
+        return join([write_head(encapsulation)])
 
     def decode(data: Any) -> Any:
         message = new_none_request()
@@ -38,11 +30,7 @@ def none_request_codec(
     return _idlc.Codec(encode, decode)
 
 
-def none_response_codec(
-    kind: Any,
-    order: str,
-    reading: _idlc.Reading,
-) -> _idlc.Codec:
+def none_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads None_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
@@ -50,8 +38,7 @@ def none_response_codec(
     read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation)]
-        return join(parts)
+        return join([write_head(encapsulation)])
 
     def decode(data: Any) -> Any:
         message = new_none_response()

@@ -46,10 +46,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
 
 @_idlc.define
 class Countdown_Result(_idlc.Message):  # noqa
-    """The result of the action tutorial_msgs/action/Countdown.
-
-    Defined in action/Countdown.action
-    """
+    """The result of the action tutorial_msgs/action/Countdown, defined in action/Countdown.action."""
 
     __match_args__ = (
         "final_count",
@@ -91,10 +88,7 @@ class Countdown_Result(_idlc.Message):  # noqa
 
 @_idlc.define
 class Countdown_Feedback(_idlc.Message):  # noqa
-    """The feedback of the action tutorial_msgs/action/Countdown.
-
-    Defined in action/Countdown.action
-    """
+    """The feedback of the action tutorial_msgs/action/Countdown, defined in action/Countdown.action."""
 
     __match_args__ = ("current_count",)
     _fields_and_field_types = {

@@ -56,10 +56,7 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
 
 @_idlc.define
 class AddTwoInts_Response(_idlc.Message):  # noqa
-    """The response of the service tutorial_msgs/srv/AddTwoInts.
-
-    Defined in srv/AddTwoInts.srv
-    """
+    """The response of the service tutorial_msgs/srv/AddTwoInts, defined in srv/AddTwoInts.srv."""
 
     __match_args__ = ("sum",)
     _fields_and_field_types = {
