@@ -273,8 +273,8 @@ def has_hashes() -> bool:
 # C structures of messages, laid out as rosidl's C generator lays them out
 
 #: Type ids in introspection by those in descriptions: int8 to float64, then bool, byte, texts.
-_TYPE_IDS = dict(enumerate((9, 8, 11, 10, 13, 12, 15, 14, 1, 2), 2))
-_TYPE_IDS |= {15: 6, 16: 7, 17: _STRING, 18: 17, 21: _STRING, 22: 17}
+_NUMBER_IDS = dict(enumerate((9, 8, 11, 10, 13, 12, 15, 14, 1, 2), 2))
+_TYPE_IDS = _NUMBER_IDS | {15: 6, 16: 7, 17: _STRING, 18: 17, 21: _STRING, 22: 17}
 #: Numbers by their size; an array of them is aligned like one.
 _NUMBERS = {1: c_uint8, 2: ctypes.c_uint16, 4: c_uint32, 8: ctypes.c_uint64}
 _MESSAGE = 18

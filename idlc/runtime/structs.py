@@ -125,8 +125,9 @@ class _Writer:
         self.out = bytearray(HEADERS[NATIVE])
 
     def put(self, data: bytes | memoryview, align: int) -> None:
-        self.out += bytes(-(len(self.out) - _HEADER) % align)
-        self.out += data
+        out = self.out
+        out += bytes(-(len(out) - _HEADER) % align)
+        out += data
 
     def numbers(self, address: int, size: int, align: int) -> None:
         self.put(c.MEMORY[address : address + size], align)
@@ -134,8 +135,7 @@ class _Writer:
     def text(self, address: int) -> None:
         data, size = _data_and_size(address)
         self.put(_COUNT.pack(size + 1), 4)
-        self.out += c.MEMORY[data : data + size]
-        self.out += b"\0"
+        self.out += c.MEMORY[data : data + size].tobytes() + b"\0"
 
     def wide_text(self, address: int) -> None:
         """Write UTF-16 units, which take four bytes each in CDR and two in C."""
@@ -154,23 +154,23 @@ def _data_and_size(address: int) -> tuple[int, int]:
     return c.WORDS[address >> 3], c.WORDS[(address >> 3) + 1]
 
 
-def _move(side: _Reader | _Writer, steps: tuple[Step, ...], base: int) -> None:
-    """Move a structure that begins at `base`."""
-    for step in steps:
-        start = base + step.offset
-        if isinstance(step, Run):
-            side.numbers(start, step.size, step.align)
-        elif isinstance(step, Text):
-            (side.wide_text if step.wide else side.text)(start)
-        else:
-            _, inner, stride, number, align = step
-            if number is None:
-                start, number = side.sequence(start, stride)
-            if align and number:
-                side.numbers(start, number * stride, align)
+def _move(side: _Reader | _Writer, steps: tuple[Step, ...], bases: range) -> None:
+    """Move the structures that begin at some addresses."""
+    for base in bases:
+        for step in steps:
+            start = base + step.offset
+            if isinstance(step, Run):
+                side.numbers(start, step.size, step.align)
+            elif isinstance(step, Text):
+                (side.wide_text if step.wide else side.text)(start)
             else:
-                for address in range(start, start + number * stride, stride):
-                    _move(side, inner, address)
+                _, inner, stride, number, align = step
+                if number is None:
+                    start, number = side.sequence(start, stride)
+                if align and number:
+                    side.numbers(start, number * stride, align)
+                else:
+                    _move(side, inner, range(start, start + number * stride, stride))
 
 
 def _field_steps(field: FieldInfo, offset: int) -> tuple[Step, ...]:
@@ -224,11 +224,11 @@ def _converter(cls: Any, structure: Structure) -> object:
             data = encode(message, b"".join)
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        _move(_Reader(memoryview(data)[_HEADER:]), parts, address)
+        _move(_Reader(memoryview(data)[_HEADER:]), parts, range(address, address + 1))
 
     def fetch(address: int) -> Any:
         side = _Writer()
-        _move(side, parts, address)
+        _move(side, parts, range(address, address + 1))
         return decode(side.out)
 
     methods = {
