@@ -321,7 +321,8 @@ class Message(metaclass=MessageMeta):
         if check and not issubclass(kind, Checked):
             self.__class__ = checked_class(kind)
         elif not check and issubclass(kind, Checked):
-            self.__class__ = kind.__base__
+            plain: Any = kind.__base__
+            self.__class__ = plain
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:

@@ -140,7 +140,8 @@ def _is_in_range(value: Any, primitive: Primitive, path: str) -> bool:
             raise ValidationError(path, allowed, value) from None
         if not math.isfinite(number):
             return True
-    return primitive.high is None or bool(primitive.low <= number <= primitive.high)
+    low, high = primitive.low, primitive.high
+    return low is None or high is None or bool(low <= number <= high)
 
 
 def refused(message: Any, name: str, values: Any, error: Exception) -> ValidationError:

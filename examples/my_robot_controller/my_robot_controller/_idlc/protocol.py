@@ -18,7 +18,7 @@ from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, order_of, wide_text
 from .message import Message, OnDemand, Service, define, equal
 from .names import owner_of, public_name, wire_name
-from .sequences import ListOf, sequence_writer
+from .sequences import ListOf, sequence_reader, sequence_writer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -394,6 +394,14 @@ def field_codecs(kind: type) -> codec.Codecs:
         return codec.maker(owner if other is structure else other.find_class())
 
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
+        def numbers(message: Any, field: Any, raw: Any) -> Any:
+            if field.is_sequence:
+                reading_of = reading.of(type(message))
+                return sequence_reader(order, field.primitive.code, reading_of)(raw)
+            from .arrays import array_reader
+
+            return array_reader(order, field.primitive.name, field.size, reading)(raw)
+
         def encode(message: Any, join: Any) -> Any:
             writer = _Writer(order)
             writer.message(message, structure)
@@ -403,7 +411,7 @@ def field_codecs(kind: type) -> codec.Codecs:
             if not reading.copy:
                 data = memoryview(data)
             reader = CarefulReader(
-                data, order_of(data), lambda other: maker_of(other)(), reading
+                data, order_of(data), lambda other: maker_of(other)(), numbers
             )
             return reader.message(structure, "")
 

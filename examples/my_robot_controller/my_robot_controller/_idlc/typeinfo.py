@@ -13,12 +13,10 @@ from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from .cdr import NATIVE, order_of
-from .codec import COPYING, Reading
 from .names import DecodeError, importing, public_name, slot_name, wire_name
-from .sequences import sequence_reader
 
 
 class Primitive(NamedTuple):
@@ -58,6 +56,8 @@ PRIMITIVES = {
     16: Primitive("byte", 1, "c"),
 }
 SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
+STRING_IDS = {17, 18, 21, 22}
+WIDE_IDS = {18, 22}
 DUMMY = "structure_needs_at_least_one_member"
 
 
@@ -79,8 +79,8 @@ class FieldInfo:
         self.shape, self.base = divmod(self.type_id, 48)
         self.nested = nested
         self.primitive = PRIMITIVES.get(self.base)
-        self.text = self.base in {17, 18, 21, 22}
-        self.wide = self.base in {18, 22}
+        self.text = self.base in STRING_IDS
+        self.wide = self.base in WIDE_IDS
         self.size = self.capacity if self.shape == ARRAY else None
         self.is_sequence = self.shape > ARRAY
         self.bound = self.capacity if self.shape == BOUNDED_SEQUENCE else None
@@ -88,6 +88,10 @@ class FieldInfo:
         self.public = public_name(self.name)
         self.is_list = self.shape != SCALAR
         self.is_numeric = self.primitive is not None and self.primitive.code not in "?c"
+
+
+#: Makes the value of a field of a message, from the bytes of numbers.
+Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
@@ -304,7 +308,7 @@ def least_element(field: FieldInfo) -> int:
 class CarefulReader:
     """Goes over a buffer and never further than it has bytes for.
 
-    `make` returns what takes the values of a structure.
+    `make` returns what takes the values of a structure, `numbers` what a field holds of numbers.
     """
 
     def __init__(
@@ -312,12 +316,12 @@ class CarefulReader:
         data: Any,
         order: str,
         make: Callable[[Structure], Any],
-        reading: Reading = COPYING,
+        numbers: Numbers | None = None,
     ) -> None:
         self.data = data
         self.order = order
         self.make = make
-        self.reading = reading
+        self.numbers = numbers or self.copied
         self.at = 4
 
     def message(self, structure: Structure, path: str) -> Any:
@@ -347,16 +351,17 @@ class CarefulReader:
             return self.numbers(message, field, raw)
         return [self.element(field, f"{path}[{index}]") for index in range(count)]
 
-    def numbers(self, message: Any, field: FieldInfo, raw: Any) -> Any:
-        """Return the value of a numeric array or sequence."""
+    def copied(self, _message: Any, field: FieldInfo, raw: bytes) -> Any:
+        """Return an array of numbers."""
         assert field.primitive is not None
+        result = array(field.primitive.code, raw)
+        if self.order != NATIVE:
+            result.byteswap()
         if field.is_sequence:
-            reading = self.reading.of(type(message))
-            return sequence_reader(self.order, field.primitive.code, reading)(raw)
-        from .arrays import array_reader
+            return result
+        import numpy as np
 
-        name, size = field.primitive.name, field.capacity
-        return array_reader(self.order, name, size, self.reading)(raw)
+        return np.array(result, field.primitive.name)
 
     def element(self, field: FieldInfo, path: str) -> Any:
         """Read one value."""
