@@ -38,7 +38,6 @@ else:
 #: The codes of other buffers for the same numbers, where C has two names for them.
 SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "L": "I"}
 
-
 #: From so many numbers on, copying them takes longer than it takes not to.
 MANY = 1 << 16
 #: What `array` itself takes as rosidl means it: the memory of bytes, the elements of others.

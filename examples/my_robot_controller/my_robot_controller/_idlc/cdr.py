@@ -150,19 +150,16 @@ def read_octets(raw: bytes | memoryview) -> list[bytes]:
     return values
 
 
-def flags_writer(size: int) -> Callable[[Collection[Any]], bytes]:
-    """Return a function that writes exactly `size` bools."""
-    return _exactly(size, flags)
-
-
 def octets_writer(size: int) -> Callable[[Collection[bytes]], bytes]:
     """Return a function that writes exactly `size` bytes."""
-    return _exactly(size, octets)
+    return flags_writer(size, octets)
 
 
-def _exactly(size: int, write: Callable[[Any], bytes]) -> Callable[[Any], bytes]:
+def flags_writer(size: int, write: Any = flags) -> Callable[[Collection[Any]], bytes]:
+    """Return a function that writes exactly `size` bools."""
+
     def checked(values: Any) -> bytes:
-        raw = write(values)
+        raw: bytes = write(values)
         if len(raw) != size:
             raise ValueError("wrong number of elements")
         return raw

@@ -56,8 +56,6 @@ PRIMITIVES = {
     16: Primitive("byte", 1, "c"),
 }
 SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
-STRING_IDS = {17, 18, 21, 22}
-WIDE_IDS = {18, 22}
 DUMMY = "structure_needs_at_least_one_member"
 
 
@@ -79,8 +77,8 @@ class FieldInfo:
         self.shape, self.base = divmod(self.type_id, 48)
         self.nested = nested
         self.primitive = PRIMITIVES.get(self.base)
-        self.text = self.base in STRING_IDS
-        self.wide = self.base in WIDE_IDS
+        self.text = self.base in {17, 18, 21, 22}
+        self.wide = self.base in {18, 22}
         self.size = self.capacity if self.shape == ARRAY else None
         self.is_sequence = self.shape > ARRAY
         self.bound = self.capacity if self.shape == BOUNDED_SEQUENCE else None
