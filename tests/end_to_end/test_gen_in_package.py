@@ -35,7 +35,7 @@ def test_code_stays_where_the_lock_is(capsys):
     write_all({**FILES, "ws/bot/src/bot/__init__.py": ""})
     assert main(["gen", "ws/bot", "-o", "ws/bot/src/bot"]) == 0
     assert main(["gen", "ws/bot"]) == 0
-    assert "ws/bot/src/bot (unchanged)" in capsys.readouterr().out
+    assert "ws/bot/src/bot, runtime carried (unchanged)" in capsys.readouterr().out
 
 
 FIND = "from setuptools import find_packages, setup\nsetup(name='bot', "
