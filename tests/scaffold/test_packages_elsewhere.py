@@ -145,7 +145,8 @@ def test_what_was_fixed_is_built(name, package, tmp_path, capsys):
     capsys.readouterr()
     found, said = codes(capsys)
     status, printed = built(Path.cwd(), tmp_path / "lib")
-    assert (status == 0) == ("IDL462" not in found), said + printed
+    # setup(idlc_interfaces=True) installs the classes wherever idlc builds, listed or not
+    assert status == 0 or "IDL462" in found, said + printed
     assert status or (tmp_path / "lib/demo/msg/__init__.py").is_file()
 
 
