@@ -36,7 +36,7 @@ def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  #
         del distribution.run_commands
         compiled = compile_interfaces(distribution.get_name(), type(distribution))
         distribution.__class__ = compiled.get("distclass", type(distribution))
-        if hasattr(distribution, "set_defaults"):  # setuptools 61 finds packages where none are named
+        if hasattr(distribution, "set_defaults"):  # from setuptools 61 on
             distribution.set_defaults()
         generated = getattr(distribution, "generated", ())
         distribution.packages = sorted({*(distribution.packages or ()), *generated})
