@@ -38,12 +38,12 @@ class Text(str):
 
 @cache
 def environment() -> jinja2.Environment:
-    """Return the environment of all templates: strict, without filters of our own."""
+    """Return what the environments of all templates have in common; it renders none itself."""
     folders = [_PACKAGE / "templates", _PACKAGE.parent / "templates"]
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(folders),
         undefined=jinja2.StrictUndefined,
-        autoescape=False,  # noqa: S701 (Python source, escaped by emit.literals)
+        autoescape=False,  # noqa: S701 (of source; `code` places nothing unescaped)
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
@@ -108,11 +108,10 @@ def verbatim(name: str) -> str:
 
 def keep_compiled() -> None:
     """Cache compiled templates: compiling them takes longer than rendering."""
-    if environment().bytecode_cache is not None:
+    if code().bytecode_cache is not None:
         return
     place = cache_folder()
     if place is not None:
-        environment().bytecode_cache = _Compiled(place, "text")
         code().bytecode_cache = _Compiled(place, "code")
         html().bytecode_cache = _Compiled(place, "html")
 

@@ -143,7 +143,7 @@ def functions(kind: type) -> Functions:
             raise
         except FAILURES:
             pass
-        # middlewares take some of what is not right
+        # middlewares accept some malformed messages
         from .typeinfo import read_carefully
 
         return read_carefully(owner, bytes(buffer), maker)

@@ -1,6 +1,6 @@
 # mypy: disable-error-code="import-not-found,import-untyped"
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
-"""What ROS 2 adds to services and actions: it is the same for all but the types that differ.
+"""The classes that ROS 2 adds to services and actions: all are alike but for some types.
 
 A service gets an Event. An action gets two services, the message of its feedback, and `Impl`,
 in which rclpy looks for them. Their classes are composed when somebody asks for one, from the
@@ -58,7 +58,7 @@ else:
 
 
 class ActionImpl:
-    """What rclpy needs of an action: its attribute `Impl`."""
+    """The attribute `Impl` of an action, which rclpy reads."""
 
     CancelGoalService = OnDemand("protocol", "import_cancel_goal")
     GoalStatusMessage = OnDemand("protocol", "import_goal_status")

@@ -30,7 +30,7 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
     place, hidden = _place(structure, file), _hidden(structure)
     comment = _lines(structure.comment)
     if not comment and not hidden and place:
-        return Docstring(Text(f"{purpose.removesuffix('.')}, defined in {place}."))
+        purpose, place = f"{purpose.removesuffix('.')}, defined in {place}.", ""
     line, *more = comment or [purpose]
     if more and not more[0]:
         del more[0]

@@ -390,7 +390,7 @@ class RefusedError(Exception):
 def machine_code(kind: str, words: dict[str, int]) -> dict[str, int]:
     """Return the addresses of functions by name; they live as long as the process.
 
-    `kind` is that of the type support, `fastrtps` or `structs`. `words` is what their code
+    `kind` names the type support, `fastrtps` or `structs`. `words` is what their code
     reads, in the order in which it follows the code. Raises RefusedError.
     """
     machine = os.uname().machine

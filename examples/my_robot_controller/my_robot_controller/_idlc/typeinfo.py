@@ -93,7 +93,7 @@ Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
-    """What a package says of types, its own and all that they refer to, in `_type_data.py`.
+    """The types of a package, and all that they refer to, from its `_type_data.py`.
 
     Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
     imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
