@@ -111,7 +111,7 @@ test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
-	    $(TEST_ENV)/bin/python -m pytest -n 2 $(SELECTION) tests/hardening/test_fuzz.py \
+	    $(TEST_ENV)/bin/python -m pytest --timeout 0 -n 2 $(SELECTION) tests/hardening/test_fuzz.py \
 	    tests/hardening/test_fuzz_recordings.py tests/recordings/test_hostile_containers.py \
 	    tests/hardening/test_limits.py tests/runtime/test_hostile.py \
 	    $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
@@ -123,7 +123,7 @@ fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or
 	else echo 'atheris has no build for this Python: its part is left out'; fi
 
 soak: $(TEST_ENV)/installed ## send a million messages through rclpy
-	IDLC_LONG=1 $(TEST_ENV)/bin/python -m pytest tests/ros/test_load.py $(ARGS)
+	IDLC_LONG=1 $(TEST_ENV)/bin/python -m pytest --timeout 0 tests/ros/test_load.py $(ARGS)
 
 lint: $(TEST_ENV)/installed ## check style and types
 	$(TEST_ENV)/bin/ruff check .
