@@ -142,12 +142,13 @@ def _lock(folder: Path, created: list[Path]) -> int | None:
     """Return a handle that locks a folder; `None` if the system cannot."""
     import fcntl
 
-    while True:
+    for _ in range(1000):
         try:
             make_folder(folder, created)
             handle = os.open(folder, os.O_RDONLY)
         except FileNotFoundError:
-            continue  # another run made a folder, and removed it again
+            # another run made a folder, and removed it again; or nobody can make one, as in /proc
+            continue
         except OSError:
             return None
         try:
@@ -160,6 +161,7 @@ def _lock(folder: Path, created: list[Path]) -> int | None:
             os.close(handle)
             return None
         os.close(handle)
+    return None
 
 
 @contextlib.contextmanager
