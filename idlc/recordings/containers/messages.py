@@ -1,10 +1,9 @@
-"""Messages as they are recorded: bytes and times."""
+"""Messages as they are recorded, bytes and times, and how they are read from chunks of MCAP."""
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from struct import Struct
 from typing import Any, NamedTuple, TypeAlias
 
@@ -13,16 +12,8 @@ import numpy as np
 
 from idlc.recordings.containers import mcap
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, decompress, zstd_frame
-from idlc.recordings.containers.db3 import Db3, Rows
 from idlc.recordings.containers.mcap import HEAD, INDEX_OFFSET, Chunk, ChunkHead
-from idlc.recordings.containers.source import (
-    LocalFile,
-    Read,
-    RecordingError,
-    Source,
-    of_file,
-    within,
-)
+from idlc.recordings.containers.source import RecordingError, Source, of_file
 
 #: Times of numpy and Arrow end here, in the year 2262.
 END_OF_TIME = 1 << 63
@@ -161,21 +152,11 @@ MESSAGE = np.dtype(
 )
 MESSAGE_HEAD = Struct("<BQH")
 LEAST = MESSAGE.itemsize - HEAD.size
-#: Adjacent chunks are read together up to so many bytes: few calls, and memory stays bounded.
-MCAP_GROUP = 1 << 24
 #: In uncompressed chunks, gaps between messages are read too if they are smaller.
 NEAR = 1 << 15
 
 
-class LoadedChunk(NamedTuple):
-    """A chunk whose records are in a buffer, from `start` to `stop`."""
-
-    chunk: Chunk
-    start: int
-    stop: int
-
-
-def mcap_messages(
+def in_chunks(
     source: Source,
     chunks: Iterable[Chunk],
     channels: Collection[int],
@@ -185,8 +166,7 @@ def mcap_messages(
     """Yield the messages of some channels in chunks, adjacent chunks together."""
     with of_file(source.name):
         room = Room(source.size)
-        matching = (chunk for chunk in chunks if may_have(chunk, window))
-        groups = _groups(source, matching, room)
+        groups = _groups(source, chunks, room)
         while True:
             with source.opened():  # closed while the caller uses the messages
                 group = next(groups, None)
@@ -197,36 +177,25 @@ def mcap_messages(
                 yield decompress_each(ranges, room)
 
 
-def _read(
-    source: Source,
-    group: list[tuple[Chunk, ChunkHead]],
-    channels: Collection[int],
-    room: Room,
-    check: bool,
-) -> Ranges:
-    """Return the messages of some channels in adjacent chunks."""
-    buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
-    opened, offsets, at = [], [], 0
-    for chunk, head in group:
-        entry = LoadedChunk(chunk, at, at := at + head.size)
-        places = _indexed(source, entry, channels)
-        _fill(source, entry, head, buffer, places, check)
-        if places is None:
-            places = np.array(_walked(buffer, entry, channels, room), np.int64)
-        opened.append(entry)
-        offsets.append(places)
-    return _messages(buffer, opened, offsets, channels)
-
-
-def may_have(chunk: Chunk, window: Window) -> bool:
-    """Return whether messages of a window may be in a chunk, by its index."""
-    return chunk.compression is None or window.overlaps(chunk.first, chunk.last)
-
-
-def count(source: Source, chunk: Chunk) -> int:
-    """Return the number of messages that the indexes of a chunk name."""
-    places = INDEX_OFFSET.iter_unpack(chunk.indexes or b"")
-    return sum(_entries(source, channel, at) // 16 for channel, at in places)
+def _groups(
+    source: Source, chunks: Iterable[Chunk], room: Room
+) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
+    """Yield groups of adjacent chunks that are read together."""
+    group: list[tuple[Chunk, ChunkHead]] = []
+    size = 0
+    for chunk in chunks:
+        head = _head(source, chunk)
+        if head.compression:
+            room.reserve(head.size)
+        elif head.size != head.stored:
+            raise RecordingError("a chunk that is not compressed declares another size")
+        if group and size + head.size > mcap.GROUP:
+            yield group
+            group, size = [], 0
+        group.append((chunk, head))
+        size += head.size
+    if group:
+        yield group
 
 
 def _head(source: Source, chunk: Chunk) -> ChunkHead:
@@ -239,116 +208,80 @@ def _head(source: Source, chunk: Chunk) -> ChunkHead:
     return mcap.read_chunk_head(source, chunk.at, chunk.size)
 
 
-def _groups(
-    source: Source, chunks: Iterable[Chunk], room: Room
-) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
-    """Yield groups of adjacent chunks that are read together."""
-    group: list[tuple[Chunk, ChunkHead]] = []
-    size = 0
-    for whole in chunks:
-        for chunk in _divided(source, whole) if whole.compression is None else (whole,):
-            head = _head(source, chunk)
-            if head.compression:
-                room.reserve(head.size)
-            elif head.size != head.stored:
-                raise RecordingError("a chunk that is not compressed declares another size")
-            if group and size + head.size > MCAP_GROUP:
-                yield group
-                group, size = [], 0
-            group.append((chunk, head))
-            size += head.size
-    if group:
-        yield group
-
-
-def _divided(source: Source, stretch: Chunk) -> Iterator[Chunk]:
-    """Yield parts of a stretch of records outside of chunks, which may be the whole file."""
-    start, end = stretch.at, stretch.at + stretch.size
-    if stretch.size > MCAP_GROUP:
-        for _, at, size in mcap.heads(source, start, end):
-            if start < at and at + size - start > MCAP_GROUP:
-                yield stretch._replace(at=start, size=at - start)
-                start = at
-    yield stretch._replace(at=start, size=end - start)
+def _read(
+    source: Source,
+    group: list[tuple[Chunk, ChunkHead]],
+    channels: Collection[int],
+    room: Room,
+    check: bool,
+) -> Ranges:
+    """Return the messages of some channels in adjacent chunks."""
+    buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
+    starts, ends, at = [], [], 0
+    for chunk, head in group:
+        target = buffer[at : at + head.size]
+        places = _indexed(source, chunk, head.size, channels)
+        _fill(source, chunk, head, target, places, check)
+        if places is None:
+            places = np.array(_walked(target, chunk, channels, room), np.int64)
+        starts.append(places + at)
+        at += head.size
+        ends.append(np.full(len(places), at))
+    return _messages(buffer, np.concatenate(starts), np.concatenate(ends), channels)
 
 
 def _fill(
-    source: Source,
-    opened: LoadedChunk,
-    head: ChunkHead,
-    buffer: memoryview,
-    offsets: Any,
-    check: bool,
+    source: Source, chunk: Chunk, head: ChunkHead, target: memoryview, places: Any, check: bool
 ) -> None:
-    """Read the records of a chunk into a buffer, or only those at `offsets` if that suffices."""
-    target = buffer[opened.start : opened.stop]
+    """Read the records of a chunk into a buffer, or only those at `places` if that suffices."""
     check = check and head.crc != 0
     if head.compression:
         decompress(source.view(head.start, head.stored), head.compression, target)
+    elif places is None or check or not source.is_local:
+        source.read(head.start, target)
     else:
-        with source.opened() as read:
-            if offsets is None or check or not isinstance(source, LocalFile):
-                read(head.start, target)
-            else:
-                _read_some(read, head.start, target, offsets - opened.start)
+        _read_some(source, head.start, target, places)
     if check and zlib.crc32(target) != head.crc:
-        raise RecordingError(f"the checksum of the chunk at byte {opened.chunk.at} is wrong")
+        raise RecordingError(f"the checksum of the chunk at byte {chunk.at} is wrong")
 
 
-def _read_some(read: Read, start: int, target: memoryview, offsets: Any) -> None:
+def _read_some(source: Source, start: int, target: memoryview, places: Any) -> None:
     """Read messages of a chunk that begins at `start`, adjacent ones together."""
-    for near in np.split(offsets, np.flatnonzero(np.diff(offsets) > NEAR) + 1):
+    for near in np.split(places, np.flatnonzero(np.diff(places) > NEAR) + 1):
         if not len(near):
             return
         first, last = int(near[0]), int(near[-1])
         stop = min(last + NEAR, len(target))
-        read(start + first, target[first:stop])
+        source.read(start + first, target[first:stop])
         _, size = HEAD.unpack_from(target, last)
         end = min(last + HEAD.size + size, len(target))
         if end > stop:
-            read(start + stop, target[stop:end])
+            source.read(start + stop, target[stop:end])
 
 
-def _indexed(source: Source, opened: LoadedChunk, channels: Collection[int]) -> Any:
-    """Return the offsets in the buffer of the messages of some channels; None without an index."""
-    if opened.chunk.indexes is None:
+def _indexed(source: Source, chunk: Chunk, size: int, channels: Collection[int]) -> Any:
+    """Return where in a chunk messages of some channels begin; None without an index."""
+    if chunk.indexes is None:
         return None
-    parts = [
-        np.frombuffer(source.view(at + HEAD.size + 6, _entries(source, channel, at)), "<u8")[1::2]
-        for channel, at in INDEX_OFFSET.iter_unpack(opened.chunk.indexes)
-        if channel in channels
-    ]
-    offsets = np.concatenate([np.zeros(0, "<u8"), *parts])
-    last = opened.stop - opened.start - MESSAGE.itemsize
-    if len(offsets) and (last < 0 or int(offsets.max()) > last):
+    parts: list[Any] = [np.zeros(0, "<u8")]
+    for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes):
+        if channel in channels:
+            entries = source.view(at + HEAD.size + 6, mcap.index_entries(source, channel, at))
+            parts.append(np.frombuffer(entries, "<u8")[1::2])
+    places = np.concatenate(parts)
+    last = size - MESSAGE.itemsize
+    if len(places) and (last < 0 or int(places.max()) > last):
         raise RecordingError("an index of messages leaves its chunk")
-    offsets = offsets.astype(np.int64)
-    if (offsets[1:] <= offsets[:-1]).any():
-        offsets.sort()
-    return offsets + opened.start
+    places = places.astype(np.int64)
+    if (places[1:] <= places[:-1]).any():
+        places.sort()
+    return places
 
 
-def _entries(source: Source, channel: int, at: int) -> int:
-    """Return the number of bytes of entries in the MessageIndex at `at`, by its head."""
-    op, size = HEAD.unpack(source.view(at, HEAD.size))
-    if op != mcap.MESSAGE_INDEX_OP:
-        raise RecordingError(f"there is no index of messages at byte {at}, where another has one")
-    within(source, at + HEAD.size, size)
-    fields = mcap.Fields(source.view(at + HEAD.size, min(size, 6)), "an index of messages")
-    if fields.number(2) != channel:
-        raise RecordingError(f"the index of messages at byte {at} is of another channel")
-    entries = fields.number(4)
-    if entries % 16 or entries > size - 6:
-        raise RecordingError(f"the index of messages at byte {at} is cut off")
-    return entries
-
-
-def _walked(
-    view: memoryview, opened: LoadedChunk, channels: Collection[int], room: Room
-) -> list[int]:
-    """Return the offsets of messages, by a walk from record to record."""
-    unpack, ahead = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size
-    places, at, stop = [], opened.start, opened.stop
+def _walked(view: memoryview, chunk: Chunk, channels: Collection[int], room: Room) -> list[int]:
+    """Return where in a chunk messages begin, by a walk from record to record."""
+    unpack, ahead, stop = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size, len(view)
+    places, at = [], 0
     for _ in room.records():
         if at + ahead > stop:
             break
@@ -357,18 +290,16 @@ def _walked(
             places.append(at)
         at += HEAD.size + size
     if at != stop and not (at < stop and at + HEAD.size + view[at + 1] == stop):
-        raise RecordingError(f"records of the chunk at byte {opened.chunk.at} are cut off")
+        raise RecordingError(f"records of the chunk at byte {chunk.at} are cut off")
     return places
 
 
-def _messages(
-    buffer: memoryview, opened: list[LoadedChunk], offsets: list[Any], channels: Collection[int]
-) -> Ranges:
-    """Return the messages at some offsets of a buffer; raise RecordingError for others."""
+def _messages(buffer: memoryview, at: Any, ends: Any, channels: Collection[int]) -> Ranges:
+    """Return the messages that begin at some places; raise RecordingError for others.
+
+    `ends` has with each of them the end of its chunk.
+    """
     array: Any = np.frombuffer(buffer, np.uint8)
-    at = np.concatenate(offsets)
-    counts = [len(part) for part in offsets]
-    ends = np.repeat(np.array([entry.stop for entry in opened], np.int64), counts)
     if (at + MESSAGE.itemsize > ends).any():
         raise RecordingError("a message is cut off")
     every = max(0, len(array) - MESSAGE.itemsize + 1)
@@ -395,72 +326,5 @@ def decompress_each(ranges: Ranges, room: Room) -> Messages:
     candidates = ranges.starts[ranges.stops > ranges.starts]
     if not (array[candidates] == ZSTD_MAGIC[0]).any():
         return ranges
-    raws = [plain(raw, room) for raw in ranges.views()]
+    raws = [zstd_frame(raw, room) if raw[:4] == ZSTD_MAGIC else raw for raw in ranges.views()]
     return Separate(ranges.log_times, ranges.publish_times, raws)
-
-
-def plain(data: Raw, room: Room) -> Raw:
-    """Return a message that may be compressed by itself."""
-    return zstd_frame(data, room) if data[:4] == ZSTD_MAGIC else data
-
-
-#: Rows are yielded together until they have so many bytes.
-DB3_GROUP = 1 << 25
-#: SQLite has no other integers.
-SMALLEST, LARGEST = -(1 << 63), (1 << 63) - 1
-
-
-def db3_messages(
-    database: Db3, pieces: Iterable[Rows], topics: Collection[int], window: Window
-) -> Iterator[Messages]:
-    """Yield the messages of some topics in some rows."""
-    room = Room(database.size)
-    for piece in pieces:
-        with of_file(database.name):
-            first: int | None = piece.first
-            while first is not None:
-                times, raws, first = _group(database, Rows(first, piece.last), topics, window, room)
-                if raws:
-                    yield Separate(np.array(times, np.int64), None, raws)
-
-
-def _group(
-    database: Db3, piece: Rows, topics: Collection[int], window: Window, room: Room
-) -> tuple[list[int], list[Raw], int | None]:
-    """Return times and contents of the first messages, and the row that is next, if any.
-
-    The file is locked only meanwhile, so that a recorder can go on writing.
-    """
-    times: list[int] = []
-    raws: list[Raw] = []
-    size = 0
-    with closing(_rows(database, piece, topics, window, room)) as rows:
-        for row, time, data in rows:
-            times.append(time)
-            raws.append(data)
-            size += len(data)
-            if size >= DB3_GROUP:
-                return times, raws, row + 1 if row < piece.last else None
-    return times, raws, None
-
-
-def _rows(
-    database: Db3, piece: Rows, topics: Collection[int], window: Window, room: Room
-) -> Generator[tuple[int, int, bytes], None, None]:
-    """Yield row, time and content of each message."""
-    marks = ", ".join("?" * len(topics))
-    start = SMALLEST if window.start is None else max(window.start, SMALLEST)
-    end = LARGEST if window.end is None else min(window.end - 1, LARGEST)
-    query = (
-        "SELECT rowid, timestamp, data FROM messages NOT INDEXED WHERE rowid BETWEEN ? AND ? "  # noqa: S608
-        f"AND topic_id IN ({marks}) AND (timestamp BETWEEN ? AND ? "
-        "OR typeof(timestamp) <> 'integer') ORDER BY rowid"
-    )
-    if start > end:
-        return
-    rows = database.rows(query, (*piece, *topics, start, end))
-    with closing(rows):
-        for row, time, data in rows:
-            if not isinstance(time, int) or not isinstance(data, bytes):
-                raise RecordingError("a message has values of other types")
-            yield row, time, data if data[:4] != ZSTD_MAGIC else zstd_frame(data, room)
