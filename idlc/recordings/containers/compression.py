@@ -68,10 +68,8 @@ def _zstd(data: memoryview, target: memoryview) -> int:
 
     Returns the number of bytes, one more than there is room for if they do not fit.
     """
-    zstandard = _zstandard()
-    if not hasattr(_THREAD, "zstd"):
-        _THREAD.zstd = zstandard.ZstdDecompressor()
-    reader = _THREAD.zstd.stream_reader(data, read_across_frames=True)
+    zstandard, decompressor = _zstandard()
+    reader = decompressor.stream_reader(data, read_across_frames=True)
     done = 0
     try:
         while done < len(target) and (size := reader.readinto(target[done:])):
@@ -83,25 +81,27 @@ def _zstd(data: memoryview, target: memoryview) -> int:
 
 def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:
     """Decompress a message that is compressed by itself and declares its size."""
-    zstandard = _zstandard()
+    zstandard, decompressor = _zstandard()
     try:
         size = zstandard.frame_content_size(data)
-    except zstandard.ZstdError:
-        size = -1
-    if size < 0:
-        raise RecordingError("a compressed message does not declare its size")
-    room.reserve(size)
-    target = bytearray(size)
-    decompress(memoryview(data), "zstd", memoryview(target))
-    return bytes(target)
+        if size < 0:
+            raise RecordingError("a compressed message does not declare its size")
+        room.reserve(size)
+        message: bytes = decompressor.decompress(data, allow_extra_data=False)
+    except zstandard.ZstdError as error:
+        raise RecordingError(f"a compressed message cannot be read: {error}") from None
+    return message
 
 
-def _zstandard() -> Any:
+def _zstandard() -> tuple[Any, Any]:
+    """Return the library, and the decompressor of this thread."""
     try:
         import zstandard
     except ImportError:
         raise missing("zstandard", "chunks are compressed with zstd") from None
-    return zstandard
+    if not hasattr(_THREAD, "zstd"):
+        _THREAD.zstd = zstandard.ZstdDecompressor()
+    return zstandard, _THREAD.zstd
 
 
 def _lz4(data: memoryview, target: memoryview) -> int:

@@ -120,15 +120,16 @@ class Source:
 
     def view(self, start: int, size: int) -> memoryview:
         """Return bytes from the file, or from the block of a local one that was read last."""
-        self.check(start, size)
         first, block = self._block
         if not first <= start <= start + size <= first + len(block):
+            self.check(start, size)
             ahead = min(BLOCK, self.size - start) if self.is_local else 0
-            first, block = start, memoryview(bytearray(max(size, ahead)))
-            self.read(start, block)
+            target = memoryview(bytearray(max(size, ahead)))
+            self.read(start, target)
+            first, block = start, target.toreadonly()
             if size < BLOCK:
                 self._block = first, block
-        return block[start - first : start - first + size].toreadonly()
+        return block[start - first : start - first + size]
 
     def check(self, start: int, size: int) -> None:
         """Raise RecordingError if the file does not have these bytes."""
