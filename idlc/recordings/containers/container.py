@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
-from idlc.recordings.containers import bag, db3, mcap
+from idlc.recordings.containers import bag, db3, records
 from idlc.recordings.containers.compression import ZSTD_MAGIC
 from idlc.recordings.containers.db3 import Db3File
 from idlc.recordings.containers.file import (
@@ -144,7 +144,7 @@ def _open_file(path: Path, index: bool, check: bool) -> File:
     start = first_bytes(path)
     if start.startswith(db3.MAGIC):
         return Db3File(path)
-    if start.startswith(mcap.MAGIC):
+    if start.startswith(records.MAGIC):
         return McapFile(path, index, check)
     if not start:
         raise RecordingError(f"`{path}` is empty")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
+from idlc.recordings.containers import records
 from idlc.recordings.containers.compression import Room, decompress
 from idlc.recordings.containers.file import (
     START,
@@ -27,24 +28,27 @@ from idlc.recordings.containers.file import (
     full_name,
     recorded_schema,
 )
+from idlc.recordings.containers.records import (
+    FOOTER,
+    HEAD,
+    INDEX_OFFSET,
+    MAGIC,
+    MESSAGE_OP,
+    Chunk,
+    ChunkHead,
+    Fields,
+    heads,
+)
 from idlc.recordings.containers.source import RecordingError, Source, of_file
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
 
-MAGIC = b"\x89MCAP0\r\n"
-HEAD = Struct("<BQ")
-#: At the end of a file: the record, and the magic bytes once more.
-FOOTER = Struct("<BQQQI")
-INDEX_OFFSET = Struct("<HQ")
-#: The head of a chunk has the name of a compression, of which none is long.
-LONGEST_HEAD = 256
-#: Adjacent chunks are read together up to so many bytes: few calls, and memory stays bounded.
-GROUP = 1 << 24
-
-FOOTER_OP, SCHEMA_OP, CHANNEL_OP, MESSAGE_OP, CHUNK_OP = 2, 3, 4, 5, 6
-MESSAGE_INDEX_OP, CHUNK_INDEX_OP, STATISTICS_OP = 7, 8, 0x0B
-SUMMARY_OFFSET_OP, DATA_END_OP = 0x0E, 0x0F
+END_OF_TIME = (1 << 64) - 1
+#: Bytes of a Message record before the message itself.
+MESSAGE_HEAD = 22
+#: The start of a message: its channel and time, with its sequence number between them.
+CHANNEL_AND_TIME = Struct("<HIQ")
 
 
 class Channel(NamedTuple):
@@ -54,85 +58,6 @@ class Channel(NamedTuple):
     topic: str
     encoding: str
     metadata: dict[str, str]
-
-
-class Chunk(NamedTuple):
-    """A range with messages: a chunk, or records outside of any, whose `compression` is None.
-
-    `indexes` has channels and places of its MessageIndex records, packed; None if it has none.
-    They take `index_size` bytes behind it.
-    """
-
-    at: int
-    size: int
-    first: int
-    last: int
-    compression: str | None
-    indexes: bytes | None
-    index_size: int = 0
-
-    def may_have(self, window: Window) -> bool:
-        """Return whether messages of a window may be in it."""
-        return self.compression is None or window.overlaps(self.first, self.last)
-
-
-class Fields:
-    """Reads the fields of one record, one after the other."""
-
-    def __init__(self, data: memoryview, what: str) -> None:
-        self.data = data
-        self.at = 0
-        self.what = what
-
-    def read(self, size: int) -> memoryview:
-        """Return the next bytes."""
-        left = len(self.data) - self.at
-        if size > left:
-            raise RecordingError(f"{self.what} is broken: {size} bytes expected, {left} left")
-        self.at += size
-        return self.data[self.at - size : self.at]
-
-    def number(self, size: int) -> int:
-        """Return an unsigned number of so many bytes."""
-        return int.from_bytes(self.read(size), "little")
-
-    def name(self) -> str:
-        """Return a short text; invalid bytes stay visible, so that names stay different."""
-        return str(self.read(self.number(4)), "utf-8", "backslashreplace")
-
-    def part(self) -> Fields:
-        """Return the fields of a part, which its size of four bytes precedes."""
-        return Fields(self.read(self.number(4)), self.what)
-
-    def more(self) -> bool:
-        """Return whether something is left."""
-        return self.at < len(self.data)
-
-
-def read_records(data: memoryview) -> Iterator[tuple[int, int, memoryview]]:
-    """Yield kind, offset and content of each record; raise RecordingError if one is cut off."""
-    at, end = 0, len(data)
-    while at < end:
-        if end - at < HEAD.size:
-            raise RecordingError(f"a record is cut off after {end - at} bytes")
-        op, size = HEAD.unpack_from(data, at)
-        start = at + HEAD.size
-        if not op:
-            raise RecordingError("a record is of no kind")
-        if size > end - start:
-            raise RecordingError(f"a record of {size} bytes is cut off after {end - start}")
-        yield op, at, data[start : start + size]
-        at = start + size
-
-
-def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
-    """Yield kind, offset and size, with the head, of each complete record."""
-    while at + HEAD.size <= end:
-        op, size = HEAD.unpack(source.view(at, HEAD.size))
-        if not op or at + HEAD.size + size > end:
-            return
-        yield op, at, HEAD.size + size
-        at += HEAD.size + size
 
 
 def read_schema(fields: Fields) -> Schema:
@@ -151,48 +76,6 @@ def read_channel(fields: Fields) -> Channel:
     return Channel(schema, topic, encoding, metadata)
 
 
-def read_chunk_index(data: memoryview) -> Chunk:
-    """Read a ChunkIndex record."""
-    fields = Fields(data, "the index of a chunk")
-    first, last, at, size = (fields.number(8) for _ in range(4))
-    indexes = bytes(fields.read(fields.number(4)))
-    if len(indexes) % INDEX_OFFSET.size:
-        raise RecordingError("the index of a chunk is broken: its offsets are cut off")
-    index_size = fields.number(8)
-    return Chunk(at, size, first, last, fields.name(), indexes or None, index_size)
-
-
-class ChunkHead(NamedTuple):
-    """The head of a chunk; its records take `stored` bytes, from `start`."""
-
-    first: int
-    last: int
-    size: int
-    crc: int
-    compression: str
-    start: int
-    stored: int
-
-
-def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
-    """Read the head of a Chunk record."""
-    data = source.view(at + HEAD.size, min(size - HEAD.size, LONGEST_HEAD))
-    fields = Fields(data, "a chunk")
-    first, last, large, crc = fields.number(8), fields.number(8), fields.number(8), fields.number(4)
-    compression, stored = fields.name(), fields.number(8)
-    left = size - HEAD.size - fields.at
-    if stored > left:
-        raise RecordingError(f"a chunk is broken: {stored} bytes expected, {left} left")
-    return ChunkHead(first, last, large, crc, compression, at + HEAD.size + fields.at, stored)
-
-
-END_OF_TIME = (1 << 64) - 1
-#: Bytes of a Message record before the message itself.
-MESSAGE_HEAD = 22
-#: The start of a message: its channel and time, with its sequence number between them.
-CHANNEL_AND_TIME = Struct("<HIQ")
-
-
 class Facts(msgspec.Struct):
     """The content of a file; `start` is the time of the first message.
 
@@ -209,12 +92,12 @@ class Facts(msgspec.Struct):
 
     def add(self, op: int, data: memoryview) -> None:
         """Add a schema or a channel; definitions of one number must be equal."""
-        if op == SCHEMA_OP:
+        if op == records.SCHEMA_OP:
             fields = Fields(data, "a schema")
             number, schema = fields.number(2), read_schema(fields)
             if self.schemas.setdefault(number, schema) != schema:
                 raise RecordingError(f"schema {number} is defined in two ways")
-        elif op == CHANNEL_OP:
+        elif op == records.CHANNEL_OP:
             fields = Fields(data, "a channel")
             number, channel = fields.number(2), read_channel(fields)
             if self.channels.setdefault(number, channel) != channel:
@@ -253,8 +136,8 @@ def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
             if op == MESSAGE_OP:
                 yield source.view(at + HEAD.size, min(size - HEAD.size, most))
         return
-    head = read_chunk_head(source, chunk.at, chunk.size)
-    for op, _, data in read_records(_content(source, head, room)):
+    head = records.read_chunk_head(source, chunk.at, chunk.size)
+    for op, _, data in records.read_records(_content(source, head, room)):
         if op == MESSAGE_OP:
             yield data[:most]
 
@@ -277,7 +160,7 @@ def _summary(source: Source, check: bool) -> Facts:
     if end < len(MAGIC) or source.view(source.size - len(MAGIC), len(MAGIC)) != MAGIC:
         raise RecordingError("it was not closed")
     op, size, start, _, crc = FOOTER.unpack(source.view(end, FOOTER.size))
-    if (op, size) != (FOOTER_OP, FOOTER.size - HEAD.size):
+    if (op, size) != (records.FOOTER_OP, FOOTER.size - HEAD.size):
         raise RecordingError("it has no footer")
     if not len(MAGIC) <= start <= end:
         raise RecordingError("it has no summary")
@@ -287,11 +170,11 @@ def _summary(source: Source, check: bool) -> Facts:
         if zlib.crc32(covered) != crc:
             raise ContradictionError("the checksum of its summary is wrong")
     facts, statistics = Facts(), None
-    for op, _, content in read_records(data):
+    for op, _, content in records.read_records(data):
         facts.add(op, content)
-        if op == CHUNK_INDEX_OP:
-            facts.chunks.append(read_chunk_index(content))
-        elif op == STATISTICS_OP:
+        if op == records.CHUNK_INDEX_OP:
+            facts.chunks.append(records.read_chunk_index(content))
+        elif op == records.STATISTICS_OP:
             statistics = content
     _check_summary(facts, statistics)
     _add_loose(source, facts, start)
@@ -335,7 +218,7 @@ def _add_loose(source: Source, facts: Facts, start: int) -> None:
         if at < end:
             raise ContradictionError("its summary names chunks that are not there")
         for op, place, size in heads(source, end, at):
-            if op == CHUNK_OP:
+            if op == records.CHUNK_OP:
                 raise ContradictionError("its summary does not name all chunks")
             if op == MESSAGE_OP:
                 walk.message(place, size)
@@ -371,7 +254,7 @@ class _Walk:
         if len(data) == CHANNEL_AND_TIME.size:
             channel, _, time = CHANNEL_AND_TIME.unpack(data)
             self.facts.count(channel, 1, time)
-        if self.loose and at + size - self.loose[0] > GROUP:
+        if self.loose and at + size - self.loose[0] > records.GROUP:
             self.end_of_loose()
         start = self.loose[0] if self.loose else at
         self.loose = (start, at + size)
@@ -387,7 +270,7 @@ class _Walk:
         """Add the chunk before, its messages, and its indexes if they name all of these."""
         if self.chunk is None:
             return
-        head = read_chunk_head(self.source, self.chunk.at, self.chunk.size)
+        head = records.read_chunk_head(self.source, self.chunk.at, self.chunk.size)
         named: dict[int, int] = {}
         offsets = bytearray()
         for at, size in self.indexes:
@@ -409,9 +292,12 @@ class _Walk:
             self.damaged = True
             content, counts = memoryview(b""), named
             first, last = head.first, head.last
-        for (op, _, data), _ in zip(read_records(content), self.room.records(), strict=False):
-            self.facts.add(op, data)
-            if op == MESSAGE_OP and len(data) >= CHANNEL_AND_TIME.size:
+        for (op, _, data), _ in zip(
+            records.read_records(content), self.room.records(), strict=False
+        ):
+            if op != MESSAGE_OP:
+                self.facts.add(op, data)
+            elif len(data) >= CHANNEL_AND_TIME.size:
                 channel, _, time = CHANNEL_AND_TIME.unpack_from(data)
                 counts[channel] = counts.get(channel, 0) + 1
                 first, last = min(first, time), max(last, time)
@@ -431,21 +317,21 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
     walk, ended, end = _Walk(source), False, len(MAGIC)
     for op, at, size in heads(source, end, source.size):
         end = at + size
-        if op == MESSAGE_INDEX_OP and walk.chunk:
+        if op == records.MESSAGE_INDEX_OP and walk.chunk:
             if index:
                 walk.indexes.append((at, size))
             continue
         walk.end_of_chunk()
         if op == MESSAGE_OP:
             walk.message(at, size)
-        elif op == CHUNK_OP:
+        elif op == records.CHUNK_OP:
             walk.end_of_loose()
             walk.chunk = Chunk(at, size, 0, 0, "", None)
-        elif op in (SCHEMA_OP, CHANNEL_OP):
+        elif op in (records.SCHEMA_OP, records.CHANNEL_OP):
             walk.facts.add(op, walk.content(at, size))
         # a summary follows, and nothing keeps a writer from going on
-        ended = op == DATA_END_OP or (ended and op not in (MESSAGE_OP, CHUNK_OP))
-        if op == FOOTER_OP:
+        ended = op == records.DATA_END_OP or (ended and op not in (MESSAGE_OP, records.CHUNK_OP))
+        if op == records.FOOTER_OP:
             break
     walk.end_of_chunk()
     walk.end_of_loose()
@@ -456,21 +342,6 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
         rest = f", {left:,} bytes are left out" if left else ""
         walk.facts.notes.append(f"{reason}: read to its last whole record{rest}")
     return walk.facts
-
-
-def index_entries(source: Source, channel: int, at: int) -> int:
-    """Return the number of bytes of entries in the MessageIndex at `at`, by its head."""
-    op, size = HEAD.unpack(source.view(at, HEAD.size))
-    if op != MESSAGE_INDEX_OP:
-        raise RecordingError(f"there is no index of messages at byte {at}, where another has one")
-    source.check(at + HEAD.size, size)
-    fields = Fields(source.view(at + HEAD.size, min(size, 6)), "an index of messages")
-    if fields.number(2) != channel:
-        raise RecordingError(f"the index of messages at byte {at} is of another channel")
-    entries = fields.number(4)
-    if entries % 16 or entries > size - 6:
-        raise RecordingError(f"the index of messages at byte {at} is cut off")
-    return entries
 
 
 class McapFile(File):
@@ -563,7 +434,7 @@ class McapFile(File):
             counted = sum(counts.get(number, 0) - loose.get(number, 0) for number in channels)
             name = self.facts.channels[next(iter(channels))].topic
             named = sum(
-                index_entries(self.source, channel, at) // 16
+                records.index_entries(self.source, channel, at) // 16
                 for chunk in whole
                 for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b"")
             )
@@ -589,7 +460,7 @@ class McapFile(File):
         self, topics: Collection[int], pieces: Iterable[Chunk], window: Window
     ) -> Iterator[Messages]:
         """Yield the messages of some channels in some chunks, adjacent ones together."""
-        from idlc.recordings.containers.messages import in_chunks
+        from idlc.recordings.containers.mcap_messages import in_chunks
 
         return in_chunks(self.source, pieces, topics, window, self.check)
 
