@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from idlc.check import names, portability, style
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.model import ir
+from idlc.model import derive, ir
 from idlc.model.link import Model
 
 if TYPE_CHECKING:
@@ -43,12 +43,7 @@ class IncrementalFindings:
         for name, (_, targets) in graph.items():
             for target in targets:
                 users.setdefault(target, []).append(name)
-        changed: set[ir.TypeName] = set()
-        while waiting:
-            name = waiting.pop()
-            if name not in changed:
-                changed.add(name)
-                waiting += users.get(name, ())
+        changed = derive.closure(waiting, lambda name: users.get(name, ()))
         own = (interface.name for interface in model.own)
         kept = {name: findings[name] for name in own if name in findings and name not in changed}
         self._packages[model.package] = {name: now for name, (now, _) in graph.items()}, kept
