@@ -93,16 +93,15 @@ Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
-    """The types of a package, and all that they refer to, from its `_type_data.py`.
+    """The types of the package `home`, and all that they refer to, from its `_type_data.py`.
 
     Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
     imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
     Packages may describe types of one name in different ways, so nothing is kept by names alone.
     """
 
-    def __init__(self, module: Any) -> None:
-        content = json.loads(module.JSON)
-        self.home: str = module.__package__.removesuffix("._idlc")
+    def __init__(self, content: Mapping[str, Any], home: str = "") -> None:
+        self.home = home
         self.package: str = content["package"]
         #: The prefix of other packages' modules, relative to this one if it begins with a dot.
         self.around: str = content.get("around", "")
@@ -180,7 +179,9 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-_types_in = cache(Types)
+@cache
+def _types_in(module: Any) -> Types:
+    return Types(json.loads(module.JSON), module.__package__.removesuffix("._idlc"))
 
 
 def types_of(kind: type) -> Types:
