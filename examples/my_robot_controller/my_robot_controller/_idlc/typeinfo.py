@@ -93,14 +93,15 @@ Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
-    """The types of the package `home`, and all that they refer to, from its `_type_data.py`.
+    """The types of the package `home`, and all that they refer to: the JSON of its `_type_data.py`.
 
     Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
     imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
     Packages may describe types of one name in different ways, so nothing is kept by names alone.
     """
 
-    def __init__(self, content: Mapping[str, Any], home: str = "") -> None:
+    def __init__(self, text: str, home: str = "") -> None:
+        content = json.loads(text)
         self.home = home
         self.package: str = content["package"]
         #: The prefix of other packages' modules, relative to this one if it begins with a dot.
@@ -179,9 +180,7 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-@cache
-def _types_in(module: Any) -> Types:
-    return Types(json.loads(module.JSON), module.__package__.removesuffix("._idlc"))
+_types_in = cache(Types)
 
 
 def types_of(kind: type) -> Types:
@@ -191,7 +190,7 @@ def types_of(kind: type) -> Types:
         data = import_module(f"{home}._type_data")
     except ModuleNotFoundError:
         data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    return _types_in(data)
+    return _types_in(data.JSON, home)
 
 
 def structure_of(kind: type) -> Structure:
