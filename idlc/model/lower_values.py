@@ -14,7 +14,7 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.language.escapes import EscapeError, read_back, through_idl
-from idlc.language.grammar import terminals
+from idlc.language.parse import terminals
 from idlc.model import ir
 from idlc.model.lower_types import Fault
 
