@@ -72,21 +72,12 @@ class Compiler:
         self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
     ) -> tuple[ir.Interface, ...]:
         """Return the interfaces of texts; from now on, references resolve to them."""
-        from idlc.language.parse import parse_any
-        from idlc.model.lower import lower
-
         own = []
         for name, source in sources:
-            lowered = self._pool.remembered(name, source)
-            if lowered is None:
-                with stage("parse", source.path):
-                    tree = parse_any(source)
-                with stage("lower", source.path):
-                    problems = Report()
-                    interface = lower(tree, name, problems, self.library.distro)
-                    lowered = self._pool.remember(interface, problems)
-            own.append(lowered.interface)
-            report.extend(lowered.problems)
+            with stage("parse", source.path):
+                entry = self._pool.lower(name, source)
+            own.append(entry.interface)
+            report.extend(entry.problems)
         return tuple(own)
 
     def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
@@ -102,15 +93,8 @@ class Compiler:
 
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
         """Return interfaces and all that they refer to, without missing ones."""
-        interfaces: dict[ir.TypeName, ir.Interface] = {}
-        waiting = list(names)
-        while waiting:
-            name = waiting.pop()
-            entry = None if name in interfaces else self._pool.get(name)
-            if entry is not None:
-                interfaces[name] = entry.interface
-                waiting += (target for _, target in entry.references)
-        return interfaces
+        graph = self._pool.graph(names)
+        return {name: interface for name, (interface, _) in graph.items() if interface}
 
     def all(
         self, packages: Iterable[inputs.Inputs], report: Report
@@ -210,5 +194,4 @@ def without_errors(
 
 def derived_names(interface: ir.Interface) -> list[str]:
     """Return the names of an interface and of all structures derived from it, sorted."""
-    parts = (*derive.messages(interface), *derive.pseudo_structures(interface))
-    return sorted({str(part.name) for part in parts})
+    return sorted({str(part.name) for part in derive.structures(interface)})

@@ -140,7 +140,7 @@ def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
             if not code.definition:
                 continue
             body = parse_definition(code.definition)
-            if not isinstance(body, tree.Broken):
+            if not isinstance(body, tree.Fault):
                 meaning = meanings.get(code.start + body.name.start)
                 yield Element(source, code, body, message, meaning)
 

@@ -1,4 +1,4 @@
-"""Source → syntax tree. Never raises on a user's text: a line without meaning becomes `Broken`.
+"""Source → syntax tree. Never raises on a user's text: a line without meaning becomes a `Fault`.
 
 `grammar.lark` is the reference, and no construct of it is hard to find in a text. So this reads
 files without lark, which takes longer to load than all other work on a file; lark says where a
@@ -80,7 +80,7 @@ def parse_definition(text: str) -> tree.Body:
 def _definition(text: str) -> tree.Body:
     type_, space, rest = text.partition(" ")
     if text[0].isspace() or not space or not _type_pattern().fullmatch(type_):
-        return _broken(text, type_)
+        return _fault(text, type_)
     rest = rest.lstrip()
     at = len(text) - len(rest)
     name, equals, value = rest.partition("=")
@@ -119,34 +119,27 @@ def _type(text: str) -> tree.Type:
     )
 
 
-def _broken(text: str, type_: str) -> tree.Broken:
+def _fault(text: str, type_: str) -> tree.Fault:
     """Return the problem of a `text` that is no definition; `type_` is its first word."""
-    blank = len(text) - len(text.lstrip())
-    if blank:
-        return tree.Broken(
-            codes.INDENTED_DEFINITION,
-            tree.Piece(text[:blank], 0),
-            "a definition must begin in the first column",
-            "remove the white space before it",
-        )
-    whole = tree.Piece(type_, 0)
-    if text == "---":
-        return tree.Broken(
-            codes.MALFORMED_SEPARATOR,
-            whole,
-            "a separator must be alone on its line",
-            "remove the blanks or the comment after it",
-        )
-    if not text.strip("-"):
-        message = f"`{text}` is not a separator"
+    start, end = 0, len(type_)
+    if text[0].isspace():
+        code, end = codes.INDENTED_DEFINITION, len(text) - len(text.lstrip())
+        message = "a definition must begin in the first column"
+        hint = "remove the white space before it"
+    elif text == "---":
+        code, message = codes.MALFORMED_SEPARATOR, "a separator must be alone on its line"
+        hint = "remove the blanks or the comment after it"
+    elif not text.strip("-"):
+        code, message = codes.MALFORMED_SEPARATOR, f"`{text}` is not a separator"
         hint = "a separator is a line of exactly three dashes, `---`"
-        return tree.Broken(codes.MALFORMED_SEPARATOR, whole, message, hint)
-    if text == type_:
+    elif text == type_:
+        code, message = codes.MISSING_NAME, f"`{type_}` has no name after it"
         hint = "write `TYPE name`; a comment begins with `#`"
-        return tree.Broken(codes.MISSING_NAME, whole, f"`{type_}` has no name after it", hint)
-    at = _error(text, len(type_) - 1)
-    piece = tree.Piece(type_[at:], at)
-    return tree.Broken(codes.MALFORMED_TYPE, piece, f"malformed type `{type_}`", _type_hint(type_))
+    else:
+        code, message = codes.MALFORMED_TYPE, f"malformed type `{type_}`"
+        hint = _type_hint(type_)
+        start = _error(text, end - 1)
+    return tree.Fault(code, message, start, end, hint)
 
 
 def _error(text: str, last: int) -> int:

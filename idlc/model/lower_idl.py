@@ -6,8 +6,6 @@ spelling of a text.
 
 from __future__ import annotations
 
-import ast
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -17,9 +15,9 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.language import idl
 from idlc.language.escapes import inside_literal
-from idlc.language.tree import OPTIONAL, Piece
+from idlc.language.tree import OPTIONAL, Fault, Piece
 from idlc.model import ir, lower_types, lower_values, names
-from idlc.model.lower_types import STRINGS, Fault, as_parsed, positive
+from idlc.model.lower_types import STRINGS, as_parsed, positive
 from idlc.model.lower_values import MAX_ELEMENTS
 
 #: The annotations that ROS 2's adapter writes.
@@ -74,34 +72,28 @@ def scalar(type_: ir.Primitive | ir.String, value: idl.Value) -> ir.Scalar | Fau
 
 def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
     """Return the value of `@default`, or its fault."""
-    if isinstance(type_, (ir.Array, ir.Sequence)):
-        return _elements(type_, value)
-    if isinstance(type_, ir.String):
-        words = text(value)
-        if not value.is_text or not _fits(type_, words):
-            return _wrong(value, type_)
-        return ir.Default(words, words)
-    if value.is_text:
-        return _wrong(value, type_)
-    lowered = lower_values.default(type_, value.pieces[0].text)
-    return lowered.moved(value.whole.start) if isinstance(lowered, Fault) else lowered
-
-
-def _elements(type_: ir.Array | ir.Sequence, value: idl.Value) -> ir.Default | Fault:
-    """Read the text of a Python tuple, as which the defaults of arrays travel."""
     words = text(value)
-    if not value.is_text or words.count(",") > MAX_ELEMENTS:
-        return _wrong(value, type_)
+    if not value.is_text and isinstance(type_, ir.Primitive):
+        lowered = lower_values.default(type_, words)
+        return lowered.moved(value.whole.start) if isinstance(lowered, Fault) else lowered
+    if value.is_text and isinstance(type_, ir.String) and _fits(type_, words):
+        return ir.Default(words, words)
+    if value.is_text and isinstance(type_, (ir.Array, ir.Sequence)):
+        values = _elements(type_, words)
+        if values is not None:
+            wrong = lower_values.wrong_length(type_, len(values), value.whole.text)
+            return wrong.moved(value.whole.start) if wrong else ir.Default(values, words)
+    message = f"this is no value of type `{ir.spell(type_)}`"
+    return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
+
+
+def _elements(type_: ir.Array | ir.Sequence, words: str) -> tuple[ir.Scalar, ...] | None:
+    """Read the text of a Python tuple, as which the defaults of arrays travel."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # unknown escapes
-            values = ast.literal_eval(words)
-    except (ValueError, SyntaxError, MemoryError, RecursionError):
-        return _wrong(value, type_)
-    if not isinstance(values, tuple) or not all(_fits(type_.element, item) for item in values):
-        return _wrong(value, type_)
-    wrong = lower_values.wrong_length(type_, len(values), value.whole.text)
-    return wrong.moved(value.whole.start) if wrong else ir.Default(values, words)
+        values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
+    except ValueError:
+        return None
+    return values if all(_fits(type_.element, value) for value in values or ()) else None
 
 
 def _fits(type_: ir.Element, value: object) -> bool:
@@ -118,13 +110,6 @@ def _fits(type_: ir.Element, value: object) -> bool:
             is_number = isinstance(value, int) and not isinstance(value, bool)
             return is_number and low <= value <= high  # type: ignore[operator]
     return False
-
-
-def _wrong(value: idl.Value, type_: ir.FieldType) -> Fault:
-    from idlc.model.ir import spell
-
-    message = f"this is no value of type `{spell(type_)}`"
-    return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
 
 
 #: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
@@ -263,9 +248,8 @@ class _Lowering:
     def _field(self, member: idl.Member) -> ir.Field:
         self._check_annotations(member.annotations)
         type_, piece = self._type(member.type)
-        span = self.file.span(member.name)
-        wrong = lower_types.field_name(member.name.text, span)
-        self.report.extend([wrong] if wrong else [])
+        if fault := lower_types.field_name(member.name.text):
+            self._fault(fault.moved(member.name.start))
         return ir.Field(
             name=member.name.text,
             type=type_,
@@ -275,7 +259,7 @@ class _Lowering:
             optional=any(
                 f"@{annotation.name.text}" == OPTIONAL for annotation in member.annotations
             ),
-            name_span=span,
+            name_span=self.file.span(member.name),
             type_span=self.file.span(piece),
         )
 
@@ -302,9 +286,8 @@ class _Lowering:
 
     def _constant(self, constant: idl.IdlConstant) -> ir.Constant | None:
         self._check_annotations(constant.annotations)
-        span = self.file.span(constant.name)
-        wrong = lower_types.constant_name(constant.name.text, span)
-        self.report.extend([wrong] if wrong else [])
+        if fault := lower_types.constant_name(constant.name.text):
+            self._fault(fault.moved(constant.name.start))
         type_, piece = self._type(constant.type)
         if not isinstance(type_, (ir.Primitive, ir.String)):
             self._foreign(piece, f"a constant of the type `{piece.text}`")
@@ -318,5 +301,5 @@ class _Lowering:
             type=type_,
             value=value,
             comment=comment(constant.annotations),
-            name_span=span,
+            name_span=self.file.span(constant.name),
         )

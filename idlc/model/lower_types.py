@@ -11,26 +11,10 @@ from itertools import takewhile
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic
-from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import closest
 from idlc.language import tree
+from idlc.language.tree import Fault
 from idlc.model import ir, names
-
-
-class Fault(msgspec.Struct, frozen=True):
-    """A problem of a value; `start` and `end` count from the beginning of its text."""
-
-    code: codes.Code
-    message: str
-    start: int
-    end: int
-    hint: str | None = None
-
-    def moved(self, offset: int) -> Fault:
-        """Return the same fault in a longer text that has `offset` characters before."""
-        return msgspec.structs.replace(self, start=self.start + offset, end=self.end + offset)
-
 
 #: Names of types in other languages, in lower case, and their names in interface files.
 _TYPES = {
@@ -131,19 +115,18 @@ def find_slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
     if is_comment(text):
         message = f"`{text[:2]}` does not begin a comment"
         return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
-    if isinstance(body, tree.Broken):
+    if isinstance(body, Fault):
         return _broken(text, body, kind)
     return _qualified(text, body) or _of_c(text, body) or _other_shape(body)
 
 
-def _broken(text: str, body: tree.Broken, kind: ir.Kind) -> Fault | None:
-    if body.code is codes.MALFORMED_SEPARATOR and kind == "msg":
+def _broken(text: str, fault: Fault, kind: ir.Kind) -> Fault | None:
+    if fault.code is codes.MALFORMED_SEPARATOR and kind == "msg":
         hint = f"a .msg file has no separators; for a line in a comment write `# {text.split()[0]}`"
-        return Fault(body.code, body.message, 0, len(text), hint)
+        return msgspec.structs.replace(fault, hint=hint)
     word = re.match(r"(?:std::)?(\w+)[<(]", text)
-    if body.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
-        piece = body.piece
-        return Fault(body.code, body.message, piece.start, piece.end, type_hint(word[1]))
+    if fault.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
+        return msgspec.structs.replace(fault, hint=type_hint(word[1]))
     return None
 
 
@@ -212,28 +195,24 @@ def _constant(body: tree.Constant) -> Fault | None:
     return None
 
 
-def field_name(name: str, span: Span) -> Diagnostic | None:
-    """Return the problem with a field's name, or `None`."""
+def field_name(name: str) -> Fault | None:
+    """Return the fault of a field's name, or `None`."""
     if names.is_field_name(name):
         return None
     like = names.field_name_like(name)
-    return codes.INVALID_FIELD_NAME.at(
-        span,
-        f"`{name}` cannot be a field name",
-        hint=f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT,
-    )
+    hint = f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT
+    message = f"`{name}` cannot be a field name"
+    return Fault(codes.INVALID_FIELD_NAME, message, 0, len(name), hint)
 
 
-def constant_name(name: str, span: Span) -> Diagnostic | None:
-    """Return the problem with a constant's name, or `None`."""
+def constant_name(name: str) -> Fault | None:
+    """Return the fault of a constant's name, or `None`."""
     if names.is_constant_name(name):
         return None
     upper = names.field_name_like(name).upper()
-    return codes.INVALID_CONSTANT_NAME.at(
-        span,
-        f"`{name}` cannot be a constant name",
-        hint=f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT,
-    )
+    hint = f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT
+    message = f"`{name}` cannot be a constant name"
+    return Fault(codes.INVALID_CONSTANT_NAME, message, 0, len(name), hint)
 
 
 STRINGS = {"string": False, "wstring": True}

@@ -84,10 +84,10 @@ def assert_same_definition(text):
     except UnexpectedInput as error:
         end = error.pos_in_stream
         type_ = None
-    if isinstance(body, tree.Broken):
+    if isinstance(body, tree.Fault):
         assert type_ is None or text[0].isspace(), text
         if body.code is codes.MALFORMED_TYPE:
-            assert body.piece.start == min(end, body.piece.end - 1)
+            assert body.start == min(end, body.end - 1)
         return
     assert {name: getattr(body.type, name) for name in type_} == type_, text
     assert "bound" in type_ or body.type.bound is None
