@@ -14,7 +14,6 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.compiling import interface_files
-from idlc.cli.main import look_for_garbage_seldom
 
 SHARE = Path(sysconfig.get_path("data")) / "share"
 ROSIDL_FILES = 30
@@ -116,8 +115,6 @@ def rebuild(inputs: Path, out: Path, *, everything: bool) -> float:
 
 def main(task: str, inputs: Path, out: Path) -> float:
     run = TASKS.get(task, idlc)
-    if run is idlc:
-        look_for_garbage_seldom()  # as the program does
     folder = tempfile.mkdtemp(dir=out.parent)  # it goes with what OUT is in
     small = Path(folder, "in", "warm", "msg", "Warm.msg")
     small.parent.mkdir(parents=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import sys
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -234,17 +234,7 @@ LEVEL_NAMES = ("wire", "hash", "source", "behaviour")
 @options.exclude
 @options.distro
 @options.report_style
-def command(
-    paths: tuple[str, ...],
-    against: str | None,
-    timeout: float | None,
-    levels: tuple[str, ...],
-    package: str | None,
-    include: tuple[str, ...],
-    exclude: tuple[str, ...],
-    distro: str | None,
-    style: str,
-) -> int:
+def command(**arguments: Any) -> int:
     """Report what a new version of interfaces breaks, and for whom.
 
     wire: bytes recorded before are read wrongly or not at all. hash: the middleware may not
@@ -260,7 +250,4 @@ def command(
     Against the graph, it reports the types of which running nodes have several versions, or
     another one than the files here or the installed packages.
     """
-    typed = BreakingArguments(
-        paths, against, timeout, levels, package, include, exclude, distro, style
-    )
-    return compare(typed)
+    return compare(BreakingArguments(**arguments))

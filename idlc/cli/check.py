@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from idlc.cli import completion, options
@@ -39,20 +41,7 @@ Example:
 @options.exclude
 @options.distros
 @options.report_style
-def command(
-    paths: tuple[str, ...],
-    select: str | None,
-    ignore: str | None,
-    fix: bool,
-    strict: bool,
-    statistics: bool,
-    prefix: str | None,
-    package: str | None,
-    include: tuple[str, ...],
-    exclude: tuple[str, ...],
-    distro: str | None,
-    style: str,
-) -> int:
+def command(paths: tuple[str, ...], **arguments: Any) -> int:
     """Report every problem of interface files and of the packages around them.
 
     PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv
@@ -64,10 +53,8 @@ def command(
     """
     from idlc.cli.direct import CheckArguments, check_paths
 
-    options.check_rules(select, ignore)
-    if prefix is not None and (paths or fix):
+    typed = CheckArguments(**arguments)
+    options.check_rules(typed.select, typed.ignore)
+    if typed.prefix is not None and (paths or typed.fix):
         raise click.UsageError("--prefix looks at what is installed, without PATH and --fix")
-    arguments = CheckArguments(
-        select, ignore, fix, strict, package, include, exclude, style, statistics, prefix, distro
-    )
-    return check_paths(paths, arguments)
+    return check_paths(paths, typed)

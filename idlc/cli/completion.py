@@ -1,7 +1,8 @@
-"""Shell completion of words that are not options: types, packages, codes."""
+"""Shell completion of words that are not options: names only, nothing is parsed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -9,41 +10,51 @@ import click
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
+    from idlc.model import ir
+    from idlc.project.library import Library
+
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer packages."""
-    from idlc.cli import candidates
-
-    return candidates.packages(word, _include(context), context.params.get("distro"))
+    return [name for name in _library(context).packages() if name.startswith(word)]
 
 
 def types_and_paths(
     context: click.Context, _: click.Parameter, word: str
 ) -> list[CompletionItem[str]]:
     """Offer types and, in the shell's own way, files."""
-    from idlc.cli import candidates
+    from idlc.model.ir import KINDS
 
-    names = candidates.types(word, _include(context), distro=context.params.get("distro"))
+    library = _library(context)
     # bash forgets items before files
-    return [_item(word, "file"), *map(_item, names)]
+    return [_item(word, "file"), *map(_item, _types(word, library, KINDS, library.packages()))]
 
 
 def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer the topics of the recordings that were typed."""
-    from idlc.cli import candidates
+    from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
+    from idlc.recordings.find import split_recordings
+    from idlc.recordings.types import read_topics
 
     typed: Any = context.params.get("paths") or (context.params.get("subject"),)
     # arguments before an option without its value are not parsed
-    return candidates.topics(word, [path for path in (*typed, *context.args) if path])
+    paths = [path for path in (*typed, *context.args) if path]
+    root = Root.here()
+    words = split_recordings(paths, root)[0]
+    recordings = filter(None, (read_topics(path, root, Report()) for path in words))
+    names = {topic.topic.name for recording in recordings for topic in recording.topics}
+    return sorted(name for name in names if name.startswith(word))
 
 
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
     """Offer the types that an endpoint of a node can have; the topic is the user's."""
-    from idlc.cli import candidates
+    from idlc.project.inputs import nearby_packages
+    from idlc.project.root import Root
     from idlc.scaffold.roles import ROLES
 
     kinds = [role.kind for role in ROLES if role.name == option.name and role.kind]
-    return candidates.types(word, _include(context), kinds, bare="own")
+    return _types(word, _library(context), kinds, list(nearby_packages(Root.here())))
 
 
 def templates(_: click.Context, __: click.Parameter, word: str) -> list[str]:
@@ -82,9 +93,58 @@ def distros(_: click.Context, __: click.Parameter, word: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in BY_NAME if name.startswith(last)]
 
 
-def _include(context: click.Context) -> tuple[str, ...]:
-    folders: Any = context.params.get("include")
-    return tuple(folders or ())
+def _types(word: str, library: Library, kinds: Sequence[ir.Kind], bare: Sequence[str]) -> list[str]:
+    """Return the types that a word begins, written as it is.
+
+    `package/Name` and `package/kind/Name` are both known, and so are names without a package of
+    types in the packages `bare`.
+    """
+    package, slash, rest = word.partition("/")
+    if slash:
+        return sorted(_within(package, rest, library, kinds))
+    named = {
+        interface.name
+        for name in bare
+        for interface in library.interfaces(name)
+        if word and interface.kind in kinds and interface.name.startswith(word)
+    }
+    holding = [
+        name
+        for name in library.packages()
+        if name.startswith(word)
+        and any(interface.kind in kinds for interface in library.interfaces(name))
+    ]
+    if len(holding) == 1 and not named:
+        return sorted(_within(holding[0], "", library, kinds))
+    return [*sorted(named), *(f"{name}/" for name in holding)]
+
+
+def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind]) -> Iterator[str]:
+    """Yield the types of a package that begin with `rest`, with their kind if it names one."""
+    for interface in library.interfaces(package):
+        full = f"{interface.kind}/{interface.name}"
+        if interface.kind in kinds:
+            if interface.name.startswith(rest):
+                yield f"{package}/{interface.name}"
+            elif full.startswith(rest):
+                yield f"{package}/{full}"
+
+
+def _library(context: click.Context) -> Library:
+    """Return the library that the options mean, for the distribution in the settings by default."""
+    from idlc.diagnostics.report import Report
+    from idlc.model.distros import BY_NAME
+    from idlc.project.inputs import nearby_packages
+    from idlc.project.library import Library
+    from idlc.project.root import Root
+    from idlc.project.settings import load_settings, scope
+
+    report, root = Report(), Root.here()
+    distro = context.params.get("distro")
+    name = distro if distro in BY_NAME else None
+    selected = scope(load_settings(root, report), distro=name).distro
+    include = context.params.get("include") or ()
+    return Library(include, root, report, own=nearby_packages(root), distro=selected)
 
 
 def _item(value: str, kind: str = "plain", about: str | None = None) -> CompletionItem[str]:

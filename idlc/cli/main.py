@@ -11,20 +11,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
     if arguments is not None:
         return _run(list(arguments))
-    if sys.argv[1:] != ["lsp"]:  # which stays
-        look_for_garbage_seldom()
     status = _run(sys.argv[1:])
     # the program ends: another garbage collection would take longer than checking a file
     gc.freeze()
     return status
-
-
-def look_for_garbage_seldom() -> None:
-    """Let the interpreter keep more garbage: a run makes little, and collecting it takes time.
-
-    It takes a fifteenth of a run, most of it while modules are imported.
-    """
-    gc.set_threshold(200_000, 30, 30)
 
 
 def _run(words: list[str]) -> int:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from functools import wraps
 from typing import Any, TypeVar
 
 import click
@@ -107,6 +109,45 @@ def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | 
         if name not in BY_NAME:
             raise click.UsageError(f"there is no distribution {name!r}; {unknown_distro(name)}")
     return value
+
+
+def scoped(
+    *options: Callable[[Any], Any],
+) -> Callable[[Callable[..., str | None]], Callable[..., int]]:
+    """Have a command called with the `scope` that these options mean, and a `report`.
+
+    It is not called if the settings have errors. What it returns is written after the report.
+    """
+
+    def decorate(command: Callable[..., str | None]) -> Callable[..., int]:
+        @wraps(command)
+        def run(
+            package: str | None = None,
+            include: tuple[str, ...] = (),
+            exclude: tuple[str, ...] = (),
+            distro: str | None = None,
+            **arguments: Any,
+        ) -> int:
+            from idlc.cli import output
+            from idlc.diagnostics.report import Report
+            from idlc.project.root import Root
+            from idlc.project.settings import load_settings, scope
+
+            report, text = Report(), None
+            settings = load_settings(Root.here(), report)
+            if not report.had_errors:
+                where = scope(settings, package, include, exclude, distro)
+                text = command(**arguments, scope=where, report=report)
+            output.show(report, "text", sys.stderr)
+            output.notes(report, sys.stderr)
+            sys.stdout.write(text or "")
+            return output.status(report)
+
+        for option in reversed(options):
+            option(run)
+        return run
+
+    return decorate
 
 
 def style(command: Command) -> Command:

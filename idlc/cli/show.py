@@ -22,25 +22,20 @@ HEAD = ("topic", "type", "messages", "hash", "here")
 
 def show_recording(
     path: str, selected: Sequence[str], style: str, scope: Scope, report: Report
-) -> int:
-    """Show the topics of a recording, or definitions of selected ones; return the exit status."""
+) -> None:
+    """Show the topics of a recording, or definitions of selected ones."""
     from idlc.cli import output
     from idlc.documents.show import definitions, topics
 
     if selected:
         output.texts(definitions(path, selected, style, scope, report), style, sys.stdout)
-    elif style not in ("text", "json"):
-        raise click.UsageError(f"--format {style} shows types: name a topic")
+    elif style == "json":
+        for facts in topics(path, scope, report):
+            output.fact(sys.stdout, "topic", **facts._asdict())
+    elif style == "text":
+        sys.stdout.writelines(_table(topics(path, scope, report)))
     else:
-        topic_facts = topics(path, scope, report)
-        if style == "json":
-            for facts in topic_facts:
-                output.fact(sys.stdout, "topic", **facts._asdict())
-        else:
-            sys.stdout.writelines(_table(topic_facts))
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    return output.status(report)
+        raise click.UsageError(f"--format {style} shows types: name a topic")
 
 
 def _table(topic_facts: Sequence[TopicFacts]) -> list[str]:
@@ -98,17 +93,10 @@ Example:
     show_default=True,
     help="For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
 )
-@options.package
-@options.include
-@options.distro
+@options.scoped(options.package, options.include, options.distro)
 def command(
-    subject: str,
-    topics: tuple[str, ...],
-    style: str,
-    package: str | None,
-    include: tuple[str, ...],
-    distro: str | None,
-) -> int:
+    subject: str, topics: tuple[str, ...], style: str, scope: Scope, report: Report
+) -> None:
     """Show an interface with the messages in it and all comments.
 
     REC is a recording, an .mcap or .db3 file or the folder of a bag: of that, its topics with their
@@ -116,21 +104,12 @@ def command(
     TOPIC, the definitions of their types.
     """
     from idlc.cli import output
-    from idlc.diagnostics.report import Report
     from idlc.documents.show import show
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
     from idlc.recordings.find import is_recording
 
-    report = Report()
-    settings = load_settings(Root.here(), report)
-    where = scope(settings, package, include, distro=distro)
-    if is_recording(subject, settings.root) and not report.had_errors:
-        return show_recording(subject, topics, style, where, report)
-    if topics:
+    if is_recording(subject, scope.root):
+        show_recording(subject, topics, style, scope, report)
+    elif topics:
         raise click.UsageError(f"`{subject}` is no recording, so it has no topics")
-    texts = [] if report.had_errors else show(subject, style, where, report)
-    output.texts(texts, style, sys.stdout)
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    return output.status(report)
+    else:
+        output.texts(show(subject, style, scope, report), style, sys.stdout)

@@ -45,14 +45,14 @@ class Code(msgspec.Struct, frozen=True):
 
     def at(
         self,
-        span: Span,
+        span: Span | None,
         message: str,
         *,
         hint: str | None = None,
         labels: tuple[Label, ...] = (),
         edits: tuple[Edit, ...] = (),
     ) -> Diagnostic:
-        """Return a problem of this kind at a location in a file."""
+        """Return a problem of this kind at a location in a file; `None`: of what has no text."""
         return Diagnostic(
             code=self.id,
             severity=self.severity,

@@ -277,10 +277,8 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     models = [model for model, _ in sound_models(packages, scope, report) if model.own]
     if not models:
         return 0
-    from idlc.project import templates
 
     about = {package.package: _about(package, scope.root) for package in packages}
-    templates.keep_compiled()
     with stage("document", out):
         files = {file.path: file.text for file in site(models, about)}
     written = Report()

@@ -337,7 +337,7 @@ class Workspace:
         with without_options():
             for distro, checker in self._checkers.items():
                 reports[distro] = Report()
-                models[distro] = checker.check(self._packages, self._selection, reports[distro])
+                models[distro] = checker.check(self._packages, reports[distro])
             every = [model for some in models.values() for model in some]
             problems = [*self._fixed, *select_problems(reports, every, self._selection)]
         first = next(iter(self._checkers))

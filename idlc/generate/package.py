@@ -60,14 +60,12 @@ def package_of(
     from idlc.generate.python.imports import ALONE, VENDORING
     from idlc.generate.python.render import carried_runtime, installed_runtime, render_package
     from idlc.generate.python.vendored import vendored_files
-    from idlc.project import templates
     from idlc.wire.layout import oversized
 
     refused = list(oversized(model))
     if refused:
         target.report.extend(refused)
         return None
-    templates.keep_compiled()
     with stage("render", model.package):
         runtime = (
             carried_runtime() if target.runtime == "carried" else installed_runtime(model.package)

@@ -120,14 +120,11 @@ class Describer:
 
     def _closure(self, name: str) -> list[str]:
         """Return all names that `name` refers to, itself excluded, in code-point order."""
-        reached: set[str] = set()
-        queue = [name]
-        while queue:
-            types = (field["type"] for field in self._individuals[queue.pop()]["fields"])
-            fresh = {type_["nested_type_name"] for type_ in types} - reached - {""}
-            reached |= fresh
-            queue.extend(fresh)
-        return sorted(reached)
+        return sorted(derive.closure(self._direct(name), self._direct))
+
+    def _direct(self, name: str) -> set[str]:
+        types = (field["type"] for field in self._individuals[name]["fields"])
+        return {type_["nested_type_name"] for type_ in types} - {""}
 
     def description(self, name: str) -> DescriptionDict:
         """Return the full description of a structure, service or action by its full name."""

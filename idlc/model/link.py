@@ -77,14 +77,7 @@ def dependents(
     for user, targets in references:
         for target in targets:
             users.setdefault(target, []).append(user)
-    reached: set[ir.TypeName] = set()
-    waiting = list(names)
-    while waiting:
-        name = waiting.pop()
-        if name not in reached:
-            reached.add(name)
-            waiting += users.get(name, ())
-    return reached
+    return derive.closure(names, lambda name: users.get(name, ()))
 
 
 def check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
@@ -494,3 +487,8 @@ def _of_others(target: ir.TypeName) -> str | None:
 def own_sections(model: Model) -> Iterable[ir.Message]:
     """Return every structure of the model's own files."""
     return (part for interface in model.own for part in derive.sections(interface))
+
+
+def own_fields(model: Model) -> Iterable[ir.Field]:
+    """Return every field of the model's own files."""
+    return (field for message in own_sections(model) for field in message.fields)

@@ -54,7 +54,7 @@ def environment() -> jinja2.Environment:
 @cache
 def code() -> jinja2.Environment:
     """Return the environment of source files, which places nothing but Code and Text."""
-    return place_only_code(environment().overlay())
+    return place_only_code(environment().overlay(bytecode_cache=_compiled("code")))
 
 
 def place_only_code(environment: jinja2.Environment) -> jinja2.Environment:
@@ -92,7 +92,8 @@ def _indented(value: object, width: int = 4) -> Code:
 @cache
 def html() -> jinja2.Environment:
     """Return the environment of pages: values are escaped, control characters spelled out."""
-    return environment().overlay(autoescape=True, finalize=_text)
+    cache = _compiled("html")
+    return environment().overlay(autoescape=True, finalize=_text, bytecode_cache=cache)
 
 
 def _text(value: object) -> object:
@@ -106,14 +107,10 @@ def verbatim(name: str) -> str:
     return loader.get_source(environment(), name)[0]
 
 
-def keep_compiled() -> None:
-    """Cache compiled templates: compiling them takes longer than rendering."""
-    if code().bytecode_cache is not None:
-        return
+def _compiled(environment: str) -> jinja2.BytecodeCache | None:
+    """Return the cache of compiled templates: compiling them takes a fifth of `idlc gen`."""
     place = cache_folder()
-    if place is not None:
-        code().bytecode_cache = _Compiled(place, "code")
-        html().bytecode_cache = _Compiled(place, "html")
+    return _Compiled(place, environment) if place else None
 
 
 class _Compiled(jinja2.FileSystemBytecodeCache):

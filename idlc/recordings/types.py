@@ -475,10 +475,7 @@ def _explicit(
     names: Iterable[ir.TypeName], interfaces: Mapping[ir.TypeName, ir.Interface]
 ) -> set[ir.TypeName]:
     """Return interfaces and those they refer to in files, without those that ROS 2 adds."""
-    reached: set[ir.TypeName] = set()
-    waiting = set(names) & interfaces.keys()
-    while waiting:
-        reached |= waiting
-        named = set[ir.TypeName]().union(*(derive.references(interfaces[name]) for name in waiting))
-        waiting = (named & interfaces.keys()) - reached
-    return reached
+    known = interfaces.keys()
+    return derive.closure(
+        known & set(names), lambda name: known & derive.references(interfaces[name])
+    )

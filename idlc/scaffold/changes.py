@@ -23,7 +23,7 @@ from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
-from idlc.project.templates import keep_compiled, verbatim
+from idlc.project.templates import verbatim
 from idlc.project.write import Plan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, Endpoint, Role
 from idlc.scaffold.templates import BrokenTemplateError, Templates, read
@@ -167,7 +167,6 @@ def templates(settings: Settings, report: Report) -> Templates:
 @contextmanager
 def rendering(subject: str, report: Report) -> Iterator[None]:
     """Report problems of a user's template within; other exceptions are bugs of idlc."""
-    keep_compiled()
     with stage("scaffold", subject):
         try:
             yield

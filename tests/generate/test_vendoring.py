@@ -11,6 +11,7 @@ import pytest
 
 from idlc.cli.main import main
 from tests.support import generated, programs
+from tests.support.paths import ROOT
 
 INTERFACES = {
     "msg/Track.msg": "std_msgs/Header header\ngeometry_msgs/Point[] points\nPart part\n",
@@ -308,12 +309,16 @@ def test_pickles_can_be_read_with_and_without_installed_packages(library, tmp_pa
     assert prints(code + USE + PICKLE, library) == []
 
 
-@pytest.fixture(scope="module")
-def other_library(tmp_path_factory):
-    """A library of another version of idlc, which kept its types in the runtime."""
+@pytest.fixture(scope="module", params=["carried", "installed"])
+def other_library(request, tmp_path_factory):
+    """A folder with another library, in both modes of the runtime."""
     folder = tmp_path_factory.mktemp("other")
     write(folder / "files", {"msg/Bee.msg": "std_msgs/Header[] headers\n"})
-    gen(folder / "files", folder / "out/bees", "--vendor-deps", package="bee_msgs")
+    words = ("--vendor-deps", "--runtime", request.param)
+    gen(folder / "files", folder / "out/bees", *words, package="bee_msgs")
+    assert (folder / "out/bees/_idlc").exists() == (request.param == "carried")
+    if request.param == "installed":
+        shutil.copytree(ROOT / "idlc/runtime", folder / "out/idlc_runtime")
     return folder / "out"
 
 
