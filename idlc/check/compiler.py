@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.model import derive, ir
 from idlc.project import inputs
@@ -90,6 +90,15 @@ class Compiler:
         with stage("check", package):
             check(model, report, self._checked)
         return model
+
+    def models(
+        self, interfaces: Mapping[ir.TypeName, ir.Interface], report: Report
+    ) -> dict[str, Model]:
+        """Return the models of interfaces by package; every problem is reported."""
+        packages: dict[str, list[ir.Interface]] = {}
+        for name in sorted(interfaces):
+            packages.setdefault(name.package, []).append(interfaces[name])
+        return {package: self.model(package, own, report) for package, own in packages.items()}
 
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
         """Return interfaces and all that they refer to, without missing ones."""
@@ -183,7 +192,7 @@ def without_errors(
 
     An error in a file counts for its file in `also` as well.
     """
-    errors = [problem for problem in report if problem.severity is Severity.ERROR]
+    errors = report.errors
     broken = {problem.where[0] for problem in errors}
     broken |= {also[path] for path in broken & also.keys()}
     is_all = any(problem.code == codes.INVALID_PACKAGE_NAME.id for problem in errors)

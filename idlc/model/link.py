@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, Severity
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean, including, package_hint
 from idlc.language.parse import parse_any
@@ -175,9 +175,7 @@ class Pool:
     def errors(self, name: ir.TypeName) -> list[Diagnostic]:
         """Return the errors of an interface's text and of its references."""
         entry = self._entries.get(name)
-        own = entry.problems if entry else ()
-        errors = [problem for problem in own if problem.severity is Severity.ERROR]
-        return errors + self.linked.get(name, [])
+        return [*(entry.problems.errors if entry else ()), *self.linked.get(name, ())]
 
     def package_references(self) -> dict[str, dict[str, Span]]:
         """Return where a package first names each other one; ROS 2 adds others by itself."""

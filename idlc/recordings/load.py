@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from idlc.check.compiler import Compiler, library_for, sources_of
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.generate.target import last_change, requested_packages
 from idlc.model import ir
 from idlc.model.python_names import class_
@@ -116,12 +116,9 @@ def requested_models(
 
 def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) -> Models:
     """Return the models of interfaces and of all that these need, by package."""
-    interfaces: dict[str, list[ir.Interface]] = {}
-    for name, interface in sorted(compiler.reached(names).items()):
-        interfaces.setdefault(name.package, []).append(interface)
     every = Report()
-    models = {package: compiler.model(package, own, every) for package, own in interfaces.items()}
-    report.extend(diagnostic for diagnostic in every if diagnostic.severity is Severity.ERROR)
+    models = compiler.models(compiler.reached(names), every)
+    report.extend(every.errors)
     return models
 
 

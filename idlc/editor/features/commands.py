@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.editor.elements import workspace_edit
 from idlc.editor.features import rename
 from idlc.editor.protocol import capabilities
@@ -84,11 +84,10 @@ def _unsaved(state: ServerState, package: str) -> Iterator[Path]:
 
 
 def _failure(report: Report) -> str:
-    errors = [diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR]
     listed = first_few(
         (
             f"{diagnostic.where[0]}: {diagnostic.code}: {diagnostic.message}"
-            for diagnostic in errors
+            for diagnostic in report.errors
         ),
         NAMED,
     )
