@@ -143,7 +143,10 @@ class _Lowering:
             word = f"`{self.file.broken.text}`" if self.file.broken.text else "this end of the text"
             self._foreign(self.file.broken, word)
             return [ir.Message(name=name, source=self.file.source) for name in names]
-        self._check_modules(names[0])
+        top, file = names[0], self.file
+        for piece, written in ((file.package, top.package), (file.kind, top.kind)):
+            if piece.text != written:
+                self._foreign(piece, f"module `{piece.text}` for `{top}`")
         constants: dict[str, list[ir.Constant]] = {}
         structures: dict[str, idl.Structure] = {}
         expected = {name.name for name in names}
@@ -163,11 +166,6 @@ class _Lowering:
                 self._foreign(self.file.kind, f"a module without `{name}`")
         return [self._structure(name, structures.get(name.name), constants) for name in names]
 
-    def _check_modules(self, name: ir.TypeName) -> None:
-        for piece, expected in ((self.file.package, name.package), (self.file.kind, name.kind)):
-            if piece.text != expected:
-                self._foreign(piece, f"module `{piece.text}` for `{name}`")
-
     def _foreign(self, piece: Piece, subject: str) -> None:
         self.strange = True
         message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
@@ -185,9 +183,8 @@ class _Lowering:
         constants: dict[str, list[ir.Constant]],
     ) -> ir.Message:
         fields = [self._field(member) for member in structure.members] if structure else []
-        if [(field.name, field.type) for field in fields] == [
-            (ir.DUMMY_FIELD, ir.Primitive("uint8"))
-        ]:
+        dummy = ir.DUMMY_FIELD, ir.Primitive("uint8")
+        if [(field.name, field.type) for field in fields] == [dummy]:
             fields = []
         return ir.Message(
             name=name,
@@ -200,16 +197,20 @@ class _Lowering:
     def _typedef(self, typedef: idl.Typedef) -> None:
         target = self._type(typedef.type)
         type_ = target.type
-        if typedef.size is not None:
-            size = positive(typedef.size, "the array's size")
-            if isinstance(size, Fault):
-                self._fault(size)
-            elif isinstance(type_, (ir.Array, ir.Sequence)):
+        if size := self._positive(typedef.size, "the array's size"):
+            if isinstance(type_, (ir.Array, ir.Sequence)):
                 self._foreign(typedef.name, "an array of arrays")
                 type_ = ir.Unknown()
             else:
                 type_ = ir.Array(type_, size)
         self.typedefs[typedef.name.text] = _Type(type_, target.piece)
+
+    def _positive(self, piece: Piece | None, subject: str) -> int | None:
+        size = None if piece is None else positive(piece, subject)
+        if not isinstance(size, Fault):
+            return size
+        self._fault(size)
+        return None
 
     def _type(self, type_: idl.Element | idl.Sequence) -> _Type:
         if isinstance(type_, idl.Element):
@@ -218,19 +219,13 @@ class _Lowering:
         if isinstance(element, (ir.Array, ir.Sequence)):
             self._foreign(piece, "a sequence of arrays")
             return _Type(ir.Unknown(), piece)
-        bound = None if type_.bound is None else positive(type_.bound, "the array's size")
-        if isinstance(bound, Fault):
-            self._fault(bound)
-            return _Type(ir.Unknown(), piece)
+        bound = self._positive(type_.bound, "the array's size")
         return _Type(as_parsed(ir.Sequence(element, bound)), piece)
 
     def _element(self, element: idl.Element) -> _Type:
         piece = element.name
         if piece.text in STRINGS:
-            bound = None if element.bound is None else positive(element.bound, "the string's bound")
-            if isinstance(bound, Fault):
-                self._fault(bound)
-                return _Type(ir.Unknown(), piece)
+            bound = self._positive(element.bound, "the string's bound")
             return _Type(ir.String(STRINGS[piece.text], bound), piece)
         if element.bound is None:
             if piece.text in _PRIMITIVES:
@@ -245,11 +240,21 @@ class _Lowering:
         self._foreign(piece, f"the type `{piece.text}`")
         return _Type(ir.Unknown(), piece)
 
+    def _check(self, element: idl.Member | idl.IdlConstant) -> None:
+        """Report unknown annotations, and a name that ROS 2 does not allow."""
+        for annotation in element.annotations:
+            if annotation.name.text not in ANNOTATIONS:
+                self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
+        is_field = isinstance(element, idl.Member)
+        fault = (lower_types.field_name if is_field else lower_types.constant_name)(
+            element.name.text
+        )
+        if fault is not None:
+            self._fault(fault.moved(element.name.start))
+
     def _field(self, member: idl.Member) -> ir.Field:
-        self._check_annotations(member.annotations)
+        self._check(member)
         type_, piece = self._type(member.type)
-        if fault := lower_types.field_name(member.name.text):
-            self._fault(fault.moved(member.name.start))
         return ir.Field(
             name=member.name.text,
             type=type_,
@@ -262,11 +267,6 @@ class _Lowering:
             name_span=self.file.span(member.name),
             type_span=self.file.span(piece),
         )
-
-    def _check_annotations(self, annotations: Sequence[idl.Annotation]) -> None:
-        for annotation in annotations:
-            if annotation.name.text not in ANNOTATIONS:
-                self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
 
     def _default(
         self, type_: ir.FieldType, annotations: Sequence[idl.Annotation]
@@ -285,9 +285,7 @@ class _Lowering:
         return lowered
 
     def _constant(self, constant: idl.IdlConstant) -> ir.Constant | None:
-        self._check_annotations(constant.annotations)
-        if fault := lower_types.constant_name(constant.name.text):
-            self._fault(fault.moved(constant.name.start))
+        self._check(constant)
         type_, piece = self._type(constant.type)
         if not isinstance(type_, (ir.Primitive, ir.String)):
             self._foreign(piece, f"a constant of the type `{piece.text}`")

@@ -160,21 +160,17 @@ def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
         listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
         definitions = [f"`{type_} {part.strip()}`" for part in listed if part.strip()]
         hint = f"write each on a line of its own: {', '.join(definitions[:4])}"
-        return _name_fault(name, "a line defines one field", hint)
+        return _fault(codes.INVALID_FIELD_NAME, name, "a line defines one field", hint)
     plain, bracket, size = name.text.partition("[")
     if bracket and size.endswith("]"):
         hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
-        return _name_fault(name, f"`{name.text}` cannot be a field name", hint)
+        message = f"`{name.text}` cannot be a field name"
+        return _fault(codes.INVALID_FIELD_NAME, name, message, hint)
     if type_.endswith(":"):
         hint = f"the type comes first: `{name.text} {type_[:-1]}`"
-        return Fault(
-            codes.INVALID_TYPE_NAME, f"`{type_}` cannot be a type name", 0, len(type_), hint
-        )
+        message = f"`{type_}` cannot be a type name"
+        return _fault(codes.INVALID_TYPE_NAME, body.type.whole, message, hint)
     return None
-
-
-def _name_fault(name: tree.Piece, message: str, hint: str) -> Fault:
-    return Fault(codes.INVALID_FIELD_NAME, message, name.start, name.end, hint)
 
 
 def _constant(body: tree.Constant) -> Fault | None:
@@ -183,15 +179,14 @@ def _constant(body: tree.Constant) -> Fault | None:
         value = "VALUE"
     if not name.text:
         hint = f"write `{type_} NAME={value}`"
-        return Fault(
-            codes.INVALID_CONSTANT_NAME, "a constant has no name", name.start, name.end + 1, hint
-        )
+        code, end = codes.INVALID_CONSTANT_NAME, name.end + 1
+        return Fault(code, "a constant has no name", name.start, end, hint)
     if names.is_field_name(name.text):
         message = f"`{name.text}` cannot be a constant name"
         hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
         if type_ in (*ir.PRIMITIVES, "string", "wstring"):
             hint += f"; a constant is called `{name.text.upper()}`"
-        return Fault(codes.INVALID_CONSTANT_NAME, message, name.start, name.end, hint)
+        return _fault(codes.INVALID_CONSTANT_NAME, name, message, hint)
     return None
 
 
@@ -253,21 +248,18 @@ def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
     if name in ir.PRIMITIVES:
         return ir.Primitive(name)
     if name in ROS1_TYPES:
-        ros2_type = "builtin_interfaces/" + name.capitalize()
-        return _fault(
-            codes.ROS1_TYPE, type_.name, f"`{name}` is a ROS 1 type", f"write `{ros2_type}`"
-        )
+        message = f"`{name}` is a ROS 1 type"
+        hint = f"write `builtin_interfaces/{name.capitalize()}`"
+        return _fault(codes.ROS1_TYPE, type_.name, message, hint)
     return _reference(type_.name, package)
 
 
 def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
     parts = piece.text.split("/")
     if len(parts) > 2:
-        hint = (
-            f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
-            if len(parts) == 3
-            else "write `package/Name`"
-        )
+        hint = "write `package/Name`"
+        if len(parts) == 3:
+            hint = f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
         if len(parts) == 3 and parts[1] in _NO_FIELDS:
             hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
         return _fault(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
