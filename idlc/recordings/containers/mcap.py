@@ -121,8 +121,6 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> Facts
     if index:
         try:
             return _summary(source, check)
-        except ContradictionError as error:
-            reason, index = error.message, False
         except RecordingError as error:
             reason = error.message
     return _walk(source, reason, index)
@@ -150,10 +148,6 @@ def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
     return target
 
 
-class ContradictionError(RecordingError):
-    """A summary is not only incomplete but wrong, and the indexes written with it may be, too."""
-
-
 def _summary(source: Source, check: bool) -> Facts:
     """Return the content by the summary; raise RecordingError if that is not reliable."""
     end = source.size - FOOTER.size - len(MAGIC)
@@ -168,7 +162,7 @@ def _summary(source: Source, check: bool) -> Facts:
     if check and crc:
         covered = source.view(start, source.size - len(MAGIC) - 4 - start)
         if zlib.crc32(covered) != crc:
-            raise ContradictionError("the checksum of its summary is wrong")
+            raise RecordingError("the checksum of its summary is wrong")
     facts, statistics = Facts(), None
     for op, _, content in records.read_records(data):
         facts.add(op, content)
@@ -194,14 +188,14 @@ def _check_summary(facts: Facts, statistics: memoryview | None) -> None:
         facts.counts[number] = part.number(8)
     facts.start = start if messages else None
     if chunks != len(facts.chunks):
-        raise ContradictionError("its summary names other chunks than it counts")
+        raise RecordingError("its summary names other chunks than it counts")
     if not facts.counts.keys() <= facts.channels.keys():
         raise RecordingError("its summary does not name all channels")
     needed = {channel.schema for channel in facts.channels.values() if channel.schema}
     if not needed <= facts.schemas.keys():
         raise RecordingError("its summary does not name all schemas")
     if messages != sum(facts.counts.values()):
-        raise ContradictionError("its summary counts messages in two ways")
+        raise RecordingError("its summary counts messages in two ways")
 
 
 def _add_loose(source: Source, facts: Facts, start: int) -> None:
@@ -216,10 +210,10 @@ def _add_loose(source: Source, facts: Facts, start: int) -> None:
         (start, start),
     ]:
         if at < end:
-            raise ContradictionError("its summary names chunks that are not there")
+            raise RecordingError("its summary names chunks that are not there")
         for op, place, size in heads(source, end, at):
             if op == records.CHUNK_OP:
-                raise ContradictionError("its summary does not name all chunks")
+                raise RecordingError("its summary does not name all chunks")
             if op == MESSAGE_OP:
                 walk.message(place, size)
         walk.end_of_loose()

@@ -121,11 +121,6 @@ def join_messages(parts: Sequence[Messages]) -> Messages:
     log = np.concatenate([none, *(part.log_times for part in parts)])
     publish_times = [part.publish_times for part in parts if part.publish_times is not None]
     publish = np.concatenate([none, *publish_times]) if len(publish_times) == len(parts) else None
-    ranges = [part for part in parts if isinstance(part, Ranges)]
-    if len(ranges) == len(parts) and len({id(part.buffer) for part in ranges}) == 1:
-        starts = np.concatenate([part.starts for part in ranges])
-        stops = np.concatenate([part.stops for part in ranges])
-        return Ranges(log, publish, ranges[0].buffer, starts, stops)
     raws = [raw for part in parts for raw in part.views()]
     sizes: Any = np.fromiter(map(len, raws), np.int64, len(raws))
     if sizes.sum() >= LARGE * len(raws):
