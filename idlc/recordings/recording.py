@@ -349,15 +349,6 @@ class Part(Selection):
             yield from file.messages(self.ids, self.pieces, self.window)
 
 
-def parts_of(
-    container: Container, topic: Topic, window: Window, size: int, include: tuple[str, ...] = ()
-) -> Iterator[Part]:
-    """Yield the parts of a topic, each of about `size` bytes of a file."""
-    for file, ids, _ in container.places(topic):
-        for pieces in file.parts(ids, window, size):
-            yield Part(topic, file.place, tuple(ids), pieces, window, include)
-
-
 #: A part reads about so many bytes of a recording.
 PART = 1 << 25
 
@@ -476,4 +467,8 @@ class RecordedTopic(Selection):
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
-        return list(parts_of(self._container, self.topic, self._window, size, self.include))
+        return [
+            Part(self.topic, file.place, tuple(numbers), pieces, self._window, self.include)
+            for file, numbers, _ in self._container.places(self.topic)
+            for pieces in file.parts(numbers, self._window, size)
+        ]

@@ -233,7 +233,7 @@ class _Walk:
         self.source = source
         self.facts = Facts()
         self.loose: tuple[int, int] | None = None
-        self.chunk: Chunk | None = None
+        self.chunk: tuple[int, int] | None = None
         self.indexes: list[tuple[int, int]] = []
         self.room = Room(source.size)
         self.damaged = False
@@ -264,14 +264,15 @@ class _Walk:
         """Add the chunk before, its messages, and its indexes if they name all of these."""
         if self.chunk is None:
             return
-        head = records.read_chunk_head(self.source, self.chunk.at, self.chunk.size)
+        at, size = self.chunk
+        head = records.read_chunk_head(self.source, at, size)
         named: dict[int, int] = {}
         offsets = bytearray()
-        for at, size in self.indexes:
-            fields = Fields(self.content(at, size), "the index of a chunk")
+        for place, length in self.indexes:
+            fields = Fields(self.content(place, length), "the index of a chunk")
             channel, entries = fields.number(2), fields.number(4)
             named[channel] = named.get(channel, 0) + entries // 16
-            offsets += INDEX_OFFSET.pack(channel, at)
+            offsets += INDEX_OFFSET.pack(channel, place)
         counts: dict[int, int] = {}
         first, last = END_OF_TIME, 0
         try:
@@ -281,7 +282,7 @@ class _Walk:
                 raise
             # reading the topics in it reports the problem again; other topics stay readable
             if not self.damaged:
-                what = f"the chunk at byte {self.chunk.at}, and perhaps others, cannot be read"
+                what = f"the chunk at byte {at}, and perhaps others, cannot be read"
                 self.facts.notes.append(f"{what}: {error.message}")
             self.damaged = True
             content, counts = memoryview(b""), named
@@ -298,8 +299,7 @@ class _Walk:
         for channel, messages in counts.items():
             self.facts.count(channel, messages, first)
         indexes = bytes(offsets) if counts == named else None
-        chunk = self.chunk._replace(first=first, last=last, indexes=indexes)
-        self.facts.chunks.append(chunk._replace(compression=head.compression))
+        self.facts.chunks.append(Chunk(at, size, first, last, head.compression, indexes))
         self.chunk, self.indexes = None, []
 
 
@@ -320,7 +320,7 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
             walk.message(at, size)
         elif op == records.CHUNK_OP:
             walk.end_of_loose()
-            walk.chunk = Chunk(at, size, 0, 0, "", None)
+            walk.chunk = at, size
         elif op in (records.SCHEMA_OP, records.CHANNEL_OP):
             walk.facts.add(op, walk.content(at, size))
         # a summary follows, and nothing keeps a writer from going on
