@@ -10,7 +10,7 @@ import msgspec
 
 from idlc.check.compiler import Compiler
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
+from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import did_you_mean, including
 from idlc.language.parse import parse_any
@@ -197,8 +197,7 @@ class LocalTypes:
         interfaces = self._compiler.reached(names)
         report = Report()
         model = self._compiler.model(package, list(interfaces.values()), report)
-        errors = (each for each in report if each.severity is Severity.ERROR)
-        return model.sound({error.where[0] for error in errors})
+        return model.sound({error.where[0] for error in report.errors})
 
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
         """Return the hash of a type that an interface defines; `None` if it is not known."""
@@ -312,29 +311,22 @@ class RecordedTypes:
         """Return the interfaces that a topic's type is made of, without those that ROS 2 adds."""
         name = topic.interface
         if name not in self._names:
-            reached = self._names[name] = set[ir.TypeName]()
-            waiting = {name} & self.interfaces.keys()
-            while waiting:
-                reached |= waiting
-                references = (derive.references(self.interfaces[each]) for each in waiting)
-                waiting = (set().union(*references) & self.interfaces.keys()) - reached
+            known = self.interfaces.keys()
+            self._names[name] = derive.closure(
+                {name} & known, lambda each: known & derive.references(self.interfaces[each])
+            )
         return self._names[name]
 
     def _compile(self) -> tuple[dict[str, Model], Report]:
         """Return the model of each package, without faulty interfaces, and the errors in these."""
         report = Report()
-        models = {
-            package: self._compiler.model(
-                package, [self.interfaces[name] for name in sorted(names)], report
-            )
-            for package, names in sorted(self.names.items())
-        }
+        models = self._compiler.models(self.interfaces, report)
         if not report.had_errors:
             extents: ContentSizes = {}
             for model in models.values():
                 report.extend(oversized(model, extents))
         errors = Report()
-        errors.extend(diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR)
+        errors.extend(report.errors)
         broken = {diagnostic.where[0] for diagnostic in errors}
         if broken:
             models = {name: model.sound(broken) for name, model in models.items()}
