@@ -442,7 +442,7 @@ class Target:
             for path, text in files.items()
         }
         outputs = self.lock.outputs if self.lock else {}
-        owned = write.owned_files(self.path / self.home, outputs)
+        owned = write.owned_files(outputs)
         force, record = check or self._force, self.home + FILE
         return plan(self.path, self.name, content, owned, self.report, record=record, force=force)
 
