@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
@@ -18,10 +19,10 @@ from idlc.recordings.columns.scan import (
     scan_uniform,
 )
 from idlc.recordings.columns.source import Flat, Pieces, Source
-from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
+from idlc.recordings.columns.table import Elements, Table, columns_of
 from idlc.runtime.cdr import order_of
 from idlc.runtime.names import DecodeError, owner_of
-from idlc.runtime.typeinfo import CarefulReader, structure_of
+from idlc.runtime.typeinfo import CarefulReader, Structure, structure_of
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -71,31 +72,42 @@ def _of_batch(batch: Any) -> Messages:
     return Messages(Flat(array), starts, stops)
 
 
+def type_of(kind: type | Structure) -> Structure:
+    """Return the type of a class of messages."""
+    return kind if isinstance(kind, Structure) else structure_of(kind)
+
+
 def to_columns(
-    kind: type,
+    kind: type | Structure,
     messages: Any,
     fields: Iterable[str] | None = None,
     ragged: bool | None = None,
     datetimes: bool = False,
 ) -> Any:
-    """Return a row for each message, as a structured array or as Columns."""
-    table, top = table_of(kind, messages, fields, datetimes)
-    if not ragged:
-        try:
-            return structured(table, top)
-        except UnevenError as error:
-            if ragged is not None:
-                raise ValueError(f"{error}; ragged=True takes it") from None
-    return columns_of(table, top)
+    """Return Columns with a row for each message, or without `ragged` what was returned before."""
+    columns = columns_of(*table_of(kind, messages, fields, datetimes))
+    if ragged:
+        return columns
+    warnings.warn(
+        "to_columns will return Columns: `to_columns(..., ragged=True)` does so now, "
+        "and `.structured()` makes a structured array of them",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    try:
+        return columns.structured()
+    except ValueError as error:
+        if ragged is None:
+            return columns
+        raise ValueError(f"{error}; ragged=True takes it") from None
 
 
 def table_of(
-    kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
+    kind: type | Structure, messages: Any, fields: Iterable[str] | None, datetimes: bool
 ) -> tuple[Table, Elements]:
     """Return what is in messages, and the rows of the table; raise DecodeError."""
-    structure = structure_of(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
-    plan = plan_of(structure, None if wanted is None else tuple(wanted), datetimes)
+    plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted), datetimes)
     all_of_them = messages_of(messages)
     try:
         return _read(plan, all_of_them)
@@ -121,8 +133,7 @@ def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
             VectorScan(source, order, result).level(plan, cursors.select(rest), first)
             done.append(rows[rest])
     order = ">" if big.any() and not mixed else "<"
-    size = int((messages.stops - messages.starts).sum())
-    table = Table(source, size, order, result)
+    table = Table(source, order, result)
     order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
     return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
 
@@ -152,14 +163,16 @@ def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
         raw = messages.raw(first)
         # classes of other packages need not be installed
         reader = CarefulReader(raw, order_of(raw), lambda _: SimpleNamespace())
-        reader.message(structure_of(kind), "")
+        reader.message(type_of(kind), "")
     except DecodeError as error:
         path = f"[{first}].{error.path}" if error.path else f"[{first}]"
-        raise _runtime_of(kind).DecodeError(error.problem, path, error.offset) from error
+        raise _error_of(kind)(error.problem, path, error.offset) from error
     raise AssertionError(f"[{first}] can be read by itself")
 
 
-def _runtime_of(kind: Any) -> Any:
-    """Return the runtime package that a message class comes from: carried, or installed."""
+def _error_of(kind: Any) -> Any:
+    """Return the DecodeError of the runtime that a message class comes with."""
+    if isinstance(kind, Structure):
+        return DecodeError
     base = owner_of(kind).__base__
-    return sys.modules[base.__module__.rpartition(".")[0]]
+    return sys.modules[base.__module__.rpartition(".")[0]].DecodeError
