@@ -23,7 +23,8 @@ from idlc.project import inputs
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.source import RecordingError, UnreadTopic, is_local
+from idlc.recordings.containers.file import UnreadTopic
+from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import ContentSizes, oversized
