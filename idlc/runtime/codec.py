@@ -10,7 +10,7 @@ import struct
 from os import environ
 
 from .cdr import NATIVE, order_of
-from .names import DecodeError, ValidationError, owner_of
+from .names import DecodeError, ValidationError, demand_stamp, owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -273,8 +273,12 @@ def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
     return message
 
 
-def maker(kind: Any) -> Callable[[], Any]:
-    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
+def maker(kind: Any, number: int | None = None) -> Callable[[], Any]:
+    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class.
+
+    Raises ImportError for a class whose fields have another stamp than `number`.
+    """
+    demand_stamp(kind, number)
     if hasattr(type(kind), "_message"):
         if CHECK_FIELDS:
             from .checked import checked_class

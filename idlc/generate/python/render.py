@@ -29,6 +29,7 @@ from idlc.model.names import snake_case
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
 from idlc.runtime import PROTOCOL
+from idlc.runtime.names import stamp
 from idlc.version import RUNTIME, __version__
 from idlc.wire import plan
 
@@ -52,7 +53,7 @@ def codec(structure: ir.Message, references: References, messages: plan.Messages
     steps = plan.steps(structure, messages, names)
     tables = Tables(names)
     writing = encode(steps, tables, 8)
-    makers = _makers(structure.name, steps, references, tables)
+    makers = _makers(structure, steps, references, messages, tables)
     foreign = {
         type_: references.name(type_) for type_ in makers if type_.package != references.package
     }
@@ -82,16 +83,30 @@ def _code(lines: Iterable[str]) -> tuple[Code, ...]:
 
 
 def _makers(
-    own: ir.TypeName, steps: tuple[plan.Step, ...], references: References, tables: Tables
+    own: ir.Message,
+    steps: tuple[plan.Step, ...],
+    references: References,
+    messages: plan.Messages,
+    tables: Tables,
 ) -> dict[ir.TypeName, str]:
-    """Return the functions that make empty objects of the message and of those in it."""
+    """Return the functions that make empty objects of the message and of those in it.
+
+    They demand that classes of the package have the fields that the codec was made for.
+    """
     makers: dict[ir.TypeName, str] = {}
-    for type_ in (own, *_types(steps)):
+    for type_ in (own.name, *_types(steps)):
         if type_ not in makers:
-            name = "kind" if type_ == own else references.name(type_)
+            name = "kind" if type_ == own.name else references.name(type_)
             stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
-            makers[type_] = tables.define(stem, f"maker {name}", call("_idlc.maker", name))
+            words = [name]
+            if type_.package == references.package:
+                words.append(f"{_stamp(own if type_ == own.name else messages[type_]):#010x}")
+            makers[type_] = tables.define(stem, f"maker {name}", call("_idlc.maker", *words))
     return makers
+
+
+def _stamp(message: ir.Message) -> int:
+    return stamp({field.name: fields.idl_text(field.type) for field in message.fields})
 
 
 def _types(steps: tuple[plan.Step, ...]) -> list[ir.TypeName]:
@@ -107,11 +122,14 @@ def _types(steps: tuple[plan.Step, ...]) -> list[ir.TypeName]:
 class TypesDict(TypedDict):
     """Descriptions and hashes by full name, and the package's own files by interface name.
 
+    `stamps` are of the package's own classes.
+
     Other packages' files are left out: their text differs between an installation and the
     catalogue, and the same input must give the same output.
     """
 
     package: str
+    stamps: dict[str, int]
     descriptions: dict[str, IndividualDict]
     hashes: dict[str, str]
     sources: dict[str, str]
@@ -127,6 +145,11 @@ def content(model: link.Model) -> TypesDict:
             full = describer.description(str(structure.name))
             for description in (full["type_description"], *full["referenced_type_descriptions"]):
                 descriptions[description["type_name"]] = description
+    stamps = {
+        str(message.name): _stamp(message)
+        for interface in model.own
+        for message in derive.sections(interface)
+    }
     sources = {
         # rosidl reads texts so, and no checkout of git's makes a difference then
         str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
@@ -135,6 +158,7 @@ def content(model: link.Model) -> TypesDict:
     }
     return {
         "package": model.package,
+        "stamps": dict(sorted(stamps.items())),
         "descriptions": dict(sorted(descriptions.items())),
         "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
         "sources": dict(sorted(sources.items())),
@@ -159,7 +183,7 @@ def _parts(tables: TypesDict, around: str) -> list[str]:
     mark = f'{{"package":{_json(tables["package"])}'
     if around:
         mark += f',"around":{_json(around)}'
-    for key in ("descriptions", "hashes", "sources"):
+    for key in ("stamps", "descriptions", "hashes", "sources"):
         mark += f',"{key}":{{'
         entries: dict[str, Any] = tables[key]
         for name, value in entries.items():
