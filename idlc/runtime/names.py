@@ -55,7 +55,7 @@ def stamp(fields: Mapping[str, str]) -> int:
 
 def demand_stamp(kind: Any, number: int | None) -> None:
     """Raise ImportError unless a class has the fields that another module was made for."""
-    if number not in (None, stamp(kind._fields_and_field_types)):
+    if number is not None and number != stamp(kind._fields_and_field_types):
         package = kind.__module__.rpartition(".")[0]
         raise ImportError(
             f"{package} has files of two versions of {kind.__name__}, perhaps because `idlc gen` "
