@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import keyword
+from collections.abc import Iterator
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Label, Report
+from idlc.diagnostics.report import Diagnostic, Label
 from idlc.model import derive, ir, names
 from idlc.model.link import Model, own_sections
 
 
-def package_name(model: Model, report: Report) -> None:
+def package_name(model: Model) -> Iterator[Diagnostic]:
     """The package's name is valid; the problem is the package's, so it is reported once."""
     if not names.is_package_name(model.package):
-        where = model.own[0].source if model.own else None
-        report.add(
-            codes.INVALID_PACKAGE_NAME.of(
-                where.path if where else model.package,
-                f"`{model.package}` cannot be a package name",
-                hint=names.PACKAGE_HINT,
-            )
-        )
+        message = f"`{model.package}` cannot be a package name"
+        yield codes.INVALID_PACKAGE_NAME.of(_first_path(model), message, hint=names.PACKAGE_HINT)
 
 
-def interface_names(model: Model, report: Report) -> None:
+def _first_path(model: Model) -> str:
+    """Return the file that services show problems of the package in."""
+    return ir.path_of(model.own[0]) if model.own and model.own[0].source else model.package
+
+
+def interface_names(model: Model) -> Iterator[Diagnostic]:
     """File names, and the names derived from them for services and actions, are valid."""
     for interface in model.own:
         if all(names.is_message_name(part.name.name) for part in derive.sections(interface)):
@@ -34,63 +34,41 @@ def interface_names(model: Model, report: Report) -> None:
             hint = "this ending is kept for the parts of services and actions"
         else:
             hint = f"call it `{like}.{kind}`" if names.is_message_name(like) else names.MESSAGE_HINT
-        report.add(
-            codes.INVALID_INTERFACE_NAME.of(
-                interface.source.path if interface.source else str(interface.name),
-                f"`{name}` cannot be the name of a .{kind} file",
-                hint=hint,
-            )
-        )
+        message = f"`{name}` cannot be the name of a .{kind} file"
+        yield codes.INVALID_INTERFACE_NAME.of(ir.path_of(interface), message, hint=hint)
 
 
-def unique_fields(model: Model, report: Report) -> None:
-    """No structure has two fields of one name."""
+def unique_names(model: Model) -> Iterator[Diagnostic]:
+    """No structure has two fields, or two constants, of one name."""
     for message in own_sections(model):
-        first: dict[str, ir.Field] = {}
-        for field in message.fields:
-            earlier = first.setdefault(field.name, field)
-            if earlier is not field and field.name_span and earlier.name_span:
-                report.add(
-                    codes.DUPLICATE_FIELD.at(
-                        field.name_span,
-                        f"a second field `{field.name}`",
+        for noun, code, elements in (
+            ("field", codes.DUPLICATE_FIELD, message.fields),
+            ("constant", codes.DUPLICATE_CONSTANT, message.constants),
+        ):
+            first: dict[str, ir.Field | ir.Constant] = {}
+            for element in elements:
+                earlier = first.setdefault(element.name, element)
+                if earlier is not element and earlier.name_span:
+                    yield code.at(
+                        element.name_span,
+                        f"a second {noun} `{element.name}`",
                         labels=(Label(earlier.name_span, "the first is here"),),
                         hint="rename or remove one of them",
                     )
-                )
 
 
-def unique_constants(model: Model, report: Report) -> None:
-    """No structure has two constants of one name."""
-    for message in own_sections(model):
-        first: dict[str, ir.Constant] = {}
-        for constant in message.constants:
-            earlier = first.setdefault(constant.name, constant)
-            if earlier is not constant and constant.name_span and earlier.name_span:
-                report.add(
-                    codes.DUPLICATE_CONSTANT.at(
-                        constant.name_span,
-                        f"a second constant `{constant.name}`",
-                        labels=(Label(earlier.name_span, "the first is here"),),
-                        hint="rename or remove one of them",
-                    )
-                )
-
-
-def unique_modules(model: Model, report: Report) -> None:
+def unique_modules(model: Model) -> Iterator[Diagnostic]:
     """Two interfaces of one kind do not share rosidl's Python module."""
     first: dict[tuple[str, str], ir.TypeName] = {}
     for interface in model.own:
         name = interface.name
         earlier = first.setdefault((name.kind, names.snake_case(name.name)), name)
         if earlier is not name and interface.source:
-            report.add(
-                codes.SAME_PYTHON_MODULE.of(
-                    interface.source.path,
-                    f"rosidl puts `{name.name}` and `{earlier.name}` into one Python module, "
-                    f"`_{names.snake_case(name.name)}`, where one of them is lost",
-                    hint="give them names that differ in more than capitals",
-                )
+            yield codes.SAME_PYTHON_MODULE.of(
+                ir.path_of(interface),
+                f"rosidl puts `{name.name}` and `{earlier.name}` into one Python module, "
+                f"`_{names.snake_case(name.name)}`, where one of them is lost",
+                hint="give them names that differ in more than capitals",
             )
 
 
@@ -121,92 +99,71 @@ _PYTHON_MEMBERS = frozenset({"get_fields_and_field_types", "check_fields"})
 _PYTHON_SUFFIXES = ("_Goal", "_Result", "_Feedback")
 
 
+_NOT_COMPILED = "what rosidl generates does not compile"
 _RENAME = "rename it if C or C++ code may ever use this package"
 
 
-def reserved_field_names(model: Model, report: Report) -> None:
+def reserved_field_names(model: Model) -> Iterator[Diagnostic]:
     """Fields are not called like words of Python, C or C++."""
     for message in own_sections(model):
         for field in message.fields:
-            if field.name_span is None:
-                continue
-            if (clash := _python_clash(field, message)) is not None:
-                text = f"`{field.name}` is {clash}; the Python code that rosidl generates fails"
+            name = field.name
+            # `builtins` hides the module of that name from the fields after it
+            hides_builtins = name == "builtins" and field is not message.fields[-1]
+            clash = "a Python keyword" if keyword.iskeyword(name) else ""
+            if name in _PYTHON_MEMBERS or hides_builtins:
+                clash = "used by the class itself"
+            if clash:
+                text = f"`{name}` is {clash}; the Python code that rosidl generates fails"
                 hint = "rename it if colcon may ever build this package; idlc's Python copes"
-                report.add(codes.BREAKS_ROSIDL_PYTHON.at(field.name_span, text, hint=hint))
-            if (native := _native_clash(field.name)) is not None:
-                code, text = native
-                report.add(code.at(field.name_span, text, hint=_RENAME))
+                yield codes.BREAKS_ROSIDL_PYTHON.at(field.name_span, text, hint=hint)
+            languages = [word for word, names in (("C", _C), ("C++", _CPP)) if name in names]
+            if languages:
+                code = codes.BREAKS_C if name in _C else codes.BREAKS_CPP
+                text = f"`{name}` is reserved in {' and '.join(languages)}; {_NOT_COMPILED}"
+                yield code.at(field.name_span, text, hint=_RENAME)
 
 
-def _python_clash(field: ir.Field, message: ir.Message) -> str | None:
-    if keyword.iskeyword(field.name):
-        return "a Python keyword"
-    # `builtins` hides the module of that name from the fields after it
-    hides_builtins = field.name == "builtins" and field is not message.fields[-1]
-    if field.name in _PYTHON_MEMBERS or hides_builtins:
-        return "used by the class itself"
-    return None
-
-
-def _native_clash(name: str) -> tuple[codes.Code, str] | None:
-    if name in _C:
-        languages, code = ("C and C++" if name in _CPP else "C"), codes.BREAKS_C
-    elif name in _CPP:
-        languages, code = "C++", codes.BREAKS_CPP
-    else:
-        return None
-    return code, f"`{name}` is reserved in {languages}; what rosidl generates does not compile"
-
-
-def reserved_constant_names(model: Model, report: Report) -> None:
+def reserved_constant_names(model: Model) -> Iterator[Diagnostic]:
     """Constants are not called like macros of the C standard library."""
     for message in own_sections(model):
         for constant in message.constants:
-            if constant.name in _MACROS and constant.name_span:
-                text = f"`{constant.name}` is a macro; what rosidl generates does not compile"
-                report.add(codes.BREAKS_CPP.at(constant.name_span, text, hint=_RENAME))
+            if constant.name in _MACROS:
+                text = f"`{constant.name}` is a macro; {_NOT_COMPILED}"
+                yield codes.BREAKS_CPP.at(constant.name_span, text, hint=_RENAME)
 
 
-def reserved_interface_names(model: Model, report: Report) -> None:
+def reserved_interface_names(model: Model) -> Iterator[Diagnostic]:
     """Messages are not called None, True or False; services do not end in _Goal."""
     for interface in model.own:
         name = interface.name
-        path = interface.source.path if interface.source else str(name)
         if keyword.iskeyword(name.name):
             text = f"`{name.name}` is a Python keyword; the Python code that rosidl generates fails"
-            report.add(codes.BREAKS_ROSIDL_PYTHON.of(path, text, hint="rename the file"))
+            yield codes.BREAKS_ROSIDL_PYTHON.of(ir.path_of(interface), text, hint="rename the file")
         if name.kind == "srv" and name.name.endswith("_Goal"):
             text = f"a service called `{name.name}` breaks the C code that rosidl generates"
-            report.add(codes.BREAKS_C.of(path, text, hint="rename the file"))
+            yield codes.BREAKS_C.of(ir.path_of(interface), text, hint="rename the file")
 
 
-def reserved_package_name(model: Model, report: Report) -> None:
+def reserved_package_name(model: Model) -> Iterator[Diagnostic]:
     """The package is not called like a word of Python, C or C++."""
-    path = model.own[0].source.path if model.own and model.own[0].source else model.package
+    path = _first_path(model)
     if keyword.iskeyword(model.package):
         text = f"package `{model.package}` is a Python keyword; no import statement can name it"
-        report.add(codes.BREAKS_ROSIDL_PYTHON.of(path, text, hint="rename the package"))
+        yield codes.BREAKS_ROSIDL_PYTHON.of(path, text, hint="rename the package")
     if model.package in _CPP or model.package == "msg":
         text = f"package `{model.package}` breaks the C++ code that rosidl generates"
-        report.add(codes.BREAKS_CPP.of(path, text, hint="rename the package"))
+        yield codes.BREAKS_CPP.of(path, text, hint="rename the package")
 
 
-def derived_suffixes(model: Model, report: Report) -> None:
+def derived_suffixes(model: Model) -> Iterator[Diagnostic]:
     """Messages whose names look derived are not used as the type of a field."""
     for message in own_sections(model):
-        for field in message.fields:
-            element = ir.element_of(field.type)
-            if not isinstance(element, ir.Ref) or field.type_span is None:
-                continue
-            name = element.target.name
-            if name.endswith(_PYTHON_SUFFIXES):
-                text = (
-                    f"a field of type `{name}` breaks the Python and C code that rosidl generates"
-                )
-                report.add(
-                    codes.BREAKS_ROSIDL_PYTHON.at(field.type_span, text, hint="rename that message")
-                )
-            elif name.endswith("_Request"):
-                text = f"a field of type `{name}` breaks the C code that rosidl generates"
-                report.add(codes.BREAKS_C.at(field.type_span, text, hint="rename that message"))
+        for field, target in message.holders:
+            in_python = target.name.endswith(_PYTHON_SUFFIXES)
+            if in_python or target.name.endswith("_Request"):
+                code = codes.BREAKS_ROSIDL_PYTHON if in_python else codes.BREAKS_C
+                languages = "Python and C" if in_python else "C"
+                breaks = f"breaks the {languages} code that rosidl generates"
+                text = f"a field of type `{target.name}` {breaks}"
+                yield code.at(field.type_span, text, hint="rename that message")

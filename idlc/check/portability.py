@@ -6,81 +6,68 @@ import math
 import re
 from collections.abc import Iterator
 
-import msgspec
-
 from idlc.check.style import REMARK, is_unit
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Report, first_few
+from idlc.diagnostics.report import Diagnostic, Edit, first_few
 from idlc.diagnostics.source import Span
 from idlc.language.escapes import plain_meaning
 from idlc.model import catalog, ir, lower_types
 from idlc.model.comments import brackets
-from idlc.model.link import Model, own_sections
+from idlc.model.link import Model, own_fields, own_sections
 from idlc.model.lower_values import BACKSLASH_HINT, FLOAT32_MAX
 
 
-def constants_and_defaults(model: Model, report: Report) -> None:
+def constants_and_defaults(model: Model) -> Iterator[Diagnostic]:
     """Values reach every language as they are written."""
     for message in own_sections(model):
         for constant in message.constants:
             if constant.value_span is not None:
-                report.extend(_problems(constant.value, constant.type, constant.value_span))
+                yield from _problems(constant.value, constant.type, constant.value_span)
         for field in message.fields:
             if field.default is not None and field.default_span is not None:
-                report.extend(_problems(field.default.value, field.type, field.default_span))
+                yield from _problems(field.default.value, field.type, field.default_span)
 
 
-def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> list[Diagnostic]:
+def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> Iterator[Diagnostic]:
     element = ir.element_of(type_)
-    if isinstance(value, tuple):
-        if not value and isinstance(element, ir.Primitive) and element.name not in ("bool", "byte"):
-            return [_breaks_python(span, "an empty default of a numeric sequence")]
-        return _broken_text(value, span)
+    texts = value if isinstance(value, tuple) else (value,)
+    if value == () and isinstance(element, ir.Primitive) and element.name not in ("bool", "byte"):
+        yield _breaks_python(span, "an empty default of a numeric sequence")
+    if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in texts):
+        yield _breaks_python(span, "a line break or NUL in a value")
     if isinstance(value, str):
-        return [*_broken_text((value,), span), *_mangled_text(value, span), *_odd_text(span)]
-    if isinstance(value, float):
-        return _number(value, element, span)
-    return []
-
-
-def _number(value: float, element: ir.Element, span: Span) -> list[Diagnostic]:
-    if not math.isfinite(value):
+        yield from _mangled_text(value, span)
+        yield from _odd_text(span)
+    elif isinstance(value, float) and not math.isfinite(value):
         message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
         hint = "use a large finite number, or set the value in code"
-        return [codes.NON_FINITE_VALUE.at(span, message, hint=hint)]
-    if element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
+        yield codes.NON_FINITE_VALUE.at(span, message, hint=hint)
+    elif (
+        element == ir.Primitive("float32") and isinstance(value, float) and abs(value) > FLOAT32_MAX
+    ):
         message = f"`{span.text}` is beyond what a float32 holds"
-        return [codes.FLOAT32_RANGE.at(span, message, hint="use float64")]
-    return []
+        yield codes.FLOAT32_RANGE.at(span, message, hint="use float64")
 
 
-def _broken_text(values: tuple[ir.Scalar, ...], span: Span) -> list[Diagnostic]:
-    if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in values):
-        return [_breaks_python(span, "a line break or NUL in a value")]
-    return []
-
-
-def _mangled_text(value: str, span: Span) -> list[Diagnostic]:
+def _mangled_text(value: str, span: Span) -> Iterator[Diagnostic]:
     text = span.text
     if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
         text = text[1:-1]
-    if "\\" not in text or value == plain_meaning(text):
-        return []
-    message = f"ROS 2 interprets the backslashes more than once and reads {value!r}"
-    return [codes.MANGLED_TEXT.at(span, message, hint=BACKSLASH_HINT)]
+    if "\\" in text and value != plain_meaning(text):
+        message = f"ROS 2 interprets the backslashes more than once and reads {value!r}"
+        yield codes.MANGLED_TEXT.at(span, message, hint=BACKSLASH_HINT)
 
 
-def _odd_text(span: Span) -> list[Diagnostic]:
-    """Return the problem of quotes or a comment that ROS 2 takes as part of the text."""
+def _odd_text(span: Span) -> Iterator[Diagnostic]:
+    """Yield the problem of quotes or a comment that ROS 2 takes as part of the text."""
     text = span.text
     one_sided = text[:1] in ('"', "'") and (len(text) == 1 or text[-1] != text[0])
     if lower_types.has_comment(text) and (one_sided or lower_types.is_comment(text)):
         message = "what looks like a comment is part of the text"
-        return [codes.ODD_TEXT.at(span, message, hint=lower_types.COMMENT_HINT)]
-    if one_sided and text[0] not in _rest_of_line(span):  # or a `#` is to blame, see IDL109
+        yield codes.ODD_TEXT.at(span, message, hint=lower_types.COMMENT_HINT)
+    elif one_sided and text[0] not in _rest_of_line(span):  # or a `#` is to blame, see IDL109
         message = f"the text is not closed by {text[0]}, which therefore is part of it"
-        return [codes.ODD_TEXT.at(span, message, hint="close the quotes, or leave them out")]
-    return []
+        yield codes.ODD_TEXT.at(span, message, hint="close the quotes, or leave them out")
 
 
 def _rest_of_line(span: Span) -> str:
@@ -102,40 +89,32 @@ _INSTEAD = {
 }
 
 
-def wide_strings(model: Model, report: Report) -> None:
+def wide_strings(model: Model) -> Iterator[Diagnostic]:
     """`wstring` is not used: its encoding differs between middlewares and platforms."""
-    for message in own_sections(model):
-        for field in message.fields:
-            if _is_string(field.type, wide=True) and field.type_span:
-                report.add(
-                    codes.WIDE_STRING.at(
-                        field.type_span,
-                        "middlewares and platforms disagree on how a wstring is sent",
-                        hint="use `string`, which is UTF-8",
-                    )
-                )
+    for field in own_fields(model):
+        element = ir.element_of(field.type)
+        if isinstance(element, ir.String) and element.wide:
+            message = "middlewares and platforms disagree on how a wstring is sent"
+            hint = "use `string`, which is UTF-8"
+            yield codes.WIDE_STRING.at(field.type_span, message, hint=hint)
 
 
-def _is_string(type_: ir.FieldType, *, wide: bool) -> bool:
-    element = ir.element_of(type_)
-    return isinstance(element, ir.String) and element.wide == wide
-
-
-def chars(model: Model, report: Report) -> None:
+def chars(model: Model) -> Iterator[Diagnostic]:
     """`char` is not used: it is a uint8 that looks like a text."""
     for message in own_sections(model):
         spans = [field.type_span for field in message.fields if _is_char(field.type)]
         spans += [
-            _constant_type(constant) for constant in message.constants if _is_char(constant.type)
+            _constant_type(constant.name_span)
+            for constant in message.constants
+            if _is_char(constant.type) and constant.name_span
         ]
-        for span in spans:
-            if span is not None:
-                diagnostic = codes.CHAR_TYPE.at(
-                    span,
-                    "`char` is an unsigned number of one byte in ROS 2, not a character",
-                    hint="write `uint8`; bytes, hash and code stay the same",
-                )
-                report.add(msgspec.structs.replace(diagnostic, edits=(_as_uint8(span),)))
+        for span in filter(None, spans):
+            yield codes.CHAR_TYPE.at(
+                span,
+                "`char` is an unsigned number of one byte in ROS 2, not a character",
+                hint="write `uint8`; bytes, hash and code stay the same",
+                edits=(_as_uint8(span),),
+            )
 
 
 def _as_uint8(span: Span) -> Edit:
@@ -151,91 +130,73 @@ def _is_char(type_: ir.FieldType) -> bool:
     return ir.element_of(type_) == ir.Primitive("char")
 
 
-def _constant_type(constant: ir.Constant) -> Span | None:
+def _constant_type(name: Span) -> Span:
     """Return the range of a constant's type: at the beginning of its line."""
-    span = constant.name_span
-    if span is None:
-        return None
-    line, _ = span.source.position(span.start)
-    start = span.source.line_starts[line - 1]
-    return Span(span.source, start, start + len("char"))
+    line, _ = name.source.position(name.start)
+    start = name.source.line_starts[line - 1]
+    return Span(name.source, start, start + len("char"))
 
 
-def nested_bounds(model: Model, report: Report) -> None:
+def nested_bounds(model: Model) -> Iterator[Diagnostic]:
     """Bounded texts are not elements of arrays: no middleware checks their length there."""
-    for message in own_sections(model):
-        for field in message.fields:
-            element = ir.element_of(field.type)
-            bound = element.bound if isinstance(element, ir.String) else None
-            if bound is not None and element is not field.type and field.type_span:
-                report.add(
-                    codes.UNENFORCED_BOUND.at(
-                        field.type_span,
-                        f"no middleware enforces that each text has at most {bound} characters",
-                        hint="check the length in code; the bound still is part of the type hash",
-                    )
-                )
+    for field in own_fields(model):
+        element = ir.element_of(field.type)
+        bound = element.bound if isinstance(element, ir.String) else None
+        if bound is not None and element is not field.type:
+            yield codes.UNENFORCED_BOUND.at(
+                field.type_span,
+                f"no middleware enforces that each text has at most {bound} characters",
+                hint="check the length in code; the bound still is part of the type hash",
+            )
 
 
-def several_units(model: Model, report: Report) -> None:
+def several_units(model: Model) -> Iterator[Diagnostic]:
     """A comment has one unit: of several pairs of brackets, ROS 2 takes none as the unit."""
-    for message in own_sections(model):
-        for field in message.fields:
-            text = "\n".join(field.comment)
-            contents = [content for _, content in brackets(text)]
-            units = sum(map(is_unit, contents))
-            # a remark such as [0..1] beside the unit leaves it clear to readers
-            unclear = units > 1 or (units and REMARK.search(text))
+    for field in own_fields(model):
+        text = "\n".join(field.comment)
+        contents = [content for _, content in brackets(text)]
+        units = sum(map(is_unit, contents))
+        # a remark such as [0..1] beside the unit leaves it clear to readers
+        unclear = units > 1 or (units and REMARK.search(text))
+        if len(contents) > 1 and unclear and field.unit is None:
             shown = first_few((f"[{unit}]" for unit in contents), SHOWN)
-            if len(contents) > 1 and unclear and field.unit is None and field.name_span:
-                report.add(
-                    codes.SEVERAL_UNITS.at(
-                        field.name_span,
-                        f"`{field.name}` has no unit for ROS 2, because its comment has several "
-                        f"pairs of brackets: {shown}",
-                        hint="write the remark with round ones, as in `ignore(IDL405)`"
-                        if REMARK.search(text)
-                        else "put one unit in brackets, and what else there is in words",
-                    )
-                )
+            yield codes.SEVERAL_UNITS.at(
+                field.name_span,
+                f"`{field.name}` has no unit for ROS 2, because its comment has several "
+                f"pairs of brackets: {shown}",
+                hint="write the remark with round ones, as in `ignore(IDL405)`"
+                if REMARK.search(text)
+                else "put one unit in brackets, and what else there is in words",
+            )
 
 
-def removed_types(model: Model, report: Report) -> None:
+def removed_types(model: Model) -> Iterator[Diagnostic]:
     """Used types exist in all later distributions."""
     for target, span in _used(model):
         since = catalog.removed(target, model.distro)
         if since is not None:
-            report.add(
-                codes.REMOVED_STANDARD_TYPE.at(
-                    span,
-                    f"ROS 2 {since.title} removed `{target}`",
-                    hint=_INSTEAD.get(str(target)) or _INSTEAD.get(target.package),
-                )
-            )
+            message = f"ROS 2 {since.title} removed `{target}`"
+            hint = _INSTEAD.get(str(target)) or _INSTEAD.get(target.package)
+            yield codes.REMOVED_STANDARD_TYPE.at(span, message, hint=hint)
 
 
-def changed_types(model: Model, report: Report) -> None:
+def changed_types(model: Model) -> Iterator[Diagnostic]:
     """Used types have the same fields in all later distributions."""
     for target, span in _used(model):
         other = catalog.changed(target, model.distro)
         if other is not None:
-            report.add(
-                codes.CHANGED_STANDARD_TYPE.at(
-                    span,
-                    f"`{target}` is another message since ROS 2 {other.title}",
-                    hint="nodes of older and newer distributions cannot exchange it; "
-                    f"`idlc breaking --distro {other.name} --against distro:{model.distro.name}` "
-                    "shows what changed",
-                )
+            yield codes.CHANGED_STANDARD_TYPE.at(
+                span,
+                f"`{target}` is another message since ROS 2 {other.title}",
+                hint="nodes of older and newer distributions cannot exchange it; "
+                f"`idlc breaking --distro {other.name} --against distro:{model.distro.name}` "
+                "shows what changed",
             )
 
 
-def _used(model: Model) -> Iterator[tuple[ir.TypeName, Span]]:
+def _used(model: Model) -> Iterator[tuple[ir.TypeName, Span | None]]:
     """Yield the messages of other packages that fields hold, with the range of their names."""
     for message in own_sections(model):
-        for field in message.fields:
-            element, span = ir.element_of(field.type), field.type_span
-            if span is None or not isinstance(element, ir.Ref):
-                continue
-            if element.target.package != model.package:
-                yield element.target, span
+        for field, target in message.holders:
+            if target.package != model.package:
+                yield target, field.type_span

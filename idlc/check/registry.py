@@ -1,22 +1,20 @@
-"""Every rule, with the codes that it reports; rules run only if one of their codes is selected.
-
-Each list is a function, so that a run imports only the rules that it needs.
-"""
+"""Every rule: a function that yields the problems of a model, or of the package around it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
+from typing import TYPE_CHECKING, TypeAlias
 
-from idlc.diagnostics import codes
+from idlc.check import names, portability, style
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.model import ir
+from idlc.model import derive, ir
 from idlc.model.link import Model
 
 if TYPE_CHECKING:
-    from idlc.check.select import Selection
     from idlc.project.package_xml import Facts
 
+Rule: TypeAlias = Callable[[Model], Iterable[Diagnostic]]
 Findings: TypeAlias = dict[ir.TypeName, tuple[Diagnostic, ...]]
 
 
@@ -45,162 +43,85 @@ class IncrementalFindings:
         for name, (_, targets) in graph.items():
             for target in targets:
                 users.setdefault(target, []).append(name)
-        changed: set[ir.TypeName] = set()
-        while waiting:
-            name = waiting.pop()
-            if name not in changed:
-                changed.add(name)
-                waiting += users.get(name, ())
+        changed = derive.closure(waiting, lambda name: users.get(name, ()))
         own = (interface.name for interface in model.own)
         kept = {name: findings[name] for name in own if name in findings and name not in changed}
         self._packages[model.package] = {name: now for name, (now, _) in graph.items()}, kept
         return kept
 
 
-Check: TypeAlias = Callable[[Model, Report], None]
-PackageCheck: TypeAlias = "Callable[[Facts, Model, Report], None]"
-
-
-class Rule(NamedTuple):
-    """A function that checks a model, and the codes that it may report.
-
-    `together`: it needs all interfaces at once, not each with its references.
-    """
-
-    check: Check
-    codes: tuple[codes.Code, ...]
-    together: bool = False
-
-
-class PackageRule(NamedTuple):
-    """A function that checks the package of a model, and the codes that it may report."""
-
-    check: PackageCheck
-    codes: tuple[codes.Code, ...]
-
-
-def verdicts() -> tuple[Rule, ...]:
-    """Return the rules that every command runs, the most helpful messages first."""
-    from idlc.check import names, portability
-    from idlc.check.names import (
-        derived_suffixes,
-        reserved_constant_names,
-        reserved_field_names,
-        reserved_interface_names,
-        reserved_package_name,
-    )
-
-    return (
-        Rule(names.package_name, (codes.INVALID_PACKAGE_NAME,), together=True),
-        Rule(names.interface_names, (codes.INVALID_INTERFACE_NAME,)),
-        Rule(names.unique_fields, (codes.DUPLICATE_FIELD,)),
-        Rule(names.unique_constants, (codes.DUPLICATE_CONSTANT,)),
-        Rule(names.unique_modules, (codes.SAME_PYTHON_MODULE,), together=True),
-        Rule(
-            reserved_field_names,
-            (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C, codes.BREAKS_CPP),
-        ),
-        Rule(reserved_constant_names, (codes.BREAKS_CPP,)),
-        Rule(reserved_interface_names, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C)),
-        Rule(
-            reserved_package_name,
-            (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_CPP),
-            together=True,
-        ),
-        Rule(derived_suffixes, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C)),
-        Rule(
-            portability.constants_and_defaults,
-            (
-                codes.BREAKS_ROSIDL_PYTHON,
-                codes.NON_FINITE_VALUE,
-                codes.FLOAT32_RANGE,
-                codes.MANGLED_TEXT,
-                codes.ODD_TEXT,
-            ),
-        ),
-    )
-
-
-def advice() -> tuple[Rule, ...]:
-    """Return the rules that only `idlc check` runs; all of them warn."""
-    from idlc.check import portability, style
-
-    return (
-        Rule(style.stamped, (codes.STAMPED_WITHOUT_HEADER,)),
-        Rule(style.documented_interfaces, (codes.UNDOCUMENTED_INTERFACE,)),
-        Rule(style.documented_fields, (codes.UNDOCUMENTED_FIELD,)),
-        Rule(style.missing_units, (codes.MISSING_UNIT,)),
-        Rule(style.unusual_units, (codes.UNUSUAL_UNIT,)),
-        Rule(style.constant_prefixes, (codes.CONSTANT_WITHOUT_PREFIX,)),
-        Rule(style.suffixes, (codes.REDUNDANT_SUFFIX,)),
-        Rule(portability.wide_strings, (codes.WIDE_STRING,)),
-        Rule(portability.chars, (codes.CHAR_TYPE,)),
-        Rule(portability.nested_bounds, (codes.UNENFORCED_BOUND,)),
-        Rule(portability.several_units, (codes.SEVERAL_UNITS,)),
-        Rule(portability.removed_types, (codes.REMOVED_STANDARD_TYPE,)),
-        Rule(portability.changed_types, (codes.CHANGED_STANDARD_TYPE,)),
-    )
-
-
-def package_advice() -> tuple[PackageRule, ...]:
-    """Return the rules on the package of the interfaces: the tutorials' troubleshooting."""
-    from idlc.check.package import installation, manifest
-    from idlc.check.package.manifest import listed_dependencies
-
-    return (
-        PackageRule(manifest.declared_dependencies, (codes.MISSING_DEPENDENCY,)),
-        PackageRule(manifest.used_dependencies, (codes.UNUSED_DEPENDENCY,)),
-        PackageRule(manifest.interface_group, (codes.NOT_IN_INTERFACE_GROUP,)),
-        PackageRule(manifest.generators, (codes.NO_INTERFACE_GENERATORS,)),
-        PackageRule(manifest.declared_imports, (codes.UNDECLARED_IMPORT,)),
-        PackageRule(listed_dependencies, (codes.MISSING_CMAKE_DEPENDENCY,)),
-        PackageRule(installation.installed, installation.CODES),
-        PackageRule(installation.resource_marker, (codes.NO_RESOURCE_MARKER,)),
-        PackageRule(installation.entry_points, (codes.BAD_ENTRY_POINT,)),
-        PackageRule(installation.names, (codes.NAME_MISMATCH,)),
-        PackageRule(installation.current_output, (codes.STALE_GENERATED_CODE,)),
-    )
+#: Rules that every command asks, the most helpful messages first; of the whole package, then
+#: of each interface with its references.
+_OF_PACKAGES = (names.package_name, names.unique_modules, names.reserved_package_name)
+_VERDICTS = (
+    names.interface_names,
+    names.unique_names,
+    names.reserved_field_names,
+    names.reserved_constant_names,
+    names.reserved_interface_names,
+    names.derived_suffixes,
+    portability.constants_and_defaults,
+)
+#: Rules that only `idlc check` asks; all of them warn.
+_ADVICE = (
+    style.stamped,
+    style.documented_interfaces,
+    style.documented_fields,
+    style.missing_units,
+    style.unusual_units,
+    style.constant_prefixes,
+    style.suffixes,
+    portability.wide_strings,
+    portability.chars,
+    portability.nested_bounds,
+    portability.several_units,
+    portability.removed_types,
+    portability.changed_types,
+)
 
 
 def check(model: Model, report: Report, incremental: IncrementalFindings | None = None) -> None:
     """Report the problems that every command reports in the model's own interfaces."""
-    _ask(verdicts(), model, report, incremental)
+    for rule in _OF_PACKAGES:
+        report.extend(rule(model))
+    report.extend(_findings(_VERDICTS, model, incremental))
 
 
-def advise(
-    model: Model,
-    report: Report,
-    selection: Selection,
-    incremental: IncrementalFindings | None = None,
-) -> None:
-    """Report the selected warnings about the model's own interfaces."""
-    rules = [rule for rule in advice() if any(map(selection.has, rule.codes))]
-    _ask(rules, model, report, incremental)
+def advise(model: Model, report: Report, incremental: IncrementalFindings | None = None) -> None:
+    """Report all warnings about the model's own interfaces; the caller selects."""
+    report.extend(_findings(_ADVICE, model, incremental))
 
 
-def _ask(
-    rules: Sequence[Rule], model: Model, report: Report, incremental: IncrementalFindings | None
-) -> None:
-    """Run rules; with `incremental`, only on changed interfaces."""
-    for rule in rules:
-        if rule.together or incremental is None:
-            rule.check(model, report)
+def _findings(
+    rules: Sequence[Rule], model: Model, incremental: IncrementalFindings | None
+) -> Iterator[Diagnostic]:
+    """Yield the findings of rules; with `incremental`, only changed interfaces are looked at."""
     if incremental is None:
+        yield from chain.from_iterable(rule(model) for rule in rules)
         return
     findings = incremental.still_valid(model)
     for part in model.per_interface():
         name = part.own[0].name
         if name not in findings:
-            problems = Report()
-            for rule in rules:
-                if not rule.together:
-                    rule.check(part, problems)
-            findings[name] = tuple(problems)
-        report.extend(findings[name])
+            findings[name] = tuple(chain.from_iterable(rule(part) for rule in rules))
+        yield from findings[name]
 
 
-def check_package(facts: Facts, model: Model, report: Report, selection: Selection) -> None:
-    """Report the selected warnings about the package of a model's interfaces."""
-    for rule in package_advice():
-        if any(map(selection.has, rule.codes)):
-            rule.check(facts, model, report)
+def check_package(facts: Facts, model: Model, report: Report) -> None:
+    """Report all warnings about the package of a model's interfaces; the caller selects."""
+    from idlc.check.package import installation, manifest
+
+    rules = (
+        manifest.declared_dependencies,
+        manifest.used_dependencies,
+        manifest.interface_group,
+        manifest.generators,
+        manifest.declared_imports,
+        manifest.listed_dependencies,
+        installation.installed,
+        installation.resource_marker,
+        installation.entry_points,
+        installation.names,
+        installation.current_output,
+    )
+    report.extend(chain.from_iterable(rule(facts, model) for rule in rules))

@@ -120,7 +120,7 @@ def _check_once(options: CheckOptions, report: Report) -> tuple[CheckResult, lis
     models: list[Model] = []
     for distro, checker in checkers(packages, scope).items():
         reports[distro] = Report()
-        models += checker.check(packages, options.selection, reports[distro])
+        models += checker.check(packages, reports[distro])
     files = tuple(file.shown for file in listing.files)
     distros = tuple(reports) if len(reports) > 1 else ()
     checked = CheckResult(files, len(packages), distros=distros)
@@ -163,30 +163,22 @@ class Checker:
         self._advised = _findings() if again else None
         self._facts: dict[str, Facts | None] = {}
 
-    def check(
-        self, packages: Sequence[inputs.Inputs], selection: Selection, report: Report
-    ) -> list[Model]:
-        """Report problems; return the model of each package, limited to the checked files."""
+    def check(self, packages: Sequence[inputs.Inputs], report: Report) -> list[Model]:
+        """Report problems, selected or not; return packages' models, limited to checked files."""
+        from idlc.check.registry import advise, check_package
+
         self.library.report_to(report)
         models = []
         compiler = Compiler(self.library, self._lowered, self._checked)
         for package, model in compiler.all(packages, report):
             models.append(model.only(package.names))
-            self._advise(package, models[-1], selection, report)
+            with stage("advise", package.package):
+                advise(models[-1], report, self._advised)
+            surroundings = self.package_facts(package)
+            if surroundings is not None:
+                with stage("check package", package.package):
+                    check_package(surroundings, models[-1], report)
         return models
-
-    def _advise(
-        self, package: inputs.Inputs, model: Model, selection: Selection, report: Report
-    ) -> None:
-        """Report the rules of `check` alone: on style, portability and the package."""
-        from idlc.check.registry import advise, check_package
-
-        with stage("advise", package.package):
-            advise(model, report, selection, self._advised)
-        surroundings = self.package_facts(package)
-        if surroundings is not None:
-            with stage("check package", package.package):
-                check_package(surroundings, model, report, selection)
 
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""

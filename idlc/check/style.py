@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import islice
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Diagnostic
 from idlc.diagnostics.source import Span
 from idlc.model import derive, ir
 from idlc.model.comments import brackets
-from idlc.model.link import Model, own_sections
+from idlc.model.link import Model, own_fields, own_sections
 
 # the lengths are bounded, or a long comment without an end would take for ever
 REMARK = re.compile(r"idlc:\s{0,20}ignore\[[^\]]{0,200}\]")
@@ -161,20 +161,18 @@ _SUFFIXES = {
 }
 
 
-def stamped(model: Model, report: Report) -> None:
+def stamped(model: Model) -> Iterator[Diagnostic]:
     """A message called …Stamped begins with its stamp: `std_msgs/Header header`, or a time."""
     for interface in model.own:
         if not isinstance(interface, ir.Message) or not interface.name.name.endswith("Stamped"):
             continue
         first = interface.fields[0] if interface.fields else None
         if first is None or not _is_stamp(first, model):
-            report.add(
-                codes.STAMPED_WITHOUT_HEADER.at(
-                    _top(interface, first),
-                    f"`{interface.name.name}` does not begin with a time stamp",
-                    hint="make `std_msgs/Header header` the first field, where tf and message "
-                    "filters look for it, or `builtin_interfaces/Time stamp`",
-                )
+            yield codes.STAMPED_WITHOUT_HEADER.at(
+                (first and first.type_span) or _top(interface),
+                f"`{interface.name.name}` does not begin with a time stamp",
+                hint="make `std_msgs/Header header` the first field, where tf and message "
+                "filters look for it, or `builtin_interfaces/Time stamp`",
             )
 
 
@@ -186,60 +184,44 @@ def _is_stamp(field: ir.Field, model: Model) -> bool:
     return is_header or field.type in (TIME, ir.Unknown())
 
 
-def _top(interface: ir.Interface, first: ir.Field | None = None) -> Span:
-    if first is not None and first.type_span is not None:
-        return first.type_span
-    assert interface.source is not None
-    return Span(interface.source, 0, 0)
+def _top(interface: ir.Interface) -> Span | None:
+    return Span(interface.source, 0, 0) if interface.source else None
 
 
-def documented_interfaces(model: Model, report: Report) -> None:
+def documented_interfaces(model: Model) -> Iterator[Diagnostic]:
     """Every file begins with a comment about its purpose."""
     for interface in model.own:
         if interface.source and not any(part.comment for part in derive.sections(interface)):
             noun = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
-            report.add(
-                codes.UNDOCUMENTED_INTERFACE.at(
-                    _top(interface),
-                    f"nothing says what {noun} `{interface.name.name}` is for",
-                    hint="begin the file with a comment and an empty line",
-                )
+            yield codes.UNDOCUMENTED_INTERFACE.at(
+                _top(interface),
+                f"nothing says what {noun} `{interface.name.name}` is for",
+                hint="begin the file with a comment and an empty line",
             )
 
 
-def documented_fields(model: Model, report: Report) -> None:
+def documented_fields(model: Model) -> Iterator[Diagnostic]:
     """Every field has a comment or a unit."""
-    for message in own_sections(model):
-        for field in message.fields:
-            if not field.comment and not unit_of(field) and field.name_span:
-                report.add(
-                    codes.UNDOCUMENTED_FIELD.at(
-                        field.name_span,
-                        f"nothing says what `{field.name}` means",
-                        hint="write a comment above or beside it",
-                    )
-                )
+    for field in own_fields(model):
+        if not field.comment and not unit_of(field):
+            message = f"nothing says what `{field.name}` means"
+            hint = "write a comment above or beside it"
+            yield codes.UNDOCUMENTED_FIELD.at(field.name_span, message, hint=hint)
 
 
 def _quantities(model: Model) -> Iterable[ir.Field]:
     """Return the fields that hold floating-point numbers."""
     floats = (ir.Primitive("float32"), ir.Primitive("float64"))
-    for message in own_sections(model):
-        yield from (field for field in message.fields if ir.element_of(field.type) in floats)
+    return (field for field in own_fields(model) if ir.element_of(field.type) in floats)
 
 
-def missing_units(model: Model, report: Report) -> None:
+def missing_units(model: Model) -> Iterator[Diagnostic]:
     """A number whose name is a physical quantity has a unit."""
     for field in _quantities(model):
         unit = expects_unit(field.name)
-        if unit and not unit_of(field) and field.name_span and not _names_unit(field.comment, unit):
-            report.add(
-                codes.MISSING_UNIT.at(
-                    field.name_span,
-                    f"`{field.name}` has no unit",
-                    hint=f"write it in brackets, as in `# [{unit}]`",
-                )
-            )
+        if unit and not unit_of(field) and not _names_unit(field.comment, unit):
+            hint = f"write it in brackets, as in `# [{unit}]`"
+            yield codes.MISSING_UNIT.at(field.name_span, f"`{field.name}` has no unit", hint=hint)
 
 
 def _names_unit(comment: Iterable[str], unit: str) -> bool:
@@ -247,22 +229,18 @@ def _names_unit(comment: Iterable[str], unit: str) -> bool:
     return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
 
 
-def unusual_units(model: Model, report: Report) -> None:
+def unusual_units(model: Model) -> Iterator[Diagnostic]:
     """Units follow REP 103: metres, radians, seconds."""
     for field in _quantities(model):
         unit = unit_of(field)
         usual = usual_unit(unit) if unit else None
-        if unit and usual and field.name_span and not is_known_by(field.name, unit):
-            report.add(
-                codes.UNUSUAL_UNIT.at(
-                    field.name_span,
-                    f"`{field.name}` is in [{unit}]",
-                    hint=f"ROS uses [{usual}] (REP 103)",
-                )
-            )
+        if unit and usual and not is_known_by(field.name, unit):
+            message = f"`{field.name}` is in [{unit}]"
+            hint = f"ROS uses [{usual}] (REP 103)"
+            yield codes.UNUSUAL_UNIT.at(field.name_span, message, hint=hint)
 
 
-def constant_prefixes(model: Model, report: Report) -> None:
+def constant_prefixes(model: Model) -> Iterator[Diagnostic]:
     """Constants that are values of one thing share the first word of their names."""
     for message in own_sections(model):
         firsts = Counter(constant.name.partition("_")[0] for constant in message.constants)
@@ -270,29 +248,22 @@ def constant_prefixes(model: Model, report: Report) -> None:
         whole = [constant for constant in message.constants if isinstance(constant.value, int)]
         for constant in whole:
             first = constant.name.partition("_")[0]
-            alone = firsts[first] == 1 and len(whole) > 1 and first not in names
-            if alone and constant.name_span:
-                report.add(
-                    codes.CONSTANT_WITHOUT_PREFIX.at(
-                        constant.name_span,
-                        f"`{constant.name}` does not say what it is a value of",
-                        hint=f"begin it with the name of its field, as in `MODE_{constant.name}`",
-                    )
+            if firsts[first] == 1 and len(whole) > 1 and first not in names:
+                yield codes.CONSTANT_WITHOUT_PREFIX.at(
+                    constant.name_span,
+                    f"`{constant.name}` does not say what it is a value of",
+                    hint=f"begin it with the name of its field, as in `MODE_{constant.name}`",
                 )
 
 
-def suffixes(model: Model, report: Report) -> None:
+def suffixes(model: Model) -> Iterator[Diagnostic]:
     """The name of a file does not repeat its extension."""
     for interface in model.own:
         name, kind = interface.name.name, interface.name.kind
-        suffix = next(
-            (ending for ending in _SUFFIXES[kind] if name.endswith(ending) and name != ending), None
-        )
-        if suffix and interface.source:
-            report.add(
-                codes.REDUNDANT_SUFFIX.of(
-                    interface.source.path,
-                    f"`{name}.{kind}` says twice that it is a .{kind} file",
-                    hint=f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use",
-                )
+        endings = (ending for ending in _SUFFIXES[kind] if name.endswith(ending) and name != ending)
+        if suffix := next(endings, None):
+            yield codes.REDUNDANT_SUFFIX.of(
+                ir.path_of(interface),
+                f"`{name}.{kind}` says twice that it is a .{kind} file",
+                hint=f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use",
             )

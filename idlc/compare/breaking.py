@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,7 +15,6 @@ from idlc.compare.distribution import compare_with_distro, is_distro
 from idlc.compare.packages import (
     Allowance,
     Comparison,
-    added_package,
     against,
     allowances,
     combine,
@@ -23,7 +22,6 @@ from idlc.compare.packages import (
     compare_hashes,
     part_to_raise,
     raised,
-    removed_package,
     without_allowed,
 )
 from idlc.diagnostics import codes
@@ -90,37 +88,64 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         # an empty folder is fine if its interfaces were removed
         report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
         return None
-    if comparison.left_out:  # for which allowances may be
-        changes = not_allowed(comparison.changes, options, report)
-    else:
-        changes = without_allowed(
-            comparison.changes, options.allowed, options.today, options.allowed_in, report
-        )
-    selected = [change for change in changes if change.levels & set(options.levels)]
-    report.extend(change.diagnostic for change in selected)
+    # unused allowances may be for what was left out
+    judged = judge(comparison.changes, options, report, is_all=not comparison.left_out)
     part = None
     if not (comparison.left_out or is_distro(options.against)):
         part = part_to_raise(comparison)
     version = _version(packages, root, report)
     return Verdict(
-        {level: sum(level in change.levels for change in selected) for level in LEVELS},
-        len(comparison.changes) - len(changes),
+        judged.levels,
+        judged.allowed,
         part,
         version,
         raised(version, part) if version and part else None,
         comparison.additions,
         comparison.left_out,
-        len(changes) - len(selected),
+        judged.hidden,
     )
 
 
+class Judged(NamedTuple):
+    """The number of reported changes by broken level, of allowed ones, and of unselected ones."""
+
+    levels: dict[str, int]
+    allowed: int
+    hidden: int
+
+
+def judge(
+    changes: Sequence[Change],
+    options: BreakingOptions,
+    report: Report,
+    *,
+    is_all: bool = False,
+    concerns: Callable[[Change], bool] = lambda _: False,
+) -> Judged:
+    """Report the changes of the selected levels, without levels those of which `concerns` is true.
+
+    `is_all`: no other comparison needs the allowances, so unused ones are reported.
+    """
+    left = not_allowed(changes, options, report, is_all=is_all)
+    levels = set(options.levels)
+    selected = [
+        change for change in left if (change.levels & levels if levels else concerns(change))
+    ]
+    report.extend(change.diagnostic for change in selected)
+    counts: dict[str, int] = {
+        level: sum(level in change.levels for change in selected) for level in LEVELS
+    }
+    return Judged(counts, len(changes) - len(left), len(left) - len(selected))
+
+
 def not_allowed(
-    changes: Sequence[Change], options: BreakingOptions, report: Report
+    changes: Sequence[Change], options: BreakingOptions, report: Report, *, is_all: bool = False
 ) -> tuple[Change, ...]:
-    """Return the changes without an allowance; unused allowances may be for other comparisons."""
+    """Return the changes without an allowance; see `judge`."""
     problems = Report()
     left = without_allowed(changes, options.allowed, options.today, options.allowed_in, problems)
-    report.extend(problem for problem in problems if problem.code != codes.UNUSED_ALLOWANCE.id)
+    unused = codes.UNUSED_ALLOWANCE.id
+    report.extend(problem for problem in problems if is_all or problem.code != unused)
     return left
 
 
@@ -192,12 +217,10 @@ def _compare(
     out = before.broken | after.broken | others | skipped
     old, new = (_without(side.models, out) for side in (before, after))
     with stage("compare", options.against):
-        changes = [
-            compare(model, new[package]) if package in new else removed_package(model)
-            for package, model in old.items()
-        ]
-        come = (model for package, model in new.items() if package not in old)
-        whole = combine([*changes, *map(added_package, come)])
+        whole = combine(
+            compare(*(side.get(package) or Model(package, (), {}) for side in (old, new)))
+            for package in {**old, **new}
+        )
     elsewhere = {*map(str, others), *submodules}
     report.extend(
         _not_compared(names, reason, options, hint)
@@ -424,10 +447,6 @@ class Baseline:
             return False
         self._side = None
         return before is not None
-
-    def repository(self) -> tuple[Path, ...]:
-        """Return the folders in which git stores the commits of names, if there is a repository."""
-        return git.reference_folders(self._folder) if self.name.startswith(GIT) else ()
 
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Return the changes that the settings do not allow."""

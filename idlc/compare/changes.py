@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import msgspec
@@ -63,6 +63,12 @@ class Change(NamedTuple):
             place=self.place,
             levels=tuple(level for level in LEVELS if level in self.levels),
         )
+
+
+def levels_of(changes: Iterable[Change]) -> str:
+    """Return the levels that changes break, such as `wire, hash`; empty for none."""
+    broken = {level for change in changes for level in change.levels}
+    return ", ".join(level for level in LEVELS if level in broken)
 
 
 class Named(Protocol):
@@ -176,45 +182,26 @@ def describe_type(field: ir.Field) -> object:
     return individual(message)["fields"][0]["type"]
 
 
-def without_bounds(type_: ir.FieldType) -> ir.FieldType:
-    """Return a type that is equal for types which differ only in sizes and bounds."""
-    match type_:
-        case ir.String():
-            return ir.String(type_.wide)
-        case ir.Sequence():
-            return ir.Sequence(_element_without_bounds(type_.element))
-        case ir.Array():
-            return ir.Array(_element_without_bounds(type_.element), 1)
-        case _:
-            return type_
-
-
-def _element_without_bounds(element: ir.Element) -> ir.Element:
+def without_bound(element: ir.Element) -> ir.Element:
+    """Return an element that is equal for texts which differ only in their bounds."""
     return ir.String(element.wide) if isinstance(element, ir.String) else element
 
 
-def container(type_: ir.FieldType) -> tuple[str, int | None]:
-    """Return the facts that are part of the type in C++: bounds of arrays, not of strings."""
-    match type_:
-        case ir.Sequence():
-            return "sequence", type_.bound
-        case ir.Array():
-            return "array", type_.size
-        case _:
-            return "", None
+def native(type_: ir.FieldType) -> ir.FieldType:
+    """Return a type that is equal for types that are one type in C++ and in Python.
 
-
-def native(type_: ir.FieldType) -> object:
-    """Return a value that is equal for types that are one type in C++ and in Python."""
-    element = ir.element_of(type_)
+    Bounds of arrays are part of the type in C++, those of strings are not.
+    """
+    element = without_bound(ir.element_of(type_))
     if element == ir.Primitive("char"):
         element = ir.Primitive("uint8")
-    return container(type_), _element_without_bounds(element)
+    if isinstance(type_, (ir.Array, ir.Sequence)):
+        return msgspec.structs.replace(type_, element=element)
+    return element
 
 
-def tighter(old: ir.FieldType, new: ir.FieldType) -> bool:
+def tighter(old: ir.Element, new: ir.Element) -> bool:
     """Return whether text that was allowed is too long now."""
-    before, after = ir.element_of(old), ir.element_of(new)
-    if not isinstance(before, ir.String) or not isinstance(after, ir.String):
+    if not isinstance(old, ir.String) or not isinstance(new, ir.String):
         return False
-    return after.bound is not None and (before.bound is None or after.bound < before.bound)
+    return new.bound is not None and (old.bound is None or new.bound < old.bound)

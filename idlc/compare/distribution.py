@@ -46,7 +46,8 @@ def compare_with_distro(
     if report.had_errors:
         return None
     with stage("compare", against):
-        used = _used(after).union(*(package.names for package in packages if package not in own))
+        standard = (package.names for package in packages if package not in own)
+        used = set[ir.TypeName]().union(*map(_used, after), *standard)
         comparisons = [compare(old, new) for old, new in zip(before, after, strict=True)]
         return combine(
             [
@@ -96,25 +97,15 @@ def _models(packages: Sequence[inputs.Inputs], library: Library, report: Report)
     return models
 
 
-def _used(models: Iterable[Model]) -> set[ir.TypeName]:
-    """Return the standard messages in packages' fields, nested ones included."""
-    used: set[ir.TypeName] = set()
-    for model in models:
-        waiting = list(model.own)
-        while waiting:
-            for target in _targets(waiting.pop()):
-                if target not in used and catalog.is_standard(target.package):
-                    used.add(target)
-                    waiting.append(model.interfaces[target])
-    return used
+def _used(model: Model) -> set[ir.TypeName]:
+    """Return the standard messages in a package's fields, nested ones included."""
 
+    def targets(name: ir.TypeName) -> list[ir.TypeName]:
+        references = derive.references(model.interfaces[name])
+        return [target for target in references if catalog.is_standard(target.package)]
 
-def _targets(interface: ir.Interface) -> Iterator[ir.TypeName]:
-    for part in derive.sections(interface):
-        for field in part.fields:
-            element = ir.element_of(field.type)
-            if isinstance(element, ir.Ref):
-                yield element.target
+    own = {interface.name for interface in model.own}
+    return derive.closure(own, targets) - own
 
 
 def _all(library: Library, other: Distro) -> set[ir.TypeName]:

@@ -10,12 +10,11 @@ from idlc.compare.changes import (
     Change,
     Level,
     Pairing,
-    container,
     describe_type,
     native,
     pair,
     tighter,
-    without_bounds,
+    without_bound,
 )
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Span
@@ -33,14 +32,24 @@ class Sides(NamedTuple):
     before: Model
     after: Model
 
-    def subject(self, name: str) -> str:
-        """Return the name of an element in allow-lists."""
-        return f"{self.new.name}.{name}"
+    def change(
+        self,
+        code: codes.Code,
+        element: ir.Field | ir.Constant,
+        message: str,
+        levels: Iterable[Level],
+        span: Span | None,
+        old: Span | None = None,
+        **facts: str,
+    ) -> Change:
+        """Return the change of an element, which allow-lists call by the name it has there."""
+        subject, path = f"{self.new.name}.{element.name}", ir.path_of(self.new)
+        return Change(code, subject, message, frozenset(levels), span, old, path, **facts)
 
     @property
-    def path(self) -> str:
-        """The file of the new version."""
-        return self.new.source.path if self.new.source else str(self.new.name)
+    def top(self) -> Span | None:
+        """The beginning of the new version, for what it no longer has."""
+        return Span(self.new.source, 0, 0) if self.new.source else None
 
 
 def field_changes(sides: Sides) -> Iterator[Change]:
@@ -69,180 +78,130 @@ def _same_hash(sides: Sides) -> bool:
 
 def _changes(sides: Sides) -> Iterator[Change]:
     pairing = pair(sides.old.fields, sides.new.fields, lambda field: field.type)
-    yield from _all_removed(sides, pairing)
+    yield from _removed(sides, pairing)
     for old, new in pairing.renamed:
-        yield _renamed(sides, old, new)
-    yield from _all_added(sides, pairing)
+        yield sides.change(
+            codes.FIELD_RENAMED,
+            old,
+            f"field `{old.name}` is called `{new.name}` now",
+            ("hash", "source"),
+            new.name_span,
+            old.name_span,
+        )
+    yield from _added(sides, pairing)
     for old, new in pairing.kept:
         if new.name in pairing.moved:
-            yield _moved(sides, old, new)
-    yield from _optional(sides)
-    for old, new in (*pairing.kept, *pairing.renamed):
-        yield from _element_changes(sides, old, new)
-
-
-def _optional(sides: Sides) -> Iterator[Change]:
-    """Yield the change if a structure has `@optional` now, at its first such field."""
+            yield sides.change(
+                codes.FIELD_MOVED,
+                new,
+                f"field `{new.name}` was moved",
+                ("wire", "hash", "source"),
+                new.name_span,
+                old.name_span,
+                hint="put it back; the order of the fields is the order of the bytes",
+            )
+    # the first such field stands for the structure
     first = next((field for field in sides.new.fields if field.optional), None)
     if first is not None and not any(field.optional for field in sides.old.fields):
-        yield Change(
+        yield sides.change(
             codes.OPTIONAL_ADDED,
-            sides.subject(first.name),
+            first,
             f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file",
-            frozenset({"source"}),
-            span=first.name_span,
-            path=sides.path,
+            ("source",),
+            first.name_span,
             hint="leave it out; it has no effect",
         )
-
-
-def _element_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change]:
-    if old.type != new.type:
-        yield _type(sides, old, new)
-    elif isinstance(target := ir.element_of(new.type), ir.Ref):
-        yield from _used_type(sides, old, new, str(target.target))
-    if _default(old) != _default(new):
-        yield _default_changed(sides, old, new)
-    if old.unit and new.unit and old.unit != new.unit:
-        yield _unit(sides, old, new)
+    for old, new in (*pairing.kept, *pairing.renamed):
+        yield from _type_changes(sides, old, new)
+        if _default(old) != _default(new):
+            yield _default_changed(sides, old, new)
+        if old.unit and new.unit and old.unit != new.unit:
+            yield sides.change(
+                codes.UNIT_CHANGED,
+                new,
+                f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now",
+                ("behaviour",),
+                new.name_span,
+                old.name_span,
+                hint="give the field another name, so that nobody uses the old unit by mistake",
+            )
 
 
 def _places(fields: Iterable[ir.Field]) -> dict[str, int]:
     return {field.name: place for place, field in enumerate(fields)}
 
 
-def _all_removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
+def _removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.old.fields)
     last = max((places[old.name] for old, _ in (*pairing.kept, *pairing.renamed)), default=-1)
     kept = [places[old.name] for old, _ in pairing.kept]
-    end = sides.new.fields[-1] if sides.new.fields else None
     for field in pairing.removed:
         place = places[field.name]
-        followed = bisect_right(kept, place)
-        beside = pairing.kept[followed][1] if followed < len(kept) else end
-        yield _removed(sides, field, beside, is_last=last < place)
+        following = bisect_right(kept, place)
+        beside = [new for _, new in pairing.kept[following : following + 1]]
+        spans = [new.type_span for new in (*beside, *sides.new.fields[-1:])]
+        yield sides.change(
+            codes.FIELD_REMOVED,
+            field,
+            f"field `{field.name}` was removed",
+            # no field that stayed comes after it
+            ("hash", "source") if last < place else ("hash", "source", "wire"),
+            (spans[0] if spans else None) or sides.top,
+            field.name_span,
+            hint="keep it and say in its comment that it is no longer used",
+        )
 
 
-def _removed(sides: Sides, field: ir.Field, beside: ir.Field | None, *, is_last: bool) -> Change:
-    """Return the change; `is_last` is whether no field that stayed comes after it."""
-    levels: set[Level] = {"hash", "source"} if is_last else {"hash", "source", "wire"}
-    return Change(
-        codes.FIELD_REMOVED,
-        sides.subject(field.name),
-        f"field `{field.name}` was removed",
-        frozenset(levels),
-        span=_start_of(beside, sides),
-        old=field.name_span,
-        path=sides.path,
-        hint="keep it and say in its comment that it is no longer used",
-    )
-
-
-def _start_of(beside: ir.Field | None, sides: Sides) -> Span | None:
-    """Return a range in the new file for an element that was removed."""
-    if beside is not None and beside.type_span is not None:
-        return beside.type_span
-    return Span(sides.new.source, 0, 0) if sides.new.source else None
-
-
-def _renamed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
-    return Change(
-        codes.FIELD_RENAMED,
-        sides.subject(old.name),
-        f"field `{old.name}` is called `{new.name}` now",
-        frozenset({"hash", "source"}),
-        span=new.name_span,
-        old=old.name_span,
-        path=sides.path,
-    )
-
-
-def _all_added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
+def _added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.new.fields)
     last = max((places[new.name] for _, new in (*pairing.kept, *pairing.renamed)), default=-1)
     for field in pairing.added:
-        yield _added(sides, field, is_last=last < places[field.name])
+        yield sides.change(
+            codes.FIELD_ADDED,
+            field,
+            f"field `{field.name}` was added",
+            # positional arguments and patterns refer to other fields if it is not the last
+            ("wire", "hash") if last < places[field.name] else ("wire", "hash", "source"),
+            field.name_span,
+            hint="add a new message instead, if old and new programs must understand each other",
+        )
 
 
-def _added(sides: Sides, field: ir.Field, *, is_last: bool) -> Change:
-    """Return the change; `is_last` is whether no field that stayed comes after it."""
-    levels: set[Level] = {"wire", "hash"}
-    if not is_last:
-        levels.add("source")  # positional arguments and patterns refer to other fields now
-    return Change(
-        codes.FIELD_ADDED,
-        sides.subject(field.name),
-        f"field `{field.name}` was added",
-        frozenset(levels),
-        span=field.name_span,
-        path=sides.path,
-        hint="add a new message instead, if old and new programs must understand each other",
-    )
-
-
-def _moved(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
-    return Change(
-        codes.FIELD_MOVED,
-        sides.subject(new.name),
-        f"field `{new.name}` was moved",
-        frozenset({"wire", "hash", "source"}),
-        span=new.name_span,
-        old=old.name_span,
-        path=sides.path,
-        hint="put it back; the order of the fields is the order of the bytes",
-    )
-
-
-def _is_last(field: ir.Field, message: ir.Message) -> bool:
-    return field is message.fields[-1]
-
-
-def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
-    package = sides.new.name.package
+def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change]:
+    before, after = ir.element_of(old.type), ir.element_of(new.type)
+    if old.type == new.type and not isinstance(after, ir.Ref):
+        return
     levels: set[Level] = set()
-    at_end = _is_last(new, sides.new)
-    before, after = sides.before.messages, sides.after.messages
-    if not type_reads_alike(old.type, new.type, before, after, at_end=at_end):
+    at_end = new is sides.new.fields[-1]
+    messages = (sides.before.messages, sides.after.messages)
+    if not type_reads_alike(old.type, new.type, *messages, at_end=at_end):
         levels.add("wire")
+    if old.type == new.type and isinstance(after, ir.Ref):
+        target = str(after.target)
+        if sides.before.describer.hash(target) != sides.after.describer.hash(target):
+            levels.add("hash")
+        message = f"`{target}`, the type of field `{new.name}`, changed"
+        if levels:
+            code = codes.USED_TYPE_CHANGED
+            yield sides.change(code, new, message, levels, new.type_span, cause=target)
+        return
     if describe_type(old) != describe_type(new):
         levels.add("hash")
-    only_bounds = without_bounds(old.type) == without_bounds(new.type)
-    if not only_bounds or container(old.type) != container(new.type):
+    if native(old.type) != native(new.type):
         levels.add("source")
-    if tighter(old.type, new.type):
+    if tighter(before, after):
         levels.add("behaviour")
-    if native(old.type) == native(new.type):
-        levels -= {"source"}
-    return Change(
+    only_bounds = type(old.type) is type(new.type) and without_bound(before) == without_bound(after)
+    package = sides.new.name.package
+    yield sides.change(
         codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED,
-        sides.subject(new.name),
+        new,
         f"field `{new.name}` was `{spell(old.type, package)}` "
         f"and is `{spell(new.type, package)}` now",
-        frozenset(levels),
-        span=new.type_span,
-        old=old.type_span,
-        path=sides.path,
+        levels,
+        new.type_span,
+        old.type_span,
     )
-
-
-def _used_type(sides: Sides, old: ir.Field, new: ir.Field, target: str) -> Iterator[Change]:
-    levels: set[Level] = set()
-    if sides.before.describer.hash(target) != sides.after.describer.hash(target):
-        levels.add("hash")
-    before, after = sides.before.messages, sides.after.messages
-    at_end = _is_last(new, sides.new)
-    if not type_reads_alike(old.type, new.type, before, after, at_end=at_end):
-        levels.add("wire")
-    if levels:
-        yield Change(
-            codes.USED_TYPE_CHANGED,
-            sides.subject(new.name),
-            f"`{target}`, the type of field `{new.name}`, changed",
-            frozenset(levels),
-            span=new.type_span,
-            path=sides.path,
-            cause=target,
-        )
 
 
 def _default(field: ir.Field) -> str | None:
@@ -250,115 +209,71 @@ def _default(field: ir.Field) -> str | None:
 
 
 def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
-    levels: set[Level] = {"behaviour"}
+    levels: tuple[Level, ...] = ("behaviour",)
     if old.default is None:
         message = f"field `{new.name}` has a default value now"
     elif new.default is None:
         message = f"field `{new.name}` lost its default value, {spell_value(old.default.value)}"
-        levels.add("source")
+        levels = ("behaviour", "source")
     else:
         message = (
             f"the default of `{new.name}` was {spell_value(old.default.value)} "
             f"and is {spell_value(new.default.value)} now"
         )
-    return Change(
-        codes.FIELD_DEFAULT_CHANGED,
-        sides.subject(new.name),
-        message,
-        frozenset(levels),
-        span=new.default_span or new.name_span,
-        old=old.default_span,
-        path=sides.path,
-    )
-
-
-def _unit(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
-    return Change(
-        codes.UNIT_CHANGED,
-        sides.subject(new.name),
-        f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now",
-        frozenset({"behaviour"}),
-        span=new.name_span,
-        old=old.name_span,
-        path=sides.path,
-        hint="give the field another name, so that nobody uses the old unit by mistake",
-    )
+    span = new.default_span or new.name_span
+    return sides.change(codes.FIELD_DEFAULT_CHANGED, new, message, levels, span, old.default_span)
 
 
 def constant_changes(sides: Sides) -> Iterator[Change]:
     """Yield the changes of the constants; their order has no meaning."""
     pairing = pair(sides.old.constants, sides.new.constants, _content)
     for constant in pairing.removed:
-        yield _removed_constant(sides, constant)
+        yield sides.change(
+            codes.CONSTANT_REMOVED,
+            constant,
+            f"constant `{constant.name}` was removed",
+            ("source",),
+            sides.top,
+            constant.name_span,
+        )
     for old, new in pairing.renamed:
-        yield _renamed_constant(sides, old, new)
+        yield sides.change(
+            codes.CONSTANT_RENAMED,
+            old,
+            f"constant `{old.name}` is called `{new.name}` now",
+            ("source",),
+            new.name_span,
+            old.name_span,
+            hint=f"keep `{old.name}` beside it, with the same value",
+        )
     for old, new in pairing.kept:
-        if _native(old) != _native(new):
-            yield _retyped(sides, old, new)
+        if native(old.type) != native(new.type):
+            yield sides.change(
+                codes.CONSTANT_TYPE_CHANGED,
+                new,
+                f"constant `{new.name}` was `{spell(old.type)}` and is `{spell(new.type)}` now",
+                ("source",),
+                new.name_span,
+                old.name_span,
+            )
         if repr(old.value) != repr(new.value):
-            yield _value(sides, old, new)
+            was, now = spell_value(old.value), spell_value(new.value)
+            yield sides.change(
+                codes.CONSTANT_VALUE_CHANGED,
+                new,
+                f"constant `{new.name}` was {was} and is {now} now",
+                ("behaviour",),
+                new.value_span,
+                old.value_span,
+                hint="both values are in use as long as not everything is rebuilt",
+            )
 
 
 def added(sides: Sides) -> Iterator[str]:
     """Yield the constants that only the new version has."""
     for constant in pair(sides.old.constants, sides.new.constants, _content).added:
-        yield f"constant `{sides.subject(constant.name)}`"
+        yield f"constant `{sides.new.name}.{constant.name}`"
 
 
 def _content(constant: ir.Constant) -> Hashable:
     return constant.type, repr(constant.value)
-
-
-def _native(constant: ir.Constant) -> object:
-    """Return a value that is equal for types that are one type in C++ and in Python."""
-    return ir.Primitive("uint8") if constant.type == ir.Primitive("char") else constant.type
-
-
-def _removed_constant(sides: Sides, constant: ir.Constant) -> Change:
-    return Change(
-        codes.CONSTANT_REMOVED,
-        sides.subject(constant.name),
-        f"constant `{constant.name}` was removed",
-        frozenset({"source"}),
-        span=Span(sides.new.source, 0, 0) if sides.new.source else None,
-        old=constant.name_span,
-        path=sides.path,
-    )
-
-
-def _renamed_constant(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
-    return Change(
-        codes.CONSTANT_RENAMED,
-        sides.subject(old.name),
-        f"constant `{old.name}` is called `{new.name}` now",
-        frozenset({"source"}),
-        span=new.name_span,
-        old=old.name_span,
-        path=sides.path,
-        hint=f"keep `{old.name}` beside it, with the same value",
-    )
-
-
-def _retyped(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
-    return Change(
-        codes.CONSTANT_TYPE_CHANGED,
-        sides.subject(new.name),
-        f"constant `{new.name}` was `{spell(old.type)}` and is `{spell(new.type)}` now",
-        frozenset({"source"}),
-        span=new.name_span,
-        old=old.name_span,
-        path=sides.path,
-    )
-
-
-def _value(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
-    return Change(
-        codes.CONSTANT_VALUE_CHANGED,
-        sides.subject(new.name),
-        f"constant `{new.name}` was {spell_value(old.value)} and is {spell_value(new.value)} now",
-        frozenset({"behaviour"}),
-        span=new.value_span,
-        old=old.value_span,
-        path=sides.path,
-        hint="both values are in use as long as not everything is rebuilt",
-    )

@@ -14,7 +14,7 @@ from idlc.compare.fields import Sides, constant_changes, field_changes
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.text import one_line
-from idlc.model import ir
+from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.wire.compatible import reads_alike
 
@@ -307,11 +307,4 @@ def _with_wire(changes: Sequence[Change], misread: bool) -> Iterator[Change]:
 
 
 def _with_nested(name: ir.TypeName, model: Model) -> set[ir.TypeName]:
-    held: set[ir.TypeName] = set()
-    waiting = [name]
-    while waiting:
-        target = waiting.pop()
-        if target not in held:
-            held.add(target)
-            waiting += model.messages[target].references
-    return held
+    return derive.closure((name,), lambda held: model.messages[held].references)

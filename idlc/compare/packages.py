@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from idlc.compare.changes import LEVELS, Change
+from idlc.compare.changes import LEVELS, Change, Level
 from idlc.compare.fields import Sides, added, constant_changes, field_changes
 from idlc.diagnostics import codes
 from idlc.diagnostics.codes import CODES
@@ -67,35 +67,19 @@ def compare(before: Model, after: Model) -> Comparison:
     appeared = [interface for name, interface in new.items() if name not in old]
     renamed = dict(_renamed(removed, appeared))
     changes = [_removed(interface) for interface in removed if interface.name not in renamed]
-    changes += [
-        renamed_interface(interface, renamed[interface.name])
-        for interface in removed
-        if interface.name in renamed
-    ]
-    renamed_to = {new.name for new in renamed.values()}
+    changes += [renamed_interface(old[name], interface) for name, interface in renamed.items()]
+    renamed_to = {interface.name for interface in renamed.values()}
     additions = [_added(interface) for interface in appeared if interface.name not in renamed_to]
     differs = bool(removed or appeared)
     for name in sorted(old.keys() & new.keys()):
         differs = differs or _differ(old[name], new[name])
-        for sides in _sides(old[name], new[name], before, after):
+        for section, counterpart in zip(
+            derive.sections(old[name]), derive.sections(new[name]), strict=True
+        ):
+            sides = Sides(section, counterpart, before, after)
             changes += [*field_changes(sides), *constant_changes(sides)]
             additions += added(sides)
     return Comparison(tuple(changes), tuple(additions), differs or bool(changes))
-
-
-def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) -> Iterator[Sides]:
-    for section, counterpart in zip(derive.sections(old), derive.sections(new), strict=True):
-        yield Sides(section, counterpart, before, after)
-
-
-def removed_package(before: Model) -> Comparison:
-    """Return the changes of a removed package."""
-    return Comparison(tuple(map(_removed, before.own)), (), bool(before.own))
-
-
-def added_package(after: Model) -> Comparison:
-    """Return the additions of a new package."""
-    return Comparison((), tuple(map(_added, after.own)), bool(after.own))
 
 
 def _differ(old: ir.Interface, new: ir.Interface) -> bool:
@@ -109,27 +93,21 @@ def _differ(old: ir.Interface, new: ir.Interface) -> bool:
 def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
     """Return the changes since type hashes were recorded, the only facts of the old version."""
     changes = []
-    sources = {str(own.name): own.source for own in after.own}
+    paths = {str(own.name): ir.path_of(own) for own in after.own}
     for name in sorted(recorded):
         kind = name.split("/")[1]
         if kind != "msg" and any(own in recorded for own in _shorter(name)):
             continue  # follows from the interface that it is derived from
-        if name not in sources:
-            levels = frozenset(LEVELS[:3])
+        if name not in paths:
+            levels = frozenset[Level](LEVELS[:3])
             message = f"{_noun(kind)} `{name}` was removed"
             changes.append(Change(codes.INTERFACE_REMOVED, name, message, levels, path=name))
         elif recorded[name] != after.describer.hash(name):
-            source = sources[name]
-            changes.append(
-                Change(
-                    codes.HASH_CHANGED,
-                    name,
-                    f"the type hash of `{name}` changed",
-                    frozenset({"hash"}),
-                    path=source.path if source else name,
-                    hint="compare with a folder or a git revision to see what changed it",
-                )
-            )
+            message = f"the type hash of `{name}` changed"
+            hint = "compare with a folder or a git revision to see what changed it"
+            levels = frozenset(("hash",))
+            change = Change(codes.HASH_CHANGED, name, message, levels, path=paths[name], hint=hint)
+            changes.append(change)
     come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)
     return Comparison(tuple(changes), come, bool(changes or come))
 
@@ -143,17 +121,13 @@ def _noun(kind: str) -> str:
     return {"msg": "message", "srv": "service"}.get(kind, kind)
 
 
-def _path(interface: ir.Interface) -> str:
-    return interface.source.path if interface.source else str(interface.name)
-
-
 def _removed(interface: ir.Interface) -> Change:
     return Change(
         codes.INTERFACE_REMOVED,
         str(interface.name),
         f"{_noun(interface.name.kind)} `{interface.name}` was removed",
         frozenset(LEVELS[:3]),
-        path=_path(interface),
+        path=ir.path_of(interface),
         place=interface.source.file if interface.source else "",
     )
 
@@ -169,7 +143,7 @@ def renamed_interface(old: ir.Interface, new: ir.Interface) -> Change:
         str(old.name),
         f"{_noun(old.name.kind)} `{old.name}` is called `{new.name}` now",
         frozenset({"hash", "source"}),
-        path=_path(new),
+        path=ir.path_of(new),
     )
 
 
@@ -261,21 +235,12 @@ def without_allowed(
     for entry in allowances:
         covered = [at for at, change in enumerate(changes) if entry.covers(change)]
         if not covered:
-            report.add(
-                codes.UNUSED_ALLOWANCE.of(
-                    path,
-                    f"no change needs the allowance for `{entry.at}`",
-                    hint="remove the entry",
-                )
-            )
+            message = f"no change needs the allowance for `{entry.at}`"
+            report.add(codes.UNUSED_ALLOWANCE.of(path, message, hint="remove the entry"))
         elif entry.until < today:
-            report.add(
-                codes.EXPIRED_ALLOWANCE.of(
-                    path,
-                    f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})",
-                    hint="take the change back, or decide again and set a new day",
-                )
-            )
+            message = f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})"
+            hint = "take the change back, or decide again and set a new day"
+            report.add(codes.EXPIRED_ALLOWANCE.of(path, message, hint=hint))
         else:
             allowed.update(covered)
     return tuple(change for at, change in enumerate(changes) if at not in allowed)

@@ -6,8 +6,8 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from idlc.check.compiler import stage
-from idlc.compare.breaking import BreakingOptions, error_free_models, not_allowed
-from idlc.compare.changes import LEVELS, Change
+from idlc.compare.breaking import BreakingOptions, error_free_models, judge
+from idlc.compare.changes import Change
 from idlc.compare.packages import compare
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
@@ -69,7 +69,9 @@ def compare_with_recordings(
     if packages and not seen:
         report.notes.append("none of these interfaces was recorded")
     counts = {"interface": len(seen), "recording": len(recordings)}
-    return _verdict(list(changes.values()), options, counts, report)
+    judged = judge([*changes.values()], options, report, concerns=concerns_readers)
+    others, hidden = (0, judged.hidden) if options.levels else (judged.hidden, 0)
+    return RecordedVerdict(judged.levels, judged.allowed, others, counts, hidden)
 
 
 class _LocalVersions:
@@ -122,29 +124,6 @@ class _LocalVersions:
 
 def _names(model: Model) -> set[ir.TypeName]:
     return {interface.name for interface in model.own}
-
-
-def _verdict(
-    changes: Sequence[Change],
-    options: BreakingOptions,
-    seen: dict[str, int],
-    report: Report,
-) -> RecordedVerdict:
-    left = not_allowed(changes, options, report)
-    levels = set(options.levels)
-    selected = [
-        change
-        for change in left
-        if (change.levels & levels if levels else concerns_readers(change))
-    ]
-    report.extend(change.diagnostic for change in selected)
-    return RecordedVerdict(
-        {level: sum(level in change.levels for change in selected) for level in LEVELS},
-        len(changes) - len(left),
-        0 if levels else len(left) - len(selected),
-        seen,
-        len(left) - len(selected) if levels else 0,
-    )
 
 
 def concerns_readers(change: Change) -> bool:

@@ -14,12 +14,12 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import chain
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 
-from idlc.check.compiler import Compiler, models_of, stage
+from idlc.check.compiler import Compiler, stage
 from idlc.compare import graph
-from idlc.compare.breaking import BreakingOptions, not_allowed
-from idlc.compare.changes import LEVELS, Change
+from idlc.compare.breaking import BreakingOptions, error_free_models, judge
+from idlc.compare.changes import Change
 from idlc.compare.graph import (
     Endpoint,
     Entity,
@@ -55,6 +55,9 @@ _PAUSE = 0.1
 _SERVICE = re.compile(r"r([qr])(/.+)(?:Request|Reply)")
 _TYPE = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
 _HASH = re.compile(r"RIHS01_[0-9a-f]{64}")
+_ACTION = "/_action/"
+Roles: TypeAlias = tuple[Role, Role]
+_SERVER: Roles = ("server", "client")
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 
 
@@ -130,35 +133,28 @@ class Graph:
         return endpoints
 
     def _now(self) -> tuple[Endpoint, ...]:
-        return tuple(sorted({*self._topics(), *self._services()}))
-
-    def _topics(self) -> Iterator[Endpoint]:
+        endpoints: set[Endpoint] = set()
+        roles: Roles
         for name, _ in self._node.get_topic_names_and_types():
-            owner, is_action, _ = name.partition("/_action/")
-            entity: Entity = "action" if is_action else "topic"
-            for sends in (True, False):
-                role: Role = "publisher" if sends else "subscription"
-                if is_action:
-                    role = "server" if sends else "client"
-                for node, type_, hash_ in self._ends(name, sends):
-                    yield Endpoint(node, entity, owner, role, sends, type_, hash_)
-
-    def _services(self) -> Iterator[Endpoint]:
-        """Yield the ends of services, which rclpy shows as topics of DDS only."""
+            roles = _SERVER if _ACTION in name else ("publisher", "subscription")
+            endpoints |= {*self._endpoints(name, name, "topic", roles)}
+        # rclpy shows services as topics of DDS only
         for topic, _ in self._node.get_topic_names_and_types(no_demangle=True):
-            match = _SERVICE.fullmatch(topic)
-            if match is None:
-                continue
-            owner, is_action, _ = match[2].partition("/_action/")
-            entity: Entity = "action" if is_action else "service"
-            for sends in (True, False):
-                role: Role = "client" if sends == (match[1] == "q") else "server"
-                for node, type_, hash_ in self._ends(topic, sends, no_mangle=True):
-                    yield Endpoint(node, entity, owner, role, sends, type_, hash_)
+            if match := _SERVICE.fullmatch(topic):
+                roles = ("client", "server") if match[1] == "q" else _SERVER
+                endpoints |= {*self._endpoints(topic, match[2], "service", roles)}
+        return tuple(sorted(endpoints))
 
-    def _ends(
-        self, topic: str, sends: bool, *, no_mangle: bool = False
-    ) -> Iterator[tuple[str, str, str]]:
+    def _endpoints(self, topic: str, name: str, entity: Entity, roles: Roles) -> Iterator[Endpoint]:
+        """Yield the ends of a topic, of which the first of `roles` sends and the other reads."""
+        owner, is_action, _ = name.partition(_ACTION)
+        for role, sends in zip(roles, (True, False), strict=True):
+            for node, type_, hash_ in self._ends(topic, sends, no_mangle=entity == "service"):
+                yield Endpoint(
+                    node, "action" if is_action else entity, owner, role, sends, type_, hash_
+                )
+
+    def _ends(self, topic: str, sends: bool, *, no_mangle: bool) -> Iterator[tuple[str, str, str]]:
         """Yield node, type and hash of each end of a topic, except idlc's own."""
         node = self._node
         look = node.get_publishers_info_by_topic if sends else node.get_subscriptions_info_by_topic
@@ -316,16 +312,10 @@ def compare_with_graph(
     with stage("compare", "graph"):
         problems = _add_described(questions, answers, models)
         changes = [*several_types(endpoints), *_changes(versions, models, problems)]
-    left = not_allowed(changes, options, report)
-    selected = [change for change in left if change.levels & set(options.levels)]
-    report.extend(change.diagnostic for change in selected)
+    judged = judge(changes, options, report)
+    silent = sum(not endpoint.hash for endpoint in endpoints)
     return GraphVerdict(
-        {level: sum(level in change.levels for change in selected) for level in LEVELS},
-        len(changes) - len(left),
-        _counts(endpoints),
-        sum(not endpoint.hash for endpoint in endpoints),
-        endpoints,
-        len(left) - len(selected),
+        judged.levels, judged.allowed, _counts(endpoints), silent, endpoints, judged.hidden
     )
 
 
@@ -353,12 +343,7 @@ def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) 
     if has_paths:
         report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
     packages = inputs.packages(listing.files, options.scope, report)
-    problems = Report()
-    models = [model for _, model in models_of(packages, options.scope, problems)]
-    if not problems.had_errors:
-        problems.extend(chain.from_iterable(map(oversized, models)))
-    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
-    return models
+    return [*error_free_models(packages, options.scope, report).values()]
 
 
 def _local_versions(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import msgspec
 
-from idlc.diagnostics.report import Diagnostic, Label, Severity
+from idlc.diagnostics.report import Diagnostic, Edit, Label, Severity
 from idlc.diagnostics.source import Span
 
 ERROR = Severity.ERROR
@@ -44,9 +44,15 @@ class Code(msgspec.Struct, frozen=True):
         return f"warning, {self.category}{'' if self.default else ', off by default'}"
 
     def at(
-        self, span: Span, message: str, *, hint: str | None = None, labels: tuple[Label, ...] = ()
+        self,
+        span: Span | None,
+        message: str,
+        *,
+        hint: str | None = None,
+        labels: tuple[Label, ...] = (),
+        edits: tuple[Edit, ...] = (),
     ) -> Diagnostic:
-        """Return a problem of this kind at a location in a file."""
+        """Return a problem of this kind at a location in a file; `None`: of what has no text."""
         return Diagnostic(
             code=self.id,
             severity=self.severity,
@@ -54,6 +60,7 @@ class Code(msgspec.Struct, frozen=True):
             span=span,
             hint=hint,
             labels=labels,
+            edits=edits,
         )
 
     def of(

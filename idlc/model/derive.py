@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable, Iterable
+from typing import TypeVar
+
 from idlc.model import ir
+
+Node = TypeVar("Node", bound=Hashable)
 
 SERVICE_EVENT_INFO = ir.TypeName("service_msgs", "msg", "ServiceEventInfo")
 UUID = ir.TypeName("unique_identifier_msgs", "msg", "UUID")
@@ -132,6 +137,18 @@ def sections(interface: ir.Interface) -> tuple[ir.Message, ...]:
             return (interface.request, interface.response)
         case ir.Action():
             return (interface.goal, interface.result, interface.feedback)
+
+
+def closure(names: Iterable[Node], targets: Callable[[Node], Iterable[Node]]) -> set[Node]:
+    """Return names and all that they lead to, in linear time, circles or not."""
+    reached: set[Node] = set()
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in reached:
+            reached.add(name)
+            waiting += targets(name)
+    return reached
 
 
 def references(interface: ir.Interface) -> set[ir.TypeName]:

@@ -222,6 +222,11 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
 Interface: TypeAlias = Message | Service | Action
 
 
+def path_of(interface: Interface) -> str:
+    """Return the path of an interface's text, or its name if there is none."""
+    return interface.source.path if interface.source else str(interface.name)
+
+
 def element_of(type_: FieldType) -> Element:
     """Return the element of an array or sequence, or the type itself."""
     return type_.element if isinstance(type_, (Array, Sequence)) else type_

@@ -529,3 +529,8 @@ def _of_others(target: ir.TypeName) -> str | None:
 def own_sections(model: Model) -> Iterable[ir.Message]:
     """Return every structure of the model's own files."""
     return (part for interface in model.own for part in derive.sections(interface))
+
+
+def own_fields(model: Model) -> Iterable[ir.Field]:
+    """Return every field of the model's own files."""
+    return (field for message in own_sections(model) for field in message.fields)

@@ -14,7 +14,7 @@ from .names import DecodeError, ValidationError, demand_stamp, owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
     from functools import partial
     from typing import Any, TypeAlias
 
@@ -251,15 +251,6 @@ def _indexed(kind: Any, buffer: Any, copy: bool, index: int) -> Any:
 
 
 # constructors
-
-
-def construct(
-    message: Any, options: Mapping[str, Any], arguments: dict[str, Any]
-) -> bool:
-    """Check a constructor's arguments; return whether the message got all its fields."""
-    from .checked import construct
-
-    return construct(message, options, arguments)
 
 
 def call_checked(cls: Any, *values: Any, **named: Any) -> Any:

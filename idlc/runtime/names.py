@@ -168,9 +168,8 @@ class importing:
     ) -> None:
         if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
             return
-        if (
-            error.name == "idlc_runtime"
-        ):  # a package says itself that it lacks its runtime
+        # a package says itself that it lacks its runtime
+        if error.name == "idlc_runtime":
             return
         package = (error.name or "").partition(".")[0] or "another package"
         raise MissingPackageError(

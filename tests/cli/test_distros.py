@@ -12,7 +12,6 @@ import pytest
 import idlc
 from idlc.check.compiler import compile_package, derived_names
 from idlc.check.registry import advise
-from idlc.check.select import Selection
 from idlc.cli import completion
 from idlc.cli.check import command as check
 from idlc.cli.main import main
@@ -534,7 +533,7 @@ def test_advice_looks_at_names_of_the_catalogue_alone():
     name = ir.TypeName("demo", "msg", "A")
     own = lower(parse(Source("A.msg", "Pose2D a\n")), name, report)
     other = lower(parse(Source("Pose2D.msg", "int32 a\n")), name._replace(name="Pose2D"), report)
-    advise(link("demo", [own, other], catalog, report), found, Selection())
+    advise(link("demo", [own, other], catalog, report), found)
     assert list(report) == []
     assert {one.code for one in found} & {"IDL424", "IDL425"} == set()
 

@@ -182,7 +182,7 @@ def told_by_idlc(example: Example) -> tuple[str, ...]:
     asked = {arrow.partition(" ")[0] + " " for arrow in example.arrows} & set(ASKED)
     if asked:
         return tuple(_answer(model, str(name), word) for word in ASKED if word in asked)
-    advise(model, report, Selection())
+    advise(model, report)
     warned = _codes(found.code for found in report if _is_shown(found.code))
     lines = spoken(example, rosidl_view.view(example.case)["parsed"])
     if not example.inline:

@@ -24,12 +24,6 @@ if TYPE_CHECKING:
     from idlc.check.package.setup_py import DataFiles, Setup
 
 _INDEX = "share/ament_index/resource_index"
-#: Problems that keep interfaces and their classes from being installed.
-CODES = (
-    codes.INTERFACES_NOT_INSTALLED,
-    codes.NO_LIBRARY_INSTALLED,
-    codes.CLASSES_NOT_INSTALLED,
-)
 
 
 @lru_cache(maxsize=16)
@@ -78,7 +72,7 @@ def _layout(facts: Facts, setup: Setup) -> Layout | None:
     return layout(setup, facts.setup_cfg, facts.pyproject, facts.folders)
 
 
-def installed(facts: Facts, model: Model, report: Report) -> None:
+def installed(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """setup.py installs interfaces, their classes, and the libraries for C++ tools."""
     setup = _built_by_setup(facts)
     if setup is not None and model.own:
@@ -88,10 +82,9 @@ def installed(facts: Facts, model: Model, report: Report) -> None:
         )
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
-        problems = check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
-        report.extend(problems)
+        yield from check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
     elif setup is not None and (view := _layout(facts, setup)):
-        report.extend(_absent_folders(setup, view, facts.name, (), facts.folders))
+        yield from _absent_folders(setup, view, facts.name, (), facts.folders)
 
 
 def _missing_interfaces(
@@ -287,28 +280,26 @@ def _kinds(keys: Iterable[str]) -> list[str]:
     return sorted({key.split("/")[0] for key in keys})
 
 
-def resource_marker(facts: Facts, _: Model, report: Report) -> None:
+def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """The package's marker, which `ros2 run` needs to find it, exists and is installed."""
     setup = _built_by_setup(facts)
     if setup is None:
         return
     if not facts.marker:
-        report.add(
-            codes.NO_RESOURCE_MARKER.at(
-                facts.place,
-                f"`resource/{facts.name}` is missing, the file by which ROS 2 finds the package",
-                hint=f"create it: `mkdir -p resource && touch resource/{facts.name}`",
-            )
+        yield codes.NO_RESOURCE_MARKER.at(
+            facts.place,
+            f"`resource/{facts.name}` is missing, the file by which ROS 2 finds the package",
+            hint=f"create it: `mkdir -p resource && touch resource/{facts.name}`",
         )
     elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
         problem = codes.NO_RESOURCE_MARKER.at(
             setup.place("data_files"), f"`resource/{facts.name}` is not among the `data_files`"
         )
         line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
-        report.add(_with_data_files(problem, setup, [line]))
+        yield _with_data_files(problem, setup, [line])
 
 
-def entry_points(facts: Facts, _: Model, report: Report) -> None:
+def entry_points(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """Each console script names an existing function."""
     if facts.setup_py is None:
         return
@@ -321,7 +312,7 @@ def entry_points(facts: Facts, _: Model, report: Report) -> None:
         problem = _problem(text, facts, elsewhere=elsewhere)
         if problem:
             place = span_of(facts.setup_py, node)
-            report.add(codes.BAD_ENTRY_POINT.at(place, problem[0], hint=problem[1]))
+            yield codes.BAD_ENTRY_POINT.at(place, problem[0], hint=problem[1])
 
 
 def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | None:
@@ -351,18 +342,14 @@ def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | N
     return None
 
 
-def names(facts: Facts, _: Model, report: Report) -> None:
+def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """setup.py and setup.cfg have the same package name as package.xml."""
     setup = _read(facts.setup_py) if facts.setup_py else None
     name = setup.text(setup.arguments.get("name")) if setup else None
     if setup and name is not None and name.replace("-", "_") != facts.name:
-        report.add(
-            codes.NAME_MISMATCH.at(
-                setup.place("name"),
-                f"setup.py calls the package `{name}`, package.xml `{facts.name}`",
-                hint="give both the same name",
-            )
-        )
+        message = f"setup.py calls the package `{name}`, package.xml `{facts.name}`"
+        hint = "give both the same name"
+        yield codes.NAME_MISMATCH.at(setup.place("name"), message, hint=hint)
     if facts.setup_cfg is None:
         return
     for line, start in zip(facts.setup_cfg.lines, facts.setup_cfg.line_starts, strict=False):
@@ -371,16 +358,14 @@ def names(facts: Facts, _: Model, report: Report) -> None:
         script = key.strip().replace("-", "_") in ("script_dir", "install_scripts")
         if equals and script and "/lib/" in folder and not folder.endswith(f"/lib/{facts.name}"):
             at = start + line.index(folder)
-            report.add(
-                codes.NAME_MISMATCH.at(
-                    Span(facts.setup_cfg, at, at + len(folder)),
-                    f"`ros2 run` looks for scripts in `lib/{facts.name}`",
-                    hint=f"write `$base/lib/{facts.name}`",
-                )
+            yield codes.NAME_MISMATCH.at(
+                Span(facts.setup_cfg, at, at + len(folder)),
+                f"`ros2 run` looks for scripts in `lib/{facts.name}`",
+                hint=f"write `$base/lib/{facts.name}`",
             )
 
 
-def current_output(facts: Facts, _: Model, report: Report) -> None:
+def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """Generated code in the package matches the current interfaces."""
     for output in facts.outputs:
         if output.package != facts.name or not facts.whole:
@@ -393,12 +378,10 @@ def current_output(facts: Facts, _: Model, report: Report) -> None:
         if changed:
             folder = facts.manifest.path.rpartition("/")[0] or "."
             words = ("gen", folder, "-o", output.path.rpartition("/")[0])
-            report.add(
-                codes.STALE_GENERATED_CODE.of(
-                    output.path,
-                    f"the generated code is out of date: {first_few(changed, 3)}",
-                    hint=f"run `idlc {shlex.join(words)}`",
-                )
+            yield codes.STALE_GENERATED_CODE.of(
+                output.path,
+                f"the generated code is out of date: {first_few(changed, 3)}",
+                hint=f"run `idlc {shlex.join(words)}`",
             )
 
 

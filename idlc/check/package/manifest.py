@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-import msgspec
-
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Label, Report
+from idlc.diagnostics.report import Diagnostic, Edit, Label
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
-from idlc.model.link import Model, own_sections
+from idlc.model.link import Model, own_fields, own_sections
 from idlc.project.package_xml import DEPENDENCIES, RANK, Facts
 from idlc.version import RUNTIME
 
@@ -26,17 +24,14 @@ _GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
 _RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
 
 
-def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
+def declared_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """Packages whose messages are used are declared."""
     seen = _may_use(facts)
     for package, span in used_packages(model).items():
         if package not in seen:
-            diagnostic = codes.MISSING_DEPENDENCY.at(
-                span,
-                f"`{facts.manifest.path}` does not declare `{package}`",
-                hint=f"add `<depend>{package}</depend>`",
-            )
-            report.add(_or_misspelt(diagnostic, facts, model, package))
+            message = f"`{facts.manifest.path}` does not declare `{package}`"
+            hint, labels, edits = _declaration_of(package, facts, model)
+            yield codes.MISSING_DEPENDENCY.at(span, message, hint=hint, labels=labels, edits=edits)
 
 
 def used_packages(model: Model) -> dict[str, Span]:
@@ -55,16 +50,18 @@ def _packages_with_interfaces(model: Model) -> set[str]:
     return {name.package for name in model.interfaces} | {*catalog.packages(model.distro)}
 
 
-def _or_misspelt(diagnostic: Diagnostic, facts: Facts, model: Model, package: str) -> Diagnostic:
-    """Return a problem with the edit that declares a package, or with the misspelt declaration."""
+def _declaration_of(
+    package: str, facts: Facts, model: Model
+) -> tuple[str, tuple[Label, ...], tuple[Edit, ...]]:
+    """Return the hint and the edit that declare a package, or the misspelt declaration."""
     existing = _packages_with_interfaces(model) | facts.available
     for name, statement in facts.declared(*_NEEDED).items():
         if name not in existing and closest_package(name, [package]):
             line = f"<{statement.tag}>{package}</{statement.tag}>"
             hint = f"write `{line}` in place of `{name}`, which is not known here"
-            label = Label(statement.span, "misspelt?")
-            return msgspec.structs.replace(diagnostic, hint=hint, labels=(label,))
-    return _with_lines(diagnostic, facts, [f"<depend>{package}</depend>"])
+            return hint, (Label(statement.span, "misspelt?"),), ()
+    line = f"<depend>{package}</depend>"
+    return f"add `{line}`", (), _additions(facts, line)
 
 
 def _may_use(facts: Facts) -> set[str]:
@@ -87,25 +84,20 @@ def declaration(facts: Facts, package: str) -> Span | None:
     return statement.span if statement else None
 
 
-def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
+def used_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """A package of interfaces alone declares no interfaces that it does not use."""
     if facts.modules or facts.native or not facts.whole:
         return
     used = {name.package for name in model.interfaces} | _IMPLICIT
     for package, statement in facts.declared("depend", "build_depend").items():
         if package not in used and catalog.is_standard(package) and not _has_gaps(model):
-            report.add(
-                codes.UNUSED_DEPENDENCY.at(
-                    statement.span,
-                    f"no interface of this package uses `{package}`",
-                    hint="remove the line",
-                )
-            )
+            message = f"no interface of this package uses `{package}`"
+            yield codes.UNUSED_DEPENDENCY.at(statement.span, message, hint="remove the line")
 
 
 def _has_gaps(model: Model) -> bool:
     """Return whether some field has an unknown type, which may be of any package."""
-    elements = [ir.element_of(field.type) for part in own_sections(model) for field in part.fields]
+    elements = [ir.element_of(field.type) for field in own_fields(model)]
     return any(
         element.target not in model.interfaces
         if isinstance(element, ir.Ref)
@@ -114,39 +106,38 @@ def _has_gaps(model: Model) -> bool:
     )
 
 
-def interface_group(facts: Facts, model: Model, report: Report) -> None:
+def interface_group(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """A package whose interfaces CMake generates is a member of the group of such packages."""
-    if not (facts.generates and model.own):
-        return
-    if _GROUP not in facts.declared("member_of_group"):
+    if facts.generates and model.own and _GROUP not in facts.declared("member_of_group"):
         line = f"<member_of_group>{_GROUP}</member_of_group>"
-        diagnostic = codes.NOT_IN_INTERFACE_GROUP.at(
+        yield codes.NOT_IN_INTERFACE_GROUP.at(
             facts.place,
             "CMake stops at a package with interfaces that is in no interface group",
             hint=f"add `{line}`",
+            edits=_additions(facts, line),
         )
-        report.add(_with_lines(diagnostic, facts, [line]))
 
 
-def generators(facts: Facts, model: Model, report: Report) -> None:
+def generators(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """A package whose interfaces CMake generates declares the generators and their runtime."""
     if not (facts.generates and model.own):
         return
-    missing = [
-        (packages[0], f"<{tag}>{packages[0]}</{tag}>")
+    missing = {
+        packages[0]: f"<{tag}>{packages[0]}</{tag}>"
         for packages, tag, others in (
             (_GENERATORS, "buildtool_depend", ("buildtool_depend", "build_depend", "depend")),
             (_RUNTIME, "exec_depend", ("exec_depend", "depend")),
         )
         if facts.declared(*others).keys().isdisjoint(packages)
-    ]
+    }
     if missing:
-        needed = " and ".join(f"`{package}`" for package, _ in missing)
-        lines = " and ".join(f"`{line}`" for _, line in missing)
-        diagnostic = codes.NO_INTERFACE_GENERATORS.at(
-            facts.place, f"a package with interfaces needs {needed}", hint=f"add {lines}"
+        needed = " and ".join(f"`{package}`" for package in missing)
+        yield codes.NO_INTERFACE_GENERATORS.at(
+            facts.place,
+            f"a package with interfaces needs {needed}",
+            hint="add " + " and ".join(f"`{line}`" for line in missing.values()),
+            edits=_additions(facts, *missing.values()),
         )
-        report.add(_with_lines(diagnostic, facts, [line for _, line in missing]))
 
 
 def needs_runtime(facts: Facts) -> bool:
@@ -160,17 +151,15 @@ def names_runtime(texts: Iterable[str]) -> bool:
     return any(map(re.compile(r"\bidlc[-_.]runtime\b", re.IGNORECASE).search, texts))
 
 
-def declared_imports(facts: Facts, model: Model, report: Report) -> None:
+def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """What the nodes and the generated classes import is declared."""
     if needs_runtime(facts):
         place = facts.setup_py or facts.pyproject or facts.manifest
-        report.add(
-            codes.UNDECLARED_IMPORT.at(
-                Span(place, 0, 0),
-                f"the classes import `idlc_runtime`, which `{place.path}` does not require",
-                hint=f"add `{RUNTIME}` to "
-                + ("`install_requires`" if place is facts.setup_py else "`dependencies`"),
-            )
+        setting = "install_requires" if place is facts.setup_py else "dependencies"
+        yield codes.UNDECLARED_IMPORT.at(
+            Span(place, 0, 0),
+            f"the classes import `idlc_runtime`, which `{place.path}` does not require",
+            hint=f"add `{RUNTIME}` to `{setting}`",
         )
     if not facts.modules:
         return
@@ -185,18 +174,17 @@ def declared_imports(facts: Facts, model: Model, report: Report) -> None:
                 declared.add(package)
                 tag = "depend" if package in used else "exec_depend"
                 line = f"<{tag}>{package}</{tag}>"
-                diagnostic = codes.UNDECLARED_IMPORT.at(
+                yield codes.UNDECLARED_IMPORT.at(
                     span_of(source, node),
                     f"`{facts.manifest.path}` does not declare `{package}`",
                     hint=f"add `{line}`",
+                    edits=_additions(facts, line),
                 )
-                report.add(_with_lines(diagnostic, facts, [line]))
 
 
-def _with_lines(diagnostic: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
-    """Return a problem with the edits that add lines to package.xml, each after similar ones."""
-    edits = tuple(edit for line in lines if (edit := _addition(facts, line)))
-    return msgspec.structs.replace(diagnostic, edits=edits)
+def _additions(facts: Facts, *lines: str) -> tuple[Edit, ...]:
+    """Return the edits that add lines to package.xml, each after similar ones."""
+    return tuple(edit for line in lines if (edit := _addition(facts, line)))
 
 
 def _addition(facts: Facts, line: str) -> Edit | None:
@@ -252,7 +240,7 @@ def calls(source: Source) -> Iterator[Call]:
         yield Call(command[1].lower(), words, tuple(places), Span(source, *command.span()))
 
 
-def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
+def listed_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """CMakeLists.txt names each package whose messages are used; without it, rosidl stops."""
     if facts.cmake is None or not (facts.generates and model.own):
         return
@@ -280,18 +268,18 @@ def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
     if any("$" in word for word in seen) or len(seen) < len(words) - len(named):
         return
     target = lists[named[0]] if named else call._replace(places=call.places[:end])
+    where = f"to `set({named[0]} ...)`" if named else "to its `DEPENDENCIES`"
     for package, span in used_packages(model).items():
         if package not in seen and package != facts.name:
-            problem = codes.MISSING_CMAKE_DEPENDENCY.at(
+            yield codes.MISSING_CMAKE_DEPENDENCY.at(
                 span,
                 f"`{facts.cmake.path}` does not give `{package}` to `{GENERATE}`",
-                hint=f"add `{package}` {_where(named)}, and `find_package({package} REQUIRED)`",
+                hint=f"add `{package}` {where}, and `find_package({package} REQUIRED)`",
+                edits=(
+                    dependency_edit(target, package, listed=bool(words)),
+                    *_find_package_edits(commands, package),
+                ),
             )
-            edits = (
-                dependency_edit(target, package, listed=bool(words)),
-                *_find_package_edits(commands, package),
-            )
-            report.add(msgspec.structs.replace(problem, edits=edits))
 
 
 def _dependencies(call: Call) -> tuple[int, int]:
@@ -299,10 +287,6 @@ def _dependencies(call: Call) -> tuple[int, int]:
     count = len(call.words)
     first = call.words.index(_KEYWORD) + 1 if _KEYWORD in call.words else count
     return first, next((at for at in range(first, count) if call.words[at] in _OPTIONS), count)
-
-
-def _where(named: list[str]) -> str:
-    return f"to `set({named[0]} ...)`" if named else "to its `DEPENDENCIES`"
 
 
 def dependency_edit(target: Call, package: str, *, listed: bool) -> Edit:

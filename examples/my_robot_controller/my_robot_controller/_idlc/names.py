@@ -55,7 +55,7 @@ def stamp(fields: Mapping[str, str]) -> int:
 
 def demand_stamp(kind: Any, number: int | None) -> None:
     """Raise ImportError unless a class has the fields that another module was made for."""
-    if number not in (None, stamp(kind._fields_and_field_types)):
+    if number is not None and number != stamp(kind._fields_and_field_types):
         package = kind.__module__.rpartition(".")[0]
         raise ImportError(
             f"{package} has files of two versions of {kind.__name__}, perhaps because `idlc gen` "
@@ -168,9 +168,8 @@ class importing:
     ) -> None:
         if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
             return
-        if (
-            error.name == "idlc_runtime"
-        ):  # a package says itself that it lacks its runtime
+        # a package says itself that it lacks its runtime
+        if error.name == "idlc_runtime":
             return
         package = (error.name or "").partition(".")[0] or "another package"
         raise MissingPackageError(
