@@ -31,7 +31,6 @@ from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
-    from idlc.check.select import Selection
     from idlc.compare.breaking import Baseline, Side
     from idlc.diagnostics.report import Diagnostic
     from idlc.diagnostics.source import Source
@@ -81,7 +80,6 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
     problems: tuple[Diagnostic, ...]
     models: Mapping[str, Model]
     library: Library
-    selection: Selection
 
     @cached_property
     def interfaces(self) -> Mapping[Path, tuple[ir.Interface, Source]]:
@@ -332,7 +330,6 @@ class Workspace:
             (*self._fixed, *problems),
             {model.package: model for model in models[first]},
             self._checkers[first].library,
-            self._selection,
         )
 
 
