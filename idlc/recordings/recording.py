@@ -229,7 +229,7 @@ class Selection:
             for name, values in times
             if values is not None
         }
-        return type(table)({**columns, **{name: table[name] for name in table.keys()}}, len(table))  # noqa: SIM118
+        return type(table)({**columns, **dict(table)}, len(table))
 
     def to_arrow(self, kind: Any = None, **options: Any) -> pa.Table:
         """Return a table of Arrow: log_time, publish_time and the fields of the messages.

@@ -76,19 +76,19 @@ def attempt(number, name, data):
 
 
 class Kinds:
-    """What of the mutated files can be decoded by classes that were compiled once."""
+    """What of the mutated files can be decoded by types that were compiled once."""
 
     def __init__(self, folder):
         path = made.by_mcap(folder / "sound.mcap", SMALL, "")
         with idlc.Recording(path) as recording:
-            self.known = {one.topic.schema: one.kind for one in recording.values()}
+            self.known = {one.topic.schema: one._type for one in recording.values()}
 
     def decode(self, recording):
         """Read messages as objects and as columns, which agree."""
         for name in recording:
             topic = recording[name]
             if topic.topic.encoding == "cdr" and topic.topic.schema in self.known:
-                topic.kind = self.known[topic.topic.schema]
+                topic._type = self.known[topic.topic.schema]
                 count = sum(1 for _ in topic)
                 assert len(topic.to_columns()) == topic.to_arrow().num_rows == count
 

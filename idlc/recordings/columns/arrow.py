@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Strings, Struct
+from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Strings, Struct, flat_nodes
 from idlc.recordings.columns.read import table_of, type_of
 from idlc.recordings.columns.table import columns_of
+from idlc.recordings.columns.values import Columns
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
 #: Between a definition and those that it refers to.
@@ -35,10 +36,10 @@ def to_arrow(
             name="pyarrow",
         ) from error
     table, top = table_of(kind, messages, fields, datetimes)
-    columns = columns_of(table, top)
-    rows = _Arrays(pyarrow, dictionary).struct(top.level.node, columns)
-    while flat and any(pyarrow.types.is_struct(field.type) for field in rows.type):
-        rows = _flattened(pyarrow, rows)
+    node, columns = top.level.node, columns_of(table, top)
+    if flat:
+        node, columns = Struct(flat_nodes(node)), Columns(columns.flat(), len(columns))
+    rows = _Arrays(pyarrow, dictionary).struct(node, columns)
     batch = pyarrow.RecordBatch.from_struct_array(rows)
     metadata = described(type_of(kind))
     return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
@@ -51,24 +52,6 @@ def described(structure: Structure) -> dict[str, str]:
         "ros2.hash": structure.hash,
         "ros2.definition": definition_of(structure),
     }
-
-
-def _flattened(pa: Any, struct: Any) -> Any:
-    arrays, names = [], []
-    for index, field in enumerate(struct.type):
-        array = struct.field(index)
-        if pa.types.is_struct(field.type):
-            arrays += [array.field(at) for at in range(field.type.num_fields)]
-            names += [f"{field.name}.{inner.name}" for inner in field.type]
-        else:
-            arrays.append(array)
-            names.append(field.name)
-    return _struct(pa, names, arrays, len(struct))
-
-
-def _struct(pa: Any, names: list[str], arrays: list[Any], count: int) -> Any:
-    fields = [pa.field(name, array.type) for name, array in zip(names, arrays, strict=True)]
-    return pa.Array.from_buffers(pa.struct(fields), count, [None], children=arrays)
 
 
 class _Arrays:
@@ -116,8 +99,11 @@ class _Arrays:
     def struct(self, node: Node, column: Any) -> Any:
         """Return the array of Columns."""
         assert isinstance(node, Struct)
+        pa = self.pa
         arrays = [self.array(inner, column[name]) for name, inner in node.fields.items()]
-        return _struct(self.pa, list(node.fields), arrays, len(column))
+        pairs = zip(node.fields, arrays, strict=True)
+        type_ = pa.struct([pa.field(name, array.type) for name, array in pairs])
+        return pa.Array.from_buffers(type_, len(column), [None], children=arrays)
 
     def lists(self, node: Lists, column: Any) -> Any:
         """Return the array of sequences, or of arrays of what are no numbers."""

@@ -144,6 +144,16 @@ class Lists(NamedTuple):
 Node = Numbers | Strings | Struct | Instant | Lists
 
 
+def flat_nodes(node: Node, name: str = "") -> dict[str, Node]:
+    """Return all nodes that are no Struct, by names such as "header.stamp.sec"."""
+    if not isinstance(node, Struct):
+        return {name: node}
+    result: dict[str, Node] = {}
+    for field, inner in node.fields.items():
+        result |= flat_nodes(inner, f"{name}.{field}" if name else field)
+    return result
+
+
 # the plan of a type
 
 #: Sizes beyond it are beyond any buffer, and beyond what numpy calculates with.
