@@ -133,15 +133,11 @@ def complete(state: ServerState, params: PositionParams) -> dict[str, object]:
     line, at = in_lines(lines, params.position, state.encoding)
     typed = TypedLine(state, document, path, workspace, lines, line, lines[line][:at], {})
     items = list(_items(typed))
-    fitting = [item for item in items if _fits(item, typed)]
+    # not all editors filter; all items replace the same word
+    start = items[0].text_edit.range.start.character if items else 0
+    word = typed.before[characters(typed.before, start, state.encoding) :]
+    fitting = [item for item in items if has_letters(item.filter_text or item.label, word)]
     return {"isIncomplete": len(items) >= MOST, "items": fitting}
-
-
-def _fits(item: Item, typed: TypedLine) -> bool:
-    """Return whether an item has the letters that it replaces: not all editors filter."""
-    start = item.text_edit.range.start.character
-    word = typed.before[characters(typed.before, start, typed.state.encoding) :]
-    return has_letters(item.filter_text or item.label, word)
 
 
 def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
