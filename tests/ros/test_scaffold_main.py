@@ -109,7 +109,8 @@ def test_a_signal_while_it_starts_ends_it(moment, package, tmp_path, ros_environ
             node.says("it runs")
             time.sleep(moment)
             node.process.send_signal(how)
-            assert node.ends() == 0, node.output
+            status = node.ends()
+            assert status == 0, (how, status, node.output)
             assert "Traceback" not in node.output
 
 
