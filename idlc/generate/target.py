@@ -223,34 +223,6 @@ _MAKERS = (
     _PACKAGE / "templates",
     _PACKAGE.parent / "templates",
 )
-#: The support code by digest: packages have the same, and comparing is faster than hashing.
-_support: dict[str, bytes] = {}
-_MOST = 128
-
-
-def unchanged(
-    out: Path,
-    lock: Lock | None,
-    package: str,
-    inputs: Mapping[str, str],
-    library: Library,
-    vendoring: Vendoring = "",
-) -> bool:
-    """Return whether a run would leave the package in `out` unchanged.
-
-    `inputs` are the digests of the input files by name within the package.
-    """
-    return (
-        lock is not None
-        and (lock.idlc, lock.package) == (__version__, package)
-        and lock.vendors_as(vendoring)
-        and bool(lock.converts_values) == library.distro.converts_values
-        and lock.inputs == inputs
-        and _outputs_stand(out, lock)
-        and _carries_this_runtime(lock)
-        and not _idlc_is_newer(out / FILE)
-        and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
-    )
 
 
 def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:
@@ -271,19 +243,8 @@ def _outputs_stand(out: Path, lock: Lock) -> bool:
     tree = Tree(out)
     for path, expected in lock.outputs.items():
         content = tree.read(path)
-        if content is None or isinstance(content, Obstacle) or not _has(content, expected, path):
+        if content is None or isinstance(content, Obstacle) or digest(content) != expected:
             return False
-    return True
-
-
-def _has(content: bytes, expected: str, path: str) -> bool:
-    """Return whether a file's content has a digest."""
-    if _support.get(expected) == content:
-        return True
-    if digest(content) != expected:
-        return False
-    if _COPY in path and len(_support) < _MOST:
-        _support[expected] = content
     return True
 
 
@@ -403,9 +364,22 @@ class Target:
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
-        """Return whether compiling the inputs would change nothing."""
-        is_unchanged = (self.lock is None or self.lock.runtime == self.runtime) and unchanged(
-            self.path, self.lock, self.package, inputs, library, vendoring
+        """Return whether compiling the inputs would change nothing.
+
+        `inputs` are the digests of the input files by name within the package.
+        """
+        lock = self.lock
+        is_unchanged = (
+            lock is not None
+            and (lock.idlc, lock.package) == (__version__, self.package)
+            and lock.runtime == self.runtime
+            and lock.vendors_as(vendoring)
+            and bool(lock.converts_values) == library.distro.converts_values
+            and lock.inputs == inputs
+            and _outputs_stand(self.path, lock)
+            and _carries_this_runtime(lock)
+            and not _idlc_is_newer(self.path / FILE)
+            and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
         )
         if is_unchanged:
             write.sweep(self.path)

@@ -55,29 +55,19 @@ def leaves(type_: ir.FieldType, path: str, messages: Messages) -> Iterator[Leaf]
         case ir.Ref():
             yield from structure(messages[type_.target], path, messages)
         case ir.Array():
-            if type_.size * _count(type_.element, messages) <= EXPANDED:
+            element = tuple(leaves(type_.element, "", messages))
+            if type_.size * len(element) <= EXPANDED:
                 for index in range(type_.size):
-                    yield from leaves(type_.element, f"{path}[{index}]", messages)
+                    for leaf in element:
+                        yield leaf._replace(path=f"{path}[{index}]{leaf.path}")
             else:
-                first = next(leaves(type_.element, "", messages))
-                yield Leaf(path, type_, first.align, None)
+                yield Leaf(path, type_, element[0].align, None)
         case ir.Primitive():
             yield Leaf(path, type_, type_.info.size, type_.info.size)
         case ir.String() | ir.Sequence():
             yield Leaf(path, type_, 4, None)
         case ir.Unknown():
             raise ValueError("an unknown type has no bytes")
-
-
-def _count(type_: ir.FieldType, messages: Messages) -> int:
-    match type_:
-        case ir.Array():
-            return type_.size * _count(type_.element, messages)
-        case ir.Ref():
-            fields = messages[type_.target].wire_fields
-            return sum(_count(field.type, messages) for field in fields)
-        case _:
-            return 1
 
 
 _OCTET = frozenset({"byte", "char", "uint8"})
