@@ -270,29 +270,11 @@ def _runtime() -> dict[str, str]:
     }
 
 
-def _idlc_is_newer(path: Path) -> bool:
-    """Return whether idlc was changed after a lock was written: by a developer, or installed."""
-    return _newest_maker() > path.stat().st_mtime_ns
-
-
 @lru_cache(maxsize=1)
 def _newest_maker() -> int:
-    return last_change(_MAKERS)
-
-
-def last_change(folders: Iterable[Path]) -> int:
-    """Return the time of the last change of a file in these folders or below."""
-    return max(map(_newest, filter(is_folder, folders)))
-
-
-def _newest(folder: str | Path) -> int:
-    newest = 0
-    for entry in os.scandir(folder):
-        if entry.is_file():
-            newest = max(newest, entry.stat().st_mtime_ns)
-        elif not entry.name.startswith((".", "__")):  # caches
-            newest = max(newest, _newest(entry.path))
-    return newest
+    """Return the time at which idlc was last changed: by a developer, or installed."""
+    files = (path for folder in _MAKERS for path in folder.rglob("*.*") if path.suffix != ".pyc")
+    return max(path.stat().st_mtime_ns for path in files)
 
 
 class Target:
@@ -378,7 +360,7 @@ class Target:
             and lock.inputs == inputs
             and _outputs_stand(self.path, lock)
             and _carries_this_runtime(lock)
-            and not _idlc_is_newer(self.path / FILE)
+            and _newest_maker() <= (self.path / FILE).stat().st_mtime_ns
             and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
         )
         if is_unchanged:

@@ -10,12 +10,11 @@ and texts and sequences make distances variable, so every position modulo eight 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from idlc.model import ir
-
-Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
+from idlc.wire.layout import Messages
 
 #: Arrays of more leaves than these stay one leaf.
 EXPANDED = 64

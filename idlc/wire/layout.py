@@ -59,6 +59,7 @@ def multiple_of(align: int) -> Alignment:
     return Alignment(align, 4 % align)
 
 
+#: All structures by name.
 Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 #: The widest alignment in CDR.
 _WIDEST = 8

@@ -54,10 +54,8 @@ def slice_of(start: str, end: str = "end") -> str:
 def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
     """Return whether a structure holds numeric buffers, which are read through a memoryview."""
     return any(
-        isinstance(step, plan.Numbers)
-        or (isinstance(step, plan.Block) and step.is_large)
-        or (isinstance(step, plan.Items) and is_bulk(step.body))
-        for step in steps
+        isinstance(step, plan.Numbers) or (isinstance(step, plan.Block) and step.is_large)
+        for step in plan.walk(steps)
     )
 
 

@@ -21,6 +21,7 @@ from idlc.generate.python.lines import (
     Put,
     Statement,
     call,
+    flat,
 )
 from idlc.generate.python.positions import Builder, Cursor, Run, Tables
 from idlc.wire import plan
@@ -321,9 +322,9 @@ class _Encoder(Builder):
         lines = [Line(place.text, place.local) for place in places]
         lines.append(Line(Group("", tuple(parts)), rows, "+="))
         loop = f"for {step.item} in {local}"
-        values = Group("", tuple(place.text for place in places)).flat()
+        values = flat(Group("", tuple(place.text for place in places)))
         texts = Comprehension("each", ((step.item, local), ("each", values)))
-        unsized = call(self.tables.function("unsized", "unsized"), texts.flat())
+        unsized = call(self.tables.function("unsized", "unsized"), flat(texts))
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
         attempt = Block("try:", (Block(f"{loop}:", tuple(lines)),))
