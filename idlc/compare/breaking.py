@@ -25,7 +25,7 @@ from idlc.compare.packages import (
     without_allowed,
 )
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
+from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
@@ -205,7 +205,7 @@ def _compare(
     before = _before(options, packages, revision, report)
     problems = Report()
     after = _side(packages, {}, options.scope, problems)
-    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
+    report.extend(problems.errors)
     if before is None or any(problem.code in codes.USAGE for problem in report):
         return None
     earlier_names = {
@@ -325,7 +325,7 @@ def _side(
     names = {*compiled, *every.values()}
     sound = {own.name for model in models for own in model.own}
     error = ""
-    if first := next((problem for problem in report if problem.severity is codes.ERROR), None):
+    if first := next(iter(report.errors), None):
         line = first.span.source.position(first.span.start)[0] if first.span else 1
         error = f"the first error is {first.code} at {first.where[0]}:{line}: {first.message}"
     return Side({model.package: model for model in models}, frozenset(names - sound), error)
@@ -358,7 +358,7 @@ def error_free_models(
         extents: ContentSizes = {}
         for model in models.values():
             problems.extend(oversized(model, extents))
-    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
+    report.extend(problems.errors)
     return models
 
 
@@ -426,9 +426,7 @@ class Baseline:
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = msgspec.structs.replace(self._options, paths=paths, scope=scope)
             side = read_baseline(options, tuple(packages), report) if paths and self.name else None
-            why = next(
-                (problem.message for problem in report if problem.severity is Severity.ERROR), ""
-            )
+            why = next((problem.message for problem in report.errors), "")
             self._side = side or Side({}, frozenset(), why)
         return self._side
 

@@ -93,11 +93,7 @@ def reads_alike(old: ir.Message, new: ir.Message, before: Messages, after: Messa
     place; missing fields at the end do no harm, additional ones do.
     """
     runs = _Runs(tuple(structure(old, "", before)), tuple(structure(new, "", after)))
-    try:
-        _Follower(before, after).follow(runs, {_Offset(0)}, at_end=True)
-    except _MisreadError:
-        return False
-    return True
+    return bool(_Follower(before, after).ends(runs, {_Offset(0)}, at_end=True))
 
 
 def type_reads_alike(
@@ -105,12 +101,8 @@ def type_reads_alike(
 ) -> bool:
     """Return whether a field of one type, the last one or not, is read as it was by another."""
     runs = _Runs(tuple(leaves(old, "", before)), tuple(leaves(new, "", after)))
-    starts = {_Offset(at) for at in range(8)}
-    try:
-        ends = _Follower(before, after).follow(runs, starts, at_end=at_end)
-    except _MisreadError:
-        return False
-    return at_end or all(not end.lead for end in ends)
+    ends = _Follower(before, after).ends(runs, {_Offset(at) for at in range(8)}, at_end=at_end)
+    return bool(ends) and (at_end or all(not end.lead for end in ends))
 
 
 class _Runs:
@@ -133,6 +125,13 @@ class _Follower:
         self._before = before
         self._after = after
         self._ends: dict[Hashable, set[_Offset]] = {}
+
+    def ends(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
+        """Return the offsets after two runs; none if a value is misread."""
+        try:
+            return self.follow(runs, starts, at_end=at_end)
+        except _MisreadError:
+            return set()
 
     def follow(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
         """Return the offsets after two runs; raise _MisreadError if a value is misread.

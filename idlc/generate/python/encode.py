@@ -23,7 +23,7 @@ from idlc.generate.python.lines import (
     call,
     flat,
 )
-from idlc.generate.python.positions import Builder, Cursor, Run, Tables
+from idlc.generate.python.positions import Builder, Cursor, Tables, ValueRun
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
@@ -122,7 +122,7 @@ class _Encoder(Builder):
         self.widest = widest
         #: Conditions that hold if another thread changed the length of an uncopied array.
         self.again: list[str] = []
-        self.run, self.start, self.text_size = Run(), alignment, ""
+        self.run, self.start, self.text_size = ValueRun(), alignment, ""
 
     def step(self, step: plan.Step) -> None:
         """Emit one step."""
@@ -206,7 +206,7 @@ class _Encoder(Builder):
             writer = self.tables.struct("write", run.path, run.fields, residue, "pack", align)
             self.body.append(Put(Group(f"{writer}{key}", tuple(run.values)), not known))
             self.position = self.position.aligned(align)
-            self.run = Run()
+            self.run = ValueRun()
 
     def note_position(self) -> None:
         """Note the position in `at`, unless all that matters of it is known."""
