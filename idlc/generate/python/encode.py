@@ -9,6 +9,8 @@ statement reads it.
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 from msgspec.structs import replace
 
 from idlc.generate.python.lines import (
@@ -30,9 +32,11 @@ from idlc.wire.layout import Alignment, multiple_of
 
 def encode(steps: tuple[plan.Step, ...], tables: Tables) -> tuple[Statement, ...]:
     """Return the statements that write a message; what they use is defined in `tables`."""
-    encoder = _Encoder(tables, Alignment(), plan.widest(steps))
+    encoder = _Encoder(tables, Alignment(), 8)
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"), "head")
+    widths = [*accumulate((plan.widest((step,)) for step in reversed(steps)), max)]
     for step in steps:
+        encoder.widest = widths.pop()
         encoder.step(step)
     encoder.flush(1)
     return _joined(_pruned(tuple(encoder.body), live=False)[0], tuple(encoder.again))
@@ -114,7 +118,7 @@ _BEGUN = Line("parts.append", "put")
 class _Encoder(Builder):
     """Emits statements that write; `run` is not yet emitted, `position` is after it.
 
-    Positions matter modulo `widest` only.
+    Positions matter modulo `widest` only, the widest alignment of this step and those after it.
     """
 
     def __init__(self, tables: Tables, alignment: Alignment, widest: int) -> None:
