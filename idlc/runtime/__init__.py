@@ -28,12 +28,14 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack as Unpack
 
     from . import arrays as arrays
+    from .checked import construct as construct
     from .conversions import *
     from .protocol import *
     from .typeinfo import *
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     _LAZY = {**dict.fromkeys(_HINTS.split(), "conversions"), "type_hash": "typeinfo"}
+    _LAZY["construct"] = "checked"
     _lazy, __dir__ = lazily(__name__, _LAZY)
 
     def __getattr__(name):

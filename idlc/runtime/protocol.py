@@ -60,22 +60,15 @@ else:
 class ActionImpl:
     """The attribute `Impl` of an action, which rclpy reads."""
 
-    CancelGoalService = OnDemand("protocol", "import_cancel_goal")
-    GoalStatusMessage = OnDemand("protocol", "import_goal_status")
+    CancelGoalService = OnDemand("protocol", "find", "action_msgs/srv/CancelGoal")
+    GoalStatusMessage = OnDemand("protocol", "find", "action_msgs/msg/GoalStatusArray")
 
 
-def import_cancel_goal(impl: type) -> Any:
-    """Return the service that cancels goals of any action."""
+def find(impl: type, name: str) -> Any:
+    """Return what cancels goals of any action, or publishes their states."""
     from .typeinfo import types_of
 
-    return types_of(impl).find_class("action_msgs/srv/CancelGoal")
-
-
-def import_goal_status(impl: type) -> Any:
-    """Return the message in which an action server publishes the states of goals."""
-    from .typeinfo import types_of
-
-    return types_of(impl).find_class("action_msgs/msg/GoalStatusArray")
+    return types_of(impl).find_class(name)
 
 
 # the fields of composed messages, as type checkers see them, constructors and docstrings
@@ -356,8 +349,10 @@ class _Package:
 def _fill(self: Any, options: Any, *values: Any) -> None:
     """Set the fields of a new message."""
     if options or values[0].__class__ is not self._usual:
+        from .checked import construct
+
         arguments = dict(zip(self.__match_args__, values, strict=True))
-        if codec.construct(self, options, arguments):
+        if construct(self, options, arguments):
             return
     for (name, make), value in zip(self._makers.items(), values, strict=True):
         setattr(self, name, make() if value is None else value)

@@ -41,7 +41,7 @@ def python(data: bytes, edit: Callable[[str], Outcome]) -> None:
     """Valid Python stays that, with every word and comment that it had."""
     found = edited(data, edit)
     if found:
-        before, after = found
+        before, after = (text.removeprefix("\ufeff") for text in found)
         ast.parse(after)
         lost = words(before) - words(after)
         # a text of several lines may have become a longer one

@@ -3,7 +3,16 @@
 """The types of my_robot_controller, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"my_robot_controller","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"my_robot_controller","stamps":{"my_robot_controller/action/Countdown_Feedback":1033816866'
+    ',"my_robot_controller/action/Countdown_Goal":755881589'
+    ',"my_robot_controller/action/Countdown_Result":1370630948'
+    ',"my_robot_controller/action/ExecuteTask_Feedback":1713746298'
+    ',"my_robot_controller/action/ExecuteTask_Goal":2648506465'
+    ',"my_robot_controller/action/ExecuteTask_Result":4074367554'
+    ',"my_robot_controller/msg/RobotCommand":975677890'
+    ',"my_robot_controller/srv/AddTwoInts_Request":1020086323'
+    ',"my_robot_controller/srv/AddTwoInts_Response":2114962197'
+    '},"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"my_robot_controller/action/Countdown":{"type_name":"my_robot_controller/action/Countdown","fields":[{"name":"goal","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Goal"},"default_value":""},{"name":"result","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Result"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Feedback"},"default_value":""},{"name":"send_goal_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_SendGoal"},"default_value":""},{"name":"get_result_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_GetResult"},"default_value":""},{"name":"feedback_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_FeedbackMessage"},"default_value":""}]}'
     ',"my_robot_controller/action/Countdown_Feedback":{"type_name":"my_robot_controller/action/Countdown_Feedback","fields":[{"name":"current_count","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"my_robot_controller/action/Countdown_FeedbackMessage":{"type_name":"my_robot_controller/action/Countdown_FeedbackMessage","fields":[{"name":"goal_id","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"unique_identifier_msgs/msg/UUID"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"my_robot_controller/action/Countdown_Feedback"},"default_value":""}]}'

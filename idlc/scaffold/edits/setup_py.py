@@ -35,7 +35,7 @@ def _section(lines: list[str], name: str) -> tuple[int, int] | None:
     headers = [n for n, line in enumerate(lines) if _HEADER.match(line)]
     for number, end in zip(headers, [*headers[1:], len(lines)], strict=False):
         header = _HEADER.match(lines[number])
-        if header and header[1].strip() == name:
+        if header and "".join(header[1].split()) == name:
             return number + 1, max(_last(lines[:end]), number + 1)
     return None
 
@@ -63,10 +63,9 @@ def add_to_cfg(text: str, script: Script) -> Outcome:
     lines = text.splitlines(keepends=True)
     section = _section(lines, SECTION)
     if section is None:
-        gap = "\n" if lines else ""
-        if lines and not lines[-1].endswith("\n"):
-            lines[-1] += "\n"
-        return Edited("".join(lines) + f"{gap}[{SECTION}]\n{KEY} =\n    {script.line}\n")
+        gap = [""] if lines else []
+        new = [*gap, f"[{SECTION}]", f"{KEY} =", f"    {script.line}"]
+        return _inserted(lines, len(lines), new)
     start, end = section
     key = next((n for n in range(start, end) if re.match(rf"{KEY}\s*[=:]", lines[n])), None)
     if key is None:
@@ -99,7 +98,7 @@ def _last(lines: list[str]) -> int:
     return max((number for number, line in enumerate(lines, 1) if line.strip()), default=0)
 
 
-def _inserted(lines: list[str], at: int, new: list[str]) -> Outcome:
+def _inserted(lines: list[str], at: int, new: list[str]) -> Edited:
     """Return the text with new lines before line `at`, with the line ends of the others."""
     ending = "\r\n" if lines and lines[0].endswith("\r\n") else "\n"
     before, after = lines[:at], lines[at:]
@@ -253,7 +252,7 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
     dynamic = project.get("dynamic", ())
     if project and not {"scripts", "entry-points"}.intersection(dynamic):
         return PYPROJECT, _in_pyproject(files[PYPROJECT], project, script)
-    if SETUP_CFG in files and _declares_scripts(files[SETUP_CFG]):
+    if SETUP_CFG in files and _section(files[SETUP_CFG].splitlines(), SECTION):
         return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
     if SETUP_PY in files:
         return SETUP_PY, add_to_setup(files[SETUP_PY], script)
@@ -261,10 +260,6 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
         return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
     why = "there is no setup.py, and no setup.cfg or pyproject.toml that describes a package"
     return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
-
-
-def _declares_scripts(text: str) -> bool:
-    return re.search(rf"(?m)^\s*\[\s*{re.escape(SECTION)}\s*\]", text) is not None
 
 
 def _table(text: str, name: str) -> dict[str, Any] | Refused:
@@ -282,40 +277,22 @@ def _line(script: Script) -> str:
 
 def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome:
     """Return a pyproject.toml with another line in `[project.scripts]`, added if missing."""
-    where = f"to [{TABLE}]"
+    why = "the scripts are written in a way that idlc does not edit"
+    refused = Refused(why, _line(script), f"to [{TABLE}]")
     scripts = project.get("scripts", {})
     if script.name in scripts:
         if script.same(f"{script.name} = {scripts[script.name]}"):
             return Edited(text)
-        refused = already_taken(script, str(scripts[script.name]), where)
-        return refused._replace(line=_line(script))
-    ending = "\r\n" if "\r\n" in text else "\n"
+        why = already_taken(script, str(scripts[script.name]), refused.where).why
+        return refused._replace(why=why)
     lines = text.splitlines(keepends=True)
-    header = re.compile(r"^\s*\[\s*project\s*\.\s*scripts\s*\]\s*(#.*)?$")
-    at = next((n for n, line in enumerate(lines) if header.match(line)), None)
-    if at is None and "scripts" in project:
-        return Refused(
-            "the scripts are written in a way that idlc does not edit", _line(script), where
-        )
-    if lines and not lines[-1].endswith("\n"):
-        lines[-1] += ending
-    if at is None:
-        new = [*lines, ending, f"[{TABLE}]{ending}", _line(script) + ending]
+    section = _section(lines, TABLE)
+    if section:
+        edited = _inserted(lines, section[1], [_line(script)])
     else:
-        end = next((n for n in range(at + 1, len(lines)) if lines[n].lstrip()[:1] == "["), None)
-        end = len(lines) if end is None else end
-        while not lines[end - 1].strip():
-            end -= 1
-        new = [*lines[:end], _line(script) + ending, *lines[end:]]
-    return _checked_scripts("".join(new), project, script, where)
-
-
-def _checked_scripts(text: str, before: dict[str, Any], script: Script, where: str) -> Outcome:
-    """Return the edited text if it differs only by the script."""
-    expected = {**before, "scripts": {**before.get("scripts", {}), script.name: script.target}}
-    if _table(text, "project") == expected:
-        return Edited(text)
-    return Refused("the scripts are written in a way that idlc does not edit", _line(script), where)
+        edited = _inserted(lines, len(lines), ["", f"[{TABLE}]", _line(script)])
+    expected = {**project, "scripts": {**scripts, script.name: script.target}}
+    return edited if _table(edited.text, "project") == expected else refused
 
 
 WHERE = "to `data_files` in the call of setup()"

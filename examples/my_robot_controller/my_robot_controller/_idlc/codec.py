@@ -10,11 +10,11 @@ import struct
 from os import environ
 
 from .cdr import NATIVE, order_of
-from .names import DecodeError, ValidationError, owner_of
+from .names import DecodeError, ValidationError, demand_stamp, owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
     from functools import partial
     from typing import Any, TypeAlias
 
@@ -253,15 +253,6 @@ def _indexed(kind: Any, buffer: Any, copy: bool, index: int) -> Any:
 # constructors
 
 
-def construct(
-    message: Any, options: Mapping[str, Any], arguments: dict[str, Any]
-) -> bool:
-    """Check a constructor's arguments; return whether the message got all its fields."""
-    from .checked import construct
-
-    return construct(message, options, arguments)
-
-
 def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
     """Make a message that checks its fields, as the environment asks for."""
     if "check_fields" in cls._fields_and_field_types:
@@ -273,8 +264,12 @@ def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
     return message
 
 
-def maker(kind: Any) -> Callable[[], Any]:
-    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
+def maker(kind: Any, number: int | None = None) -> Callable[[], Any]:
+    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class.
+
+    Raises ImportError for a class whose fields have another stamp than `number`.
+    """
+    demand_stamp(kind, number)
     if hasattr(type(kind), "_message"):
         if CHECK_FIELDS:
             from .checked import checked_class

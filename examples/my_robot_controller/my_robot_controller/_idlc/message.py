@@ -16,7 +16,7 @@ from .names import owner_of, public_name, slot_name, wire_name
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
     from dataclasses import Field
     from functools import partial
     from typing import Any, ClassVar, Literal, TypeVar
@@ -48,15 +48,16 @@ class OnDemand:
     An error in that is an AttributeError, as code that looks at all attributes of a class expects.
     """
 
-    def __init__(self, module: str, function: str) -> None:
+    def __init__(self, module: str, function: str, *arguments: str) -> None:
         self._module = f"{__package__}.{module}"
         self._function = function
+        self._arguments = arguments
 
     def __get__(self, instance: object, owner: type) -> Any:
         """Return what a function of the runtime makes for a class."""
         try:
             module = __import__(self._module, fromlist=[self._function])
-            return getattr(module, self._function)(owner)
+            return getattr(module, self._function)(owner, *self._arguments)
         except Exception as error:
             raise AttributeError(str(error)) from error
 
@@ -77,20 +78,16 @@ def _columns() -> Any:
 
 #: Values that a copy may share.
 ATOMIC = frozenset({bool, bytes, float, int, str})
-#: Elements up to which Python compares two arrays of numbers before numpy has begun.
+#: Elements up to which Python compares two arrays before numpy has begun.
 SMALL = 64
 #: Packages that are shown under other names than they are imported by.
 SHOWN: dict[str, str] = {}
-#: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
-_of_numpy: set[type] = set()
 
 
 def equal(message: Any, other: Any) -> bool:
     """Compare a message with one of its class or of a copy of that, which has the same fields."""
     owner = owner_of(type(message))
     if not isinstance(other, owner):
-        if not hasattr(type(type(other)), "_message"):
-            return NotImplemented  # type: ignore[no-any-return]
         from .typeinfo import is_copy
 
         if not is_copy(owner, type(other)):
@@ -103,62 +100,40 @@ def equal(message: Any, other: Any) -> bool:
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     kind = type(mine)
-    if kind is array and type(other) is array:
-        if mine.typecode == other.typecode:
-            if mine.typecode in "fd":  # no nan is equal to another
-                return memoryview(mine) == memoryview(other)
-            if len(mine) > SMALL:
-                # only `bytes` and `bytearray` compare memory at once
-                return len(mine) == len(other) and bytearray(mine) == memoryview(other)
-    elif kind in _of_numpy and type(other) is kind and len(mine) <= SMALL:
-        return bool(mine.data == other)
-    elif kind.__module__ == "numpy" or type(other).__module__ == "numpy":
+    if kind is array and type(other) is array and mine.typecode == other.typecode:
+        if mine.typecode in "fd":  # no nan is equal to another
+            return memoryview(mine) == memoryview(other)
+        # only `bytes` and `bytearray` compare memory at once
+        return bytearray(mine) == other
+    if kind.__module__ == "numpy" or type(other).__module__ == "numpy":
         import numpy as np
 
-        _of_numpy.add(np.ndarray)
+        if type(other) is kind is np.ndarray and len(mine) <= SMALL:
+            return bool(mine.data == other)
         return np.array_equal(mine, other)
     return bool(mine == other)
 
 
-def copied(message: Any) -> Any:
-    """Return a shallow copy."""
+def copied(message: Any, memo: dict[int, Any] | None = None) -> Any:
+    """Return a copy; with the memo of `deepcopy`, it shares nothing that can change."""
     kind = type(message)
-    if owner_of(kind) is not kind:
-        return _reconstructed(message, lambda value: value)
     duplicate = object.__new__(kind)
-    for slot in kind.__slots__:
-        setattr(duplicate, slot, getattr(message, slot))
-    return duplicate
-
-
-def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
-    """Return a copy that shares nothing that can change."""
-    from copy import deepcopy
-
-    kind = type(message)
-    if owner_of(kind) is not kind:
-        return _reconstructed(message, lambda value: deepcopy(value, memo), memo)
-    duplicate = memo[id(message)] = object.__new__(kind)
-    for slot in kind.__slots__:
-        value = getattr(message, slot)
-        if type(value) not in ATOMIC:
-            value = deepcopy(value, memo)
-        setattr(duplicate, slot, value)
-    return duplicate
-
-
-def _reconstructed(
-    message: Any, copy_of: Callable[[Any], Any], memo: dict[int, Any] | None = None
-) -> Any:
-    """Return a copy of an instance of a user's subclass, which may have more than slots."""
-    reduced: Any = object.__reduce_ex__(message, 4)
-    state = reduced[2]
-    duplicate = object.__new__(type(message))
+    if owner_of(kind) is kind:
+        state = {slot: getattr(message, slot) for slot in kind.__slots__}
+    else:  # a user's subclass, which may have more than slots
+        reduced: Any = object.__reduce_ex__(message, 4)
+        parts = reduced[2] if isinstance(reduced[2], tuple) else (reduced[2],)
+        state = {name: part[name] for part in parts for name in part or ()}
     if memo is not None:
+        from copy import deepcopy
+
         memo[id(message)] = duplicate
-    for part in state if isinstance(state, tuple) else (state,):
-        for name, value in (part or {}).items():
-            object.__setattr__(duplicate, name, copy_of(value))
+        for name, value in state.items():
+            if type(value) not in ATOMIC:
+                state[name] = deepcopy(value, memo)
+    store = object.__setattr__
+    for name, value in state.items():
+        store(duplicate, name, value)
     return duplicate
 
 
@@ -429,8 +404,7 @@ class Message(metaclass=MessageMeta):
         message: typing_extensions.Self = from_dict(cls, values)
         return message
 
-    __copy__ = copied
-    __deepcopy__ = deeply_copied
+    __copy__ = __deepcopy__ = copied
     _repr_pretty_ = pretty
 
     def __repr__(self) -> str:

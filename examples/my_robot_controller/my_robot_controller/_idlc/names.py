@@ -46,6 +46,24 @@ def owner_of(kind: type) -> Any:
     return owner
 
 
+def stamp(fields: Mapping[str, str]) -> int:
+    """Return a number for the fields of a class: their names and types, in order."""
+    from binascii import crc32
+
+    return crc32(repr(fields).encode())
+
+
+def demand_stamp(kind: Any, number: int | None) -> None:
+    """Raise ImportError unless a class has the fields that another module was made for."""
+    if number is not None and number != stamp(kind._fields_and_field_types):
+        package = kind.__module__.rpartition(".")[0]
+        raise ImportError(
+            f"{package} has files of two versions of {kind.__name__}, perhaps because `idlc gen` "
+            f"was interrupted: run it again",
+            name=kind.__module__,
+        )
+
+
 def lazily(
     package: str, modules: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -150,9 +168,8 @@ class importing:
     ) -> None:
         if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
             return
-        if (
-            error.name == "idlc_runtime"
-        ):  # a package says itself that it lacks its runtime
+        # a package says itself that it lacks its runtime
+        if error.name == "idlc_runtime":
             return
         package = (error.name or "").partition(".")[0] or "another package"
         raise MissingPackageError(

@@ -16,7 +16,14 @@ from struct import Struct
 from typing import Any, NamedTuple, TypeAlias
 
 from .cdr import NATIVE, order_of
-from .names import DecodeError, importing, public_name, slot_name, wire_name
+from .names import (
+    DecodeError,
+    demand_stamp,
+    importing,
+    public_name,
+    slot_name,
+    wire_name,
+)
 
 
 class Primitive(NamedTuple):
@@ -109,6 +116,8 @@ class Types:
         self.descriptions: dict[str, Any] = content["descriptions"]
         self.hashes: dict[str, str] = content["hashes"]
         self.sources: dict[str, str] = content["sources"]
+        #: The stamps of the package's own classes.
+        self.stamps: dict[str, int] = content.get("stamps", {})
         self._structures: dict[str, Structure] = {}
 
     def __getitem__(self, name: str) -> Structure:
@@ -205,7 +214,14 @@ def structure_of(kind: type) -> Structure:
 def _structure_of(owner: type) -> Structure:
     types = types_of(owner)
     kind = owner.__module__.rsplit(".", 2)[1]
-    return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
+    structure = types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
+    demand_stamp(owner, types.stamps.get(structure.name))
+    for field in structure.fields:
+        if (
+            field.nested and field.nested.is_own
+        ):  # whose fields are read and written, too
+            _structure_of(field.nested.find_class())
+    return structure
 
 
 def type_hash(kind: type) -> str:

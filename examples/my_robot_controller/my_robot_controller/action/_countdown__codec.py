@@ -18,7 +18,7 @@ def countdown_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc
     """Return what writes and reads Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
-    new_countdown_goal = _idlc.maker(kind)
+    new_countdown_goal = _idlc.maker(kind, 0x2d0dd675)
     read_target_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -42,7 +42,7 @@ def countdown_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _id
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4si?").pack
-    new_countdown_result = _idlc.maker(kind)
+    new_countdown_result = _idlc.maker(kind, 0x51b22b24)
     read_final_count = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -69,7 +69,7 @@ def countdown_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _
     """Return what writes and reads Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
-    new_countdown_feedback = _idlc.maker(kind)
+    new_countdown_feedback = _idlc.maker(kind, 0x3d9ecb22)
     read_current_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -99,9 +99,9 @@ def countdown_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Read
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     write_head = _idlc.layout(order, "4s16Bi").pack
-    new_countdown_send_goal_request = _idlc.maker(kind)
+    new_countdown_send_goal_request = _idlc.maker(kind, 0x856b7371)
     new_uuid = _idlc.maker(UUID)
-    new_countdown_goal = _idlc.maker(Countdown_Goal)
+    new_countdown_goal = _idlc.maker(Countdown_Goal, 0x2d0dd675)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_goal_id_uuid = _idlc.layout(order, "16Bi", start=4).unpack_from
 
@@ -139,8 +139,8 @@ def countdown_get_result_response_codec(kind: Any, order: str, reading: _idlc.Re
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4sbi?").pack
-    new_countdown_get_result_response = _idlc.maker(kind)
-    new_countdown_result = _idlc.maker(Countdown_Result)
+    new_countdown_get_result_response = _idlc.maker(kind, 0xa2edd258)
+    new_countdown_result = _idlc.maker(Countdown_Result, 0x51b22b24)
     read_status = _idlc.layout(order, "bi?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -179,9 +179,9 @@ def countdown_feedback_message_codec(kind: Any, order: str, reading: _idlc.Readi
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     write_head = _idlc.layout(order, "4s16Bi").pack
-    new_countdown_feedback_message = _idlc.maker(kind)
+    new_countdown_feedback_message = _idlc.maker(kind, 0x9506e2fd)
     new_uuid = _idlc.maker(UUID)
-    new_countdown_feedback = _idlc.maker(Countdown_Feedback)
+    new_countdown_feedback = _idlc.maker(Countdown_Feedback, 0x3d9ecb22)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_goal_id_uuid = _idlc.layout(order, "16Bi", start=4).unpack_from
 

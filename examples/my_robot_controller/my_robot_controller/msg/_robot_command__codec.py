@@ -20,7 +20,7 @@ def robot_command_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*ff", align=4)
     write_text = _idlc.Texts(order, "I*")
-    new_robot_command = _idlc.maker(kind)
+    new_robot_command = _idlc.maker(kind, 0x3a27a9c2)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
     read_linear_velocity_x = _idlc.layout(order, "ffI").unpack_from

@@ -3,7 +3,13 @@
 """The types of comments_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"comments_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"comments_msgs","stamps":{"comments_msgs/action/Fill_Feedback":2540940271'
+    ',"comments_msgs/action/Fill_Goal":2540940271'
+    ',"comments_msgs/action/Fill_Result":2673583703'
+    ',"comments_msgs/msg/Gauge":2806459913'
+    ',"comments_msgs/srv/Reset_Request":4278015920'
+    ',"comments_msgs/srv/Reset_Response":564938589'
+    '},"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"comments_msgs/action/Fill":{"type_name":"comments_msgs/action/Fill","fields":[{"name":"goal","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Goal"},"default_value":""},{"name":"result","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Result"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Feedback"},"default_value":""},{"name":"send_goal_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_SendGoal"},"default_value":""},{"name":"get_result_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_GetResult"},"default_value":""},{"name":"feedback_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_FeedbackMessage"},"default_value":""}]}'
     ',"comments_msgs/action/Fill_Feedback":{"type_name":"comments_msgs/action/Fill_Feedback","fields":[{"name":"level","type":{"type_id":10,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"comments_msgs/action/Fill_FeedbackMessage":{"type_name":"comments_msgs/action/Fill_FeedbackMessage","fields":[{"name":"goal_id","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"unique_identifier_msgs/msg/UUID"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"comments_msgs/action/Fill_Feedback"},"default_value":""}]}'

@@ -3,7 +3,16 @@
 """The types of names_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"names_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"names_msgs","stamps":{"names_msgs/msg/Any":2748842867'
+    ',"names_msgs/msg/FOOBar":3144652822'
+    ',"names_msgs/msg/FooBar":3114272170'
+    ',"names_msgs/msg/Hiding":1217309909'
+    ',"names_msgs/msg/Odd":1110169549'
+    ',"names_msgs/msg/Point":1335838197'
+    ',"names_msgs/msg/Text":2380234703'
+    ',"names_msgs/srv/None_Request":2745614147'
+    ',"names_msgs/srv/None_Response":2745614147'
+    '},"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"geometry_msgs/msg/Point":{"type_name":"geometry_msgs/msg/Point","fields":[{"name":"x","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"y","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"z","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"geometry_msgs/msg/Pose":{"type_name":"geometry_msgs/msg/Pose","fields":[{"name":"position","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"geometry_msgs/msg/Point"},"default_value":""},{"name":"orientation","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"geometry_msgs/msg/Quaternion"},"default_value":""}]}'
     ',"geometry_msgs/msg/Quaternion":{"type_name":"geometry_msgs/msg/Quaternion","fields":[{"name":"x","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.0"},{"name":"y","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.0"},{"name":"z","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"0.0"},{"name":"w","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":"1.0"}]}'

@@ -3,7 +3,16 @@
 """The types of tutorial_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"tutorial_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"tutorial_msgs","stamps":{"tutorial_msgs/action/Countdown_Feedback":1033816866'
+    ',"tutorial_msgs/action/Countdown_Goal":755881589'
+    ',"tutorial_msgs/action/Countdown_Result":1370630948'
+    ',"tutorial_msgs/action/ExecuteTask_Feedback":1713746298'
+    ',"tutorial_msgs/action/ExecuteTask_Goal":2648506465'
+    ',"tutorial_msgs/action/ExecuteTask_Result":4074367554'
+    ',"tutorial_msgs/msg/RobotCommand":975677890'
+    ',"tutorial_msgs/srv/AddTwoInts_Request":1020086323'
+    ',"tutorial_msgs/srv/AddTwoInts_Response":2114962197'
+    '},"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"service_msgs/msg/ServiceEventInfo":{"type_name":"service_msgs/msg/ServiceEventInfo","fields":[{"name":"event_type","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamp","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"client_gid","type":{"type_id":51,"capacity":16,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"sequence_number","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"tutorial_msgs/action/Countdown":{"type_name":"tutorial_msgs/action/Countdown","fields":[{"name":"goal","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_Goal"},"default_value":""},{"name":"result","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_Result"},"default_value":""},{"name":"feedback","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_Feedback"},"default_value":""},{"name":"send_goal_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_SendGoal"},"default_value":""},{"name":"get_result_service","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_GetResult"},"default_value":""},{"name":"feedback_message","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"tutorial_msgs/action/Countdown_FeedbackMessage"},"default_value":""}]}'
     ',"tutorial_msgs/action/Countdown_Feedback":{"type_name":"tutorial_msgs/action/Countdown_Feedback","fields":[{"name":"current_count","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'

@@ -18,7 +18,7 @@ def fill_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Code
     """Return what writes and reads Fill_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
-    new_fill_goal = _idlc.maker(kind)
+    new_fill_goal = _idlc.maker(kind, 0x9773abef)
     read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -41,7 +41,7 @@ def fill_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Co
     """Return what writes and reads Fill_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
-    new_fill_result = _idlc.maker(kind)
+    new_fill_result = _idlc.maker(kind, 0x9f5ba657)
     read_reached = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -64,7 +64,7 @@ def fill_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
     """Return what writes and reads Fill_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
-    new_fill_feedback = _idlc.maker(kind)
+    new_fill_feedback = _idlc.maker(kind, 0x9773abef)
     read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -94,9 +94,9 @@ def fill_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) 
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     write_head = _idlc.layout(order, "4s16Bf").pack
-    new_fill_send_goal_request = _idlc.maker(kind)
+    new_fill_send_goal_request = _idlc.maker(kind, 0x3b051d2a)
     new_uuid = _idlc.maker(UUID)
-    new_fill_goal = _idlc.maker(Fill_Goal)
+    new_fill_goal = _idlc.maker(Fill_Goal, 0x9773abef)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_goal_id_uuid = _idlc.layout(order, "16Bf", start=4).unpack_from
 
@@ -133,8 +133,8 @@ def fill_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading
 
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sbf").pack
-    new_fill_get_result_response = _idlc.maker(kind)
-    new_fill_result = _idlc.maker(Fill_Result)
+    new_fill_get_result_response = _idlc.maker(kind, 0xc638db37)
+    new_fill_result = _idlc.maker(Fill_Result, 0x9f5ba657)
     read_status = _idlc.layout(order, "bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -171,9 +171,9 @@ def fill_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     write_head = _idlc.layout(order, "4s16Bf").pack
-    new_fill_feedback_message = _idlc.maker(kind)
+    new_fill_feedback_message = _idlc.maker(kind, 0x72e82694)
     new_uuid = _idlc.maker(UUID)
-    new_fill_feedback = _idlc.maker(Fill_Feedback)
+    new_fill_feedback = _idlc.maker(Fill_Feedback, 0x9773abef)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_goal_id_uuid = _idlc.layout(order, "16Bf", start=4).unpack_from
 

@@ -27,7 +27,7 @@ def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     write_count_at = _idlc.phases(order, "I")
     bytes_of_float64_9 = _arrays.array_writer(order, "float64", 9)
     write_covariance_at = _idlc.phases(order, "9dc")
-    new_gauge = _idlc.maker(kind)
+    new_gauge = _idlc.maker(kind, 0xa7472e09)
     read_rate = _idlc.layout(order, "fBI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from

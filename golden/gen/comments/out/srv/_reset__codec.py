@@ -19,7 +19,7 @@ def reset_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
     """Return what writes and reads Reset_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
-    new_reset_request = _idlc.maker(kind)
+    new_reset_request = _idlc.maker(kind, 0xfefd57b0)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
@@ -51,7 +51,7 @@ def reset_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack
-    new_reset_response = _idlc.maker(kind)
+    new_reset_response = _idlc.maker(kind, 0x21ac475d)
     read_ok = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:

@@ -53,10 +53,10 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
     write_stamps_item = _idlc.layout(order, "iI", start=4).pack
     bytes_of_float32_4 = _arrays.array_writer(order, "float32", 4)
     write_weights_at = _idlc.phases(order, "4fq")
-    new_everything = _idlc.maker(kind)
-    new_inner = _idlc.maker(Inner)
-    new_row = _idlc.maker(Row)
-    new_nothing = _idlc.maker(Nothing)
+    new_everything = _idlc.maker(kind, 0x6acfa524)
+    new_inner = _idlc.maker(Inner, 0xbc6b0a23)
+    new_row = _idlc.maker(Row, 0x362b5c90)
+    new_nothing = _idlc.maker(Nothing, 0xa3a6bf43)
     new_time = _idlc.maker(Time)
     read_flag = _idlc.layout(order, "?BdI", start=4).unpack_from
     text = reading.text

@@ -20,7 +20,7 @@ def inner_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
     write_head = _idlc.Texts(order, "4sBdI*I")
-    new_inner = _idlc.maker(kind)
+    new_inner = _idlc.maker(kind, 0xbc6b0a23)
     read_a = _idlc.layout(order, "BdI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from

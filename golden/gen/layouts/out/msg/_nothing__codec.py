@@ -16,7 +16,7 @@ def nothing_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Nothing in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
-    new_nothing = _idlc.maker(kind)
+    new_nothing = _idlc.maker(kind, 0xa3a6bf43)
     read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:

@@ -20,7 +20,7 @@ def pair_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*", align=4)
     write_text = _idlc.Texts(order, "I*")
-    new_pair = _idlc.maker(kind)
+    new_pair = _idlc.maker(kind, 0xd36dae8d)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 

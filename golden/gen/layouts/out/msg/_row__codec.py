@@ -19,7 +19,7 @@ def row_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_3 = _arrays.array_writer(order, "uint8", 3)
     write_head = _idlc.layout(order, "4sIH3B").pack
-    new_row = _idlc.maker(kind)
+    new_row = _idlc.maker(kind, 0x362b5c90)
     array_of_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
     read_a = _idlc.layout(order, "IH3B", start=4).unpack_from
 

@@ -32,9 +32,9 @@ def texts_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     write_text = _idlc.Texts(order, "I*")
     write_titled_item_level = _idlc.Texts(order, "BI*I")
     write_titled_item_number_at = _idlc.phases(order, "d")
-    new_texts = _idlc.maker(kind)
-    new_pair = _idlc.maker(Pair)
-    new_titled = _idlc.maker(Titled)
+    new_texts = _idlc.maker(kind, 0x19ff4631)
+    new_pair = _idlc.maker(Pair, 0xd36dae8d)
+    new_titled = _idlc.maker(Titled, 0xd2827b9c)
     read_count = _idlc.layout(order, "I").unpack_from
     strings = _idlc.strings_reader(order, reading.text)
     text = reading.text

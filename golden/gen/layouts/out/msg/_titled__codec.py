@@ -26,8 +26,8 @@ def titled_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     write_head = _idlc.Texts(order, "4sBI*I")
     write_rows = _idlc.rows_writer(order)
     write_number_at = _idlc.phases(order, "d")
-    new_titled = _idlc.maker(kind)
-    new_pair = _idlc.maker(Pair)
+    new_titled = _idlc.maker(kind, 0xd2827b9c)
+    new_pair = _idlc.maker(Pair, 0xd36dae8d)
     read_level = _idlc.layout(order, "BI", start=4).unpack_from
     text = reading.text
     read_count = _idlc.layout(order, "I").unpack_from

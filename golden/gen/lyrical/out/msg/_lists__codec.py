@@ -40,8 +40,8 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     array = _idlc.array_of(order)
     write_position_at = _idlc.phases(order, "3fI")
     write_texts_in_a_long_field_name = _idlc.text_block(order)
-    new_lists = _idlc.maker(kind)
-    new_words = _idlc.maker(Words)
+    new_lists = _idlc.maker(kind, 0x41e1ea5a)
+    new_words = _idlc.maker(Words, 0xa61530d8)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
     read_names = _idlc.texts_reader(order, text)

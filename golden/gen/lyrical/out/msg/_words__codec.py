@@ -20,7 +20,7 @@ def words_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.Texts(order, "4sI*ic?d")
-    new_words = _idlc.maker(kind)
+    new_words = _idlc.maker(kind, 0xa61530d8)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
     read_count_at = _idlc.phases(order, "ic?d")

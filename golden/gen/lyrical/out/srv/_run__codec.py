@@ -21,7 +21,7 @@ def run_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Co
     write_args = _idlc.text_block(order)
     truths = _idlc.TRUTHS
     write_wait = _idlc.layout(order, "?").pack
-    new_run_request = _idlc.maker(kind)
+    new_run_request = _idlc.maker(kind, 0xe6c4ce1d)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
     read_args = _idlc.texts_reader(order, text)
@@ -54,7 +54,7 @@ def run_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.C
     listed = _idlc.listed
     write_head = _idlc.layout(order, "4siI").pack
     write_stamps_item = _idlc.layout(order, "iI", start=4).pack
-    new_run_response = _idlc.maker(kind)
+    new_run_response = _idlc.maker(kind, 0x9261af4a)
     new_time = _idlc.maker(Time)
     read_status = _idlc.layout(order, "iI", start=4).unpack_from
     read_stamps_item = _idlc.layout(order, "iI", start=4).iter_unpack

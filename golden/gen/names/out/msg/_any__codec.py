@@ -25,7 +25,7 @@ def any_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sddddddd").pack
-    new_any = _idlc.maker(kind)
+    new_any = _idlc.maker(kind, 0xa3d80373)
     new_pose = _idlc.maker(Pose)
     new_point = _idlc.maker(Point)
     new_quaternion = _idlc.maker(Quaternion)

@@ -16,7 +16,7 @@ def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads FooBar in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
-    new_foo_bar = _idlc.maker(kind)
+    new_foo_bar = _idlc.maker(kind, 0xb9a005aa)
     read_a = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:

@@ -18,8 +18,8 @@ def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
-    new_foo_bar = _idlc.maker(kind)
-    new_foo_bar_2 = _idlc.maker(FooBar)
+    new_foo_bar = _idlc.maker(kind, 0xbb6f9816)
+    new_foo_bar_2 = _idlc.maker(FooBar, 0xb9a005aa)
     read_inner_a = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:

@@ -24,8 +24,8 @@ def hiding_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     bytes_of_int32_3 = _arrays.array_writer(order, "int32", 3)
     write_from_dict = _idlc.layout(order, "3i", align=4).pack
     write_to_dict = _idlc.text_block(order)
-    new_hiding = _idlc.maker(kind)
-    new_point = _idlc.maker(Point)
+    new_hiding = _idlc.maker(kind, 0x488eacd5)
+    new_point = _idlc.maker(Point, 0x4f9f45f5)
     read_validate_x = _idlc.layout(order, "ddBI", start=4).unpack_from
     sequence_of_float32 = _idlc.sequence_reader(order, "f", reading)
     array_of_int32_3 = _arrays.array_reader(order, "int32", 3, reading)

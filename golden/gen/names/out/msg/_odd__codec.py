@@ -30,8 +30,8 @@ def odd_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     pad8 = _idlc.PAD8
     bytes_of_int32_3 = _arrays.array_writer(order, "int32", 3)
     write_array_x_at = _idlc.phases(order, "dd3i")
-    new_odd = _idlc.maker(kind)
-    new_point = _idlc.maker(Point)
+    new_odd = _idlc.maker(kind, 0x422bd7cd)
+    new_point = _idlc.maker(Point, 0x4f9f45f5)
     read_class = _idlc.layout(order, "iiiiiI", start=4).unpack_from
     text = reading.text
     read_bytes_at = _idlc.phases(order, "c?fI")

@@ -16,7 +16,7 @@ def point_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Point in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sdd").pack
-    new_point = _idlc.maker(kind)
+    new_point = _idlc.maker(kind, 0x4f9f45f5)
     read_x = _idlc.layout(order, "dd", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:

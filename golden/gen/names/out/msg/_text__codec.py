@@ -31,10 +31,10 @@ def text_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     write_head = _idlc.layout(order, "4sdddddI").pack
     write_any_item = _idlc.layout(order, "ddddddd", start=4).pack
     pad8 = _idlc.PAD8
-    new_text = _idlc.maker(kind)
+    new_text = _idlc.maker(kind, 0x8ddf7fcf)
     new_geometry_msgs_point = _idlc.maker(geometry_msgs_Point)
-    new_names_msgs_point = _idlc.maker(names_msgs_Point)
-    new_names_msgs_any = _idlc.maker(names_msgs_Any)
+    new_names_msgs_point = _idlc.maker(names_msgs_Point, 0x4f9f45f5)
+    new_names_msgs_any = _idlc.maker(names_msgs_Any, 0xa3d80373)
     new_pose = _idlc.maker(Pose)
     new_quaternion = _idlc.maker(Quaternion)
     read_other_x = _idlc.layout(order, "dddddI", start=4).unpack_from

@@ -16,7 +16,7 @@ def none_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.C
     """Return what writes and reads None_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
-    new_none_request = _idlc.maker(kind)
+    new_none_request = _idlc.maker(kind, 0xa3a6bf43)
     read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -34,7 +34,7 @@ def none_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
     """Return what writes and reads None_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
-    new_none_response = _idlc.maker(kind)
+    new_none_response = _idlc.maker(kind, 0xa3a6bf43)
     read_nothing = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:

@@ -21,7 +21,7 @@ def execute_task_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _i
     """Return what writes and reads ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
-    new_execute_task_goal = _idlc.maker(kind)
+    new_execute_task_goal = _idlc.maker(kind, 0x9ddd0061)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
@@ -53,7 +53,7 @@ def execute_task_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> 
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack
-    new_execute_task_result = _idlc.maker(kind)
+    new_execute_task_result = _idlc.maker(kind, 0xf2d9ea42)
     read_success = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -76,7 +76,7 @@ def execute_task_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -
     """Return what writes and reads ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
-    new_execute_task_feedback = _idlc.maker(kind)
+    new_execute_task_feedback = _idlc.maker(kind, 0x6625b17a)
     read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
@@ -114,9 +114,9 @@ def execute_task_send_goal_request_codec(kind: Any, order: str, reading: _idlc.R
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     write_head = _idlc.Texts(order, "4s16BI*")
-    new_execute_task_send_goal_request = _idlc.maker(kind)
+    new_execute_task_send_goal_request = _idlc.maker(kind, 0x4af8994d)
     new_uuid = _idlc.maker(UUID)
-    new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
+    new_execute_task_goal = _idlc.maker(ExecuteTask_Goal, 0x9ddd0061)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_goal_id_uuid = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
@@ -162,8 +162,8 @@ def execute_task_get_result_response_codec(kind: Any, order: str, reading: _idlc
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4sb?").pack
-    new_execute_task_get_result_response = _idlc.maker(kind)
-    new_execute_task_result = _idlc.maker(ExecuteTask_Result)
+    new_execute_task_get_result_response = _idlc.maker(kind, 0xd1e7c400)
+    new_execute_task_result = _idlc.maker(ExecuteTask_Result, 0xf2d9ea42)
     read_status = _idlc.layout(order, "b?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -200,9 +200,9 @@ def execute_task_feedback_message_codec(kind: Any, order: str, reading: _idlc.Re
     encapsulation = _idlc.HEADERS[order]
     bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     write_head = _idlc.Texts(order, "4s16BI*")
-    new_execute_task_feedback_message = _idlc.maker(kind)
+    new_execute_task_feedback_message = _idlc.maker(kind, 0xcd14998b)
     new_uuid = _idlc.maker(UUID)
-    new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback)
+    new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback, 0x6625b17a)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_goal_id_uuid = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text

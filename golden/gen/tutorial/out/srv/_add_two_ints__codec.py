@@ -16,7 +16,7 @@ def add_two_ints_request_codec(kind: Any, order: str, reading: _idlc.Reading) ->
     """Return what writes and reads AddTwoInts_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sqq").pack
-    new_add_two_ints_request = _idlc.maker(kind)
+    new_add_two_ints_request = _idlc.maker(kind, 0x3ccd4833)
     read_a = _idlc.layout(order, "qq", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -43,7 +43,7 @@ def add_two_ints_response_codec(kind: Any, order: str, reading: _idlc.Reading) -
     """Return what writes and reads AddTwoInts_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sq").pack
-    new_add_two_ints_response = _idlc.maker(kind)
+    new_add_two_ints_response = _idlc.maker(kind, 0x7e0fc315)
     read_sum = _idlc.layout(order, "q", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
