@@ -86,7 +86,7 @@ def _makers(
     own: ir.Message,
     steps: tuple[plan.Step, ...],
     references: References,
-    messages: plan.Messages,
+    messages: Messages,
     tables: Tables,
 ) -> dict[ir.TypeName, str]:
     """Return the functions that make empty objects of the message and of those in it.
