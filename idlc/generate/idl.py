@@ -154,17 +154,26 @@ def _member(field: ir.Field) -> Iterator[str]:
     yield f"{type_} {field.name};"
 
 
-def _idl_element(element: ir.Element) -> str:
-    match element:
+def idl_text(type_: ir.FieldType) -> str:
+    """Return a type as rosidl's `get_fields_and_field_types` spells it."""
+    match type_:
+        case ir.Array(element, size):
+            return f"{idl_text(element)}[{size}]"
+        case ir.Sequence(element, bound):
+            limit = "" if bound is None else f", {bound}"
+            return f"sequence<{idl_text(element)}{limit}>"
+        case ir.String(wide, bound):
+            return ("wstring" if wide else "string") + ("" if bound is None else f"<{bound}>")
+        case ir.Ref(target):
+            return f"{target.package}/{target.name}"
         case ir.Primitive():
-            return element.info.idl
-        case ir.String():
-            bound = "" if element.bound is None else f"<{element.bound}>"
-            return f"{'w' * element.wide}string{bound}"
-        case ir.Ref():
-            return "::".join(element.target)
+            return type_.info.idl
         case ir.Unknown():
-            raise ValueError("an unknown type has no name")
+            raise ValueError("an unknown type cannot be emitted")
+
+
+def _idl_element(element: ir.Element) -> str:
+    return "::".join(element.target) if isinstance(element, ir.Ref) else idl_text(element)
 
 
 def _idl_comment(lines: tuple[str, ...]) -> Iterator[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from symtable import symtable
 from typing import TYPE_CHECKING, NamedTuple
 
 from msgspec import UNSET
@@ -79,7 +78,6 @@ def package_of(
     plan = target.plan(files, check=check)
     if plan is None:
         return None
-    _check_syntax(plan, target)
     own = {
         ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if _key(n) in digests
     }
@@ -113,20 +111,6 @@ def _with_surroundings(
     from idlc.generate.prefix import overlaid
 
     return overlaid(model, modules, target)
-
-
-def _check_syntax(plan: Plan, target: Target) -> None:
-    """Fail on rendered code that Python cannot parse, which would be a bug of idlc.
-
-    Only text from an interface file can cause that, and such text is escaped by a backslash;
-    modules without one are like those that the tests parse.
-    """
-    for change in plan.changes:
-        rendered = change.path.endswith(".py") and "/_idlc/" not in f"/{change.path}"
-        if rendered and change.new and b"\\" in change.new:
-            with stage("compile", f"{target.name}/{change.path}"):
-                # parses, and resolves names, without the cost of making bytecode
-                symtable(change.new.decode("utf-8"), change.path, "exec")
 
 
 def _imports(model: Model) -> tuple[str, ...]:

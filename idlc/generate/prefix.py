@@ -140,11 +140,6 @@ class Overlay(Target):
         self.modules = f"{prefixes.modules_folder()}/{package}/"
 
     @property
-    def place(self) -> str:
-        """The prefix's path, for shells that do not know the path of the file they source."""
-        return self.path.as_posix()
-
-    @property
     def distribution(self) -> Distribution:
         """The distribution that libraries are for: the installed one, unless others are chosen."""
         installed = distribution((self.path, *prefixes.ament_prefixes()))
@@ -221,7 +216,9 @@ def write_setup_scripts(overlay: Target) -> bool:
     assert isinstance(overlay, Overlay)
     files = {
         f"{name}.{shell}": _rendered(
-            f"overlay/setup.{shell}.jinja", prefix=Text(quote(overlay.place))
+            # for shells that do not know the path of the file that they source
+            f"overlay/setup.{shell}.jinja",
+            prefix=Text(quote(overlay.path.as_posix())),
         )
         for shell in _SHELLS
         for name in ("local_setup", "setup")

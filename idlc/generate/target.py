@@ -216,31 +216,6 @@ _MAKERS = (
 )
 
 
-def unchanged(
-    out: Path,
-    lock: Lock | None,
-    package: str,
-    inputs: Mapping[str, str],
-    library: Library,
-    vendoring: Vendoring = "",
-) -> bool:
-    """Return whether a run would leave the package in `out` unchanged.
-
-    `inputs` are the digests of the input files by name within the package.
-    """
-    return (
-        lock is not None
-        and (lock.idlc, lock.package) == (__version__, package)
-        and lock.vendors_as(vendoring)
-        and bool(lock.converts_values) == library.distro.converts_values
-        and lock.inputs == inputs
-        and _outputs_stand(out, lock)
-        and _carries_this_runtime(lock)
-        and not _idlc_is_newer(out / FILE)
-        and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
-    )
-
-
 def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:
     """Return the digests by which interfaces of other packages are recorded."""
     return {str(name): _dependency(str(name), library) for name in names}
@@ -286,29 +261,11 @@ def _runtime() -> dict[str, str]:
     }
 
 
-def _idlc_is_newer(path: Path) -> bool:
-    """Return whether idlc was changed after a lock was written: by a developer, or installed."""
-    return _newest_maker() > path.stat().st_mtime_ns
-
-
 @lru_cache(maxsize=1)
 def _newest_maker() -> int:
-    return last_change(_MAKERS)
-
-
-def last_change(folders: Iterable[Path]) -> int:
-    """Return the time of the last change of a file in these folders or below."""
-    return max(map(_newest, filter(is_folder, folders)))
-
-
-def _newest(folder: str | Path) -> int:
-    newest = 0
-    for entry in os.scandir(folder):
-        if entry.is_file():
-            newest = max(newest, entry.stat().st_mtime_ns)
-        elif not entry.name.startswith((".", "__")):  # caches
-            newest = max(newest, _newest(entry.path))
-    return newest
+    """Return the time at which idlc was last changed: by a developer, or installed."""
+    files = (path for folder in _MAKERS for path in folder.rglob("*.*") if path.suffix != ".pyc")
+    return max(path.stat().st_mtime_ns for path in files)
 
 
 class Output(NamedTuple):
@@ -375,9 +332,22 @@ class Target:
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
-        """Return whether compiling the inputs would change nothing."""
-        is_unchanged = (self.lock is None or self.lock.runtime == self.runtime) and unchanged(
-            self.path, self.lock, self.package, inputs, library, vendoring
+        """Return whether compiling the inputs would change nothing.
+
+        `inputs` are the digests of the input files by name within the package.
+        """
+        lock = self.lock
+        is_unchanged = (
+            lock is not None
+            and (lock.idlc, lock.package) == (__version__, self.package)
+            and lock.runtime == self.runtime
+            and lock.vendors_as(vendoring)
+            and bool(lock.converts_values) == library.distro.converts_values
+            and lock.inputs == inputs
+            and _outputs_stand(self.path, lock)
+            and _carries_this_runtime(lock)
+            and _newest_maker() <= (self.path / FILE).stat().st_mtime_ns
+            and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
         )
         if is_unchanged:
             write.sweep(self.path)

@@ -10,12 +10,11 @@ and texts and sequences make distances variable, so every position modulo eight 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from idlc.model import ir
-
-Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
+from idlc.wire.layout import Messages
 
 #: Arrays of more leaves than these stay one leaf.
 EXPANDED = 64
@@ -55,29 +54,19 @@ def leaves(type_: ir.FieldType, path: str, messages: Messages) -> Iterator[Leaf]
         case ir.Ref():
             yield from structure(messages[type_.target], path, messages)
         case ir.Array():
-            if type_.size * _count(type_.element, messages) <= EXPANDED:
+            element = tuple(leaves(type_.element, "", messages))
+            if type_.size * len(element) <= EXPANDED:
                 for index in range(type_.size):
-                    yield from leaves(type_.element, f"{path}[{index}]", messages)
+                    for leaf in element:
+                        yield leaf._replace(path=f"{path}[{index}]{leaf.path}")
             else:
-                first = next(leaves(type_.element, "", messages))
-                yield Leaf(path, type_, first.align, None)
+                yield Leaf(path, type_, element[0].align, None)
         case ir.Primitive():
             yield Leaf(path, type_, type_.info.size, type_.info.size)
         case ir.String() | ir.Sequence():
             yield Leaf(path, type_, 4, None)
         case ir.Unknown():
             raise ValueError("an unknown type has no bytes")
-
-
-def _count(type_: ir.FieldType, messages: Messages) -> int:
-    match type_:
-        case ir.Array():
-            return type_.size * _count(type_.element, messages)
-        case ir.Ref():
-            fields = messages[type_.target].wire_fields
-            return sum(_count(field.type, messages) for field in fields)
-        case _:
-            return 1
 
 
 _OCTET = frozenset({"byte", "char", "uint8"})
@@ -104,11 +93,7 @@ def reads_alike(old: ir.Message, new: ir.Message, before: Messages, after: Messa
     place; missing fields at the end do no harm, additional ones do.
     """
     runs = _Runs(tuple(structure(old, "", before)), tuple(structure(new, "", after)))
-    try:
-        _Follower(before, after).follow(runs, {_Offset(0)}, at_end=True)
-    except _MisreadError:
-        return False
-    return True
+    return bool(_Follower(before, after).ends(runs, {_Offset(0)}, at_end=True))
 
 
 def type_reads_alike(
@@ -116,12 +101,8 @@ def type_reads_alike(
 ) -> bool:
     """Return whether a field of one type, the last one or not, is read as it was by another."""
     runs = _Runs(tuple(leaves(old, "", before)), tuple(leaves(new, "", after)))
-    starts = {_Offset(at) for at in range(8)}
-    try:
-        ends = _Follower(before, after).follow(runs, starts, at_end=at_end)
-    except _MisreadError:
-        return False
-    return at_end or all(not end.lead for end in ends)
+    ends = _Follower(before, after).ends(runs, {_Offset(at) for at in range(8)}, at_end=at_end)
+    return bool(ends) and (at_end or all(not end.lead for end in ends))
 
 
 class _Runs:
@@ -144,6 +125,13 @@ class _Follower:
         self._before = before
         self._after = after
         self._ends: dict[Hashable, set[_Offset]] = {}
+
+    def ends(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
+        """Return the offsets after two runs; none if a value is misread."""
+        try:
+            return self.follow(runs, starts, at_end=at_end)
+        except _MisreadError:
+            return set()
 
     def follow(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
         """Return the offsets after two runs; raise _MisreadError if a value is misread.

@@ -59,6 +59,7 @@ def multiple_of(align: int) -> Alignment:
     return Alignment(align, 4 % align)
 
 
+#: All structures by name.
 Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 #: The widest alignment in CDR.
 _WIDEST = 8
@@ -144,24 +145,14 @@ class _Layouts:
         return extent
 
     def _repeated(self, element: ir.Element, count: int, at: int) -> Extent:
-        """Return the size of an array; after eight elements at most, all repeats."""
-        start, exact = at, True
-        seen: dict[int, tuple[int, int]] = {}
-        left = count
-        while left:
-            if (residue := at % _WIDEST) in seen:
-                left_then, at_then = seen[residue]
-                rounds = left // (left_then - left)
-                at += rounds * (at - at_then)
-                left -= rounds * (left_then - left)
-                seen.clear()
-                if not left:
-                    break
-            seen[at % _WIDEST] = left, at
-            at += -at % self._alignment(element)
-            size = self._size(element, at)
-            at, exact, left = at + size.size, exact and size.exact, left - 1
-        return Extent(at - start, exact)
+        """Return the size of an array: all its elements but the first are at the same distance."""
+        end, exact = at, True
+        for number in range(min(count, 2)):
+            start = end + -end % self._alignment(element)
+            size = self._size(element, start)
+            repeats = count - 1 if number else 1
+            end, exact = end + repeats * (start + size.size - end), size.exact
+        return Extent(end - at, exact)
 
 
 MAX_FIELDS = 20_000

@@ -6,14 +6,13 @@ variable that holds its owner. Knows sizes and alignments; knows no Python text.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from typing import TypeAlias
 
 import msgspec
 
 from idlc.model import ir, python_names
-
-Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
+from idlc.wire.layout import Messages
 
 
 class Place(msgspec.Struct, frozen=True):
@@ -237,23 +236,19 @@ def _least(step: Step) -> int:
             return 4
 
 
+def walk(body: tuple[Step, ...]) -> Iterator[Step]:
+    """Yield steps, each before those of its elements."""
+    for step in body:
+        yield step
+        if isinstance(step, Items):
+            yield from walk(step.body)
+
+
 def widest(body: tuple[Step, ...]) -> int:
     """Return the widest alignment of all values, counts among them."""
-    return max(map(_width, body), default=1)
-
-
-def _width(step: Step) -> int:
-    match step:
-        case Number() | Dummy() | Block():
-            return step.unit
-        case Numbers():
-            return max(4, step.unit)
-        case Items():
-            return max(4, widest(step.body))
-        case Enter():
-            return 1
-        case _:
-            return 4
+    units = {step.unit for step in walk(body) if isinstance(step, (Number, Block, Numbers))}
+    has_counts = any(not isinstance(step, (Number, Block, Dummy, Enter)) for step in walk(body))
+    return max(units | {4 if has_counts else 1})
 
 
 def is_many(step: Items) -> bool:

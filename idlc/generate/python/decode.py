@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from idlc.generate.python.lines import Block, Comprehension, Group, Line, Statement, call
-from idlc.generate.python.positions import Builder, Cursor, Run, Tables
+from idlc.generate.python.positions import Builder, Cursor, Tables, ValueRun
 from idlc.model import ir
 from idlc.model.names import snake_case
 from idlc.wire import plan
@@ -23,7 +23,7 @@ TOO_MANY = (Line('raise ValueError("too many elements")'),)
 UNENDED = (Line('raise ValueError("text without end")'),)
 
 
-class UnpackedRun(Run):
+class ReadRun(ValueRun):
     """Values with what follows them, and the alignment and size of each."""
 
     def __init__(self) -> None:
@@ -54,10 +54,8 @@ def slice_of(start: str, end: str = "end") -> str:
 def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
     """Return whether a structure holds numeric buffers, which are read through a memoryview."""
     return any(
-        isinstance(step, plan.Numbers)
-        or (isinstance(step, plan.Block) and step.is_large)
-        or (isinstance(step, plan.Items) and is_bulk(step.body))
-        for step in steps
+        isinstance(step, plan.Numbers) or (isinstance(step, plan.Block) and step.is_large)
+        for step in plan.walk(steps)
     )
 
 
@@ -110,14 +108,14 @@ class _Decoder(Builder):
         self.makers = makers
         self.foreign = foreign
         self.source = source
-        self.run = UnpackedRun()
+        self.run = ReadRun()
         self.limited = False
         self.unchecked = False
         self.worded = False
 
     def flush(self, *, last: bool = False) -> None:
         """Emit the run; the position after the `last` one is not needed."""
-        run, self.run = self.run, UnpackedRun()
+        run, self.run = self.run, ReadRun()
         if not run.fields:
             return
         self.unchecked = False
@@ -142,7 +140,7 @@ class _Decoder(Builder):
                 self.position = run.skipped(self.position).at("at")
         self.body += run.after
 
-    def reader(self, run: Run, start: int | None) -> str:
+    def reader(self, run: ValueRun, start: int | None) -> str:
         """Return the function that reads a run, or without `start` a table of Structs."""
         return self.tables.struct("read", run.path, run.fields, start, "unpack_from")
 
@@ -217,7 +215,7 @@ class _Decoder(Builder):
 
     # Values of fixed size.
 
-    def fixed(self, step: plan.Plain, run: UnpackedRun) -> None:
+    def fixed(self, step: plan.Plain, run: ReadRun) -> None:
         """Add a value to a run."""
         if isinstance(step, plan.Dummy):
             run.add(step.code, 1, "", "nothing")
@@ -354,7 +352,7 @@ class _Decoder(Builder):
         self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)
-        run = UnpackedRun()
+        run = ReadRun()
         entered: list[Statement] = []
         for part in step.body:
             if isinstance(part, plan.Enter):

@@ -9,6 +9,8 @@ statement reads it.
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 from msgspec.structs import replace
 
 from idlc.generate.python.lines import (
@@ -21,17 +23,20 @@ from idlc.generate.python.lines import (
     Put,
     Statement,
     call,
+    flat,
 )
-from idlc.generate.python.positions import Builder, Cursor, Run, Tables
+from idlc.generate.python.positions import Builder, Cursor, Tables, ValueRun
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
 
 def encode(steps: tuple[plan.Step, ...], tables: Tables) -> tuple[Statement, ...]:
     """Return the statements that write a message; what they use is defined in `tables`."""
-    encoder = _Encoder(tables, Alignment(), plan.widest(steps))
+    encoder = _Encoder(tables, Alignment(), 8)
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"), "head")
+    widths = [*accumulate((plan.widest((step,)) for step in reversed(steps)), max)]
     for step in steps:
+        encoder.widest = widths.pop()
         encoder.step(step)
     encoder.flush(1)
     return _joined(_pruned(tuple(encoder.body), live=False)[0], tuple(encoder.again))
@@ -113,7 +118,7 @@ _BEGUN = Line("parts.append", "put")
 class _Encoder(Builder):
     """Emits statements that write; `run` is not yet emitted, `position` is after it.
 
-    Positions matter modulo `widest` only.
+    Positions matter modulo `widest` only, the widest alignment of this step and those after it.
     """
 
     def __init__(self, tables: Tables, alignment: Alignment, widest: int) -> None:
@@ -121,7 +126,7 @@ class _Encoder(Builder):
         self.widest = widest
         #: Conditions that hold if another thread changed the length of an uncopied array.
         self.again: list[str] = []
-        self.run, self.start, self.text_size = Run(), alignment, ""
+        self.run, self.start, self.text_size = ValueRun(), alignment, ""
 
     def step(self, step: plan.Step) -> None:
         """Emit one step."""
@@ -205,7 +210,7 @@ class _Encoder(Builder):
             writer = self.tables.struct("write", run.path, run.fields, residue, "pack", align)
             self.body.append(Put(Group(f"{writer}{key}", tuple(run.values)), not known))
             self.position = self.position.aligned(align)
-            self.run = Run()
+            self.run = ValueRun()
 
     def note_position(self) -> None:
         """Note the position in `at`, unless all that matters of it is known."""
@@ -321,9 +326,9 @@ class _Encoder(Builder):
         lines = [Line(place.text, place.local) for place in places]
         lines.append(Line(Group("", tuple(parts)), rows, "+="))
         loop = f"for {step.item} in {local}"
-        values = Group("", tuple(place.text for place in places)).flat()
+        values = flat(Group("", tuple(place.text for place in places)))
         texts = Comprehension("each", ((step.item, local), ("each", values)))
-        unsized = call(self.tables.function("unsized", "unsized"), texts.flat())
+        unsized = call(self.tables.function("unsized", "unsized"), flat(texts))
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
         attempt = Block("try:", (Block(f"{loop}:", tuple(lines)),))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from textwrap import dedent
-from typing import NamedTuple
 
 import msgspec
 
+from idlc.generate.idl import idl_text
 from idlc.generate.python import literals
 from idlc.generate.python.imports import References
 from idlc.model import ir, python_names
@@ -176,24 +176,6 @@ def numeric_class(type_: ir.Sequence | ir.Array) -> str:
     return f"_idlc.{stem}Sequence" if isinstance(type_, ir.Sequence) else f"_arrays.{stem}Array"
 
 
-def idl_text(type_: ir.FieldType) -> str:
-    """Return a type as rosidl's `get_fields_and_field_types` spells it."""
-    match type_:
-        case ir.Array(element, size):
-            return f"{idl_text(element)}[{size}]"
-        case ir.Sequence(element, bound):
-            limit = "" if bound is None else f", {bound}"
-            return f"sequence<{idl_text(element)}{limit}>"
-        case ir.String(wide, bound):
-            return ("wstring" if wide else "string") + ("" if bound is None else f"<{bound}>")
-        case ir.Ref(target):
-            return f"{target.package}/{target.name}"
-        case ir.Primitive():
-            return type_.info.idl
-        case ir.Unknown():
-            raise ValueError("an unknown type cannot be emitted")
-
-
 def view(
     field: ir.Field, references: References, naming: Naming, file: str, *, converts: bool
 ) -> FieldView:
@@ -202,7 +184,7 @@ def view(
     With `converts`, `None` is the default of any field, and a list is made of any iterable.
     """
     name = python_names.field(field.name)
-    shape = _shape(field, references, naming, converts=converts)
+    annotation, parameter, fresh = _shape(field, references, naming, converts=converts)
     # type checkers take a field of a method's name for a mistake
     ignored = "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
     is_list = isinstance(field.type, (ir.Array, ir.Sequence))
@@ -211,11 +193,11 @@ def view(
         wire_name=Code(field.name),
         slot=Code(python_names.slot(field.name)),
         idl=Code(idl_text(field.type)),
-        annotation=Code(shape.annotation + ignored),
-        parameter=Code(shape.parameter),
-        fresh=Code(shape.fresh),
+        annotation=Code(annotation + ignored),
+        parameter=Code(parameter),
+        fresh=Code(fresh),
         docstring=attribute(field, file),
-        numbers=shape.numbers,
+        numbers=bool(support(field.type)),
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
         is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
     )
@@ -230,38 +212,31 @@ def usual_class(field: ir.Field, references: References, naming: Naming) -> Code
     return Code(_builtin(_element(field.type, references), naming))
 
 
-class _Shape(NamedTuple):
-    """The code that fields of one kind share."""
-
-    annotation: str
-    parameter: str
-    fresh: str = ""
-    numbers: bool = False
-
-
-def _shape(field: ir.Field, references: References, naming: Naming, *, converts: bool) -> _Shape:
+def _shape(
+    field: ir.Field, references: References, naming: Naming, *, converts: bool
+) -> tuple[str, str, str]:
+    """Return a field's annotation, its parameter and its fresh default."""
     element = _builtin(_element(ir.element_of(field.type), references), naming)
     if isinstance(field.type, (ir.Primitive, ir.String)):
         default = _scalar_default(field)
         if converts:
-            return _Shape(element, f"{element} | None = None", default)
-        return _Shape(element, f"{element} = {default}")
+            return element, f"{element} | None = None", default
+        return element, f"{element} = {default}", ""
     if isinstance(field.type, ir.Ref):
-        return _Shape(element, f"{element} | None = None", f"{element}()")
-    numbers = support(field.type)
-    if numbers:
-        return _numbers(field, numbers, naming)
-    if field.default is not None:
-        fresh = f"{naming.receiver}.{default_name(field)}"
-    else:
-        fresh = _fresh_list(field, references)
-    if converts:
+        return element, f"{element} | None = None", f"{element}()"
+    if support(field.type):
+        annotation, values, fresh = _numbers(field.type)
+    elif converts:
         inside = getattr(ir.element_of(field.type), "name", "")
         read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
         annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({read})"
-        return _Shape(annotation, f"_idlc.Iterable[{element}] | None = None", fresh)
-    annotation = f"{naming.builtins}list[{element}]"
-    return _Shape(annotation, f"{annotation} | None = None", fresh)
+        values, fresh = f"_idlc.Iterable[{element}]", _fresh_list(field, references)
+    else:
+        annotation = values = f"{naming.builtins}list[{element}]"
+        fresh = _fresh_list(field, references)
+    if field.default is not None:
+        fresh = f"{naming.receiver}.{default_name(field)}"
+    return annotation, f"{values} | None = None", fresh
 
 
 def _builtin(name: str, naming: Naming) -> str:
@@ -319,23 +294,16 @@ def _fresh_list(field: ir.Field, references: References) -> str:
     return "[]"
 
 
-def _numbers(field: ir.Field, kind: str, naming: Naming) -> _Shape:
-    assert isinstance(field.type, (ir.Sequence, ir.Array))
-    assert isinstance(field.type.element, ir.Primitive)
-    descriptor = numeric_class(field.type)
-    if kind == "sequence":
-        values = "_idlc.Floats" if "Float" in descriptor else "_idlc.Integers"
-        annotation = f"{descriptor} = {descriptor}()"
-        fresh = f'_array("{field.type.element.info.code}")'
-    else:
-        assert isinstance(field.type, ir.Array)
-        size = field.type.size
-        values = "_arrays.Values"
-        annotation = f"{descriptor} = {descriptor}({size})"
-        fresh = f"_arrays.zeros({size}, _arrays.{field.type.element.info.dtype.upper()})"
-    if field.default is not None:
-        fresh = f"{naming.receiver}.{default_name(field)}"
-    return _Shape(annotation, f"{values} | None = None", fresh, True)
+def _numbers(type_: ir.FieldType) -> tuple[str, str, str]:
+    """Return the annotation of an array of numbers, what it takes, and its fresh default."""
+    assert isinstance(type_, (ir.Sequence, ir.Array))
+    assert isinstance(type_.element, ir.Primitive)
+    descriptor, info = numeric_class(type_), type_.element.info
+    if isinstance(type_, ir.Array):
+        fresh = f"_arrays.zeros({type_.size}, _arrays.{info.dtype.upper()})"
+        return f"{descriptor} = {descriptor}({type_.size})", "_arrays.Values", fresh
+    values = "_idlc.Integers" if info.low is not None else "_idlc.Floats"
+    return f"{descriptor} = {descriptor}()", values, f'_array("{info.code}")'
 
 
 def default_name(field: ir.Field) -> str:

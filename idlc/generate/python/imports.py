@@ -12,7 +12,7 @@ import msgspec
 
 from idlc.model import derive, ir, link, python_names
 from idlc.project.templates import Code, Text
-from idlc.wire import plan
+from idlc.wire.layout import Messages
 
 
 def natural(name: str) -> list[tuple[int, str]]:
@@ -74,25 +74,6 @@ VENDORING = Surroundings(others=".vendor.")
 VENDORED = Surroundings(runtime="....", others="...vendor.")
 
 
-class Homes:
-    """The module of each structure of a package, without the package and the kind."""
-
-    def __init__(
-        self,
-        interface: ir.Interface,
-        modules: python_names.Modules,
-        surroundings: Surroundings = ALONE,
-    ) -> None:
-        self.modules = modules
-        self.surroundings = surroundings
-        self.classes = modules[interface.name]
-        self.structures = {message.name for message in derive.messages(interface)}
-
-    def of(self, structure: ir.TypeName) -> python_names.ModuleName:
-        """Return the module that defines a structure's class."""
-        return self.classes if structure in self.structures else self.modules[structure]
-
-
 class References:
     """The names of all classes that a module mentions.
 
@@ -104,11 +85,14 @@ class References:
         self,
         interface: ir.Interface,
         structures: Iterable[ir.Message],
-        messages: plan.Messages,
-        homes: Homes,
+        messages: Messages,
+        modules: python_names.Modules,
+        surroundings: Surroundings,
     ) -> None:
-        self._homes = homes
-        self.surroundings = homes.surroundings
+        self._modules = dict(modules)
+        for message in derive.messages(interface):
+            self._modules[message.name] = modules[interface.name]
+        self.surroundings = surroundings
         self.package = interface.name.package
         self.kind = interface.name.kind
         self.own = {message.name for message in structures}
@@ -155,9 +139,9 @@ class References:
                 group = inside if self.surroundings.vendors else outside
                 group[self.surroundings.module(type_)].add(name)
             elif type_.kind == self.kind:
-                inside[f".{self._homes.of(type_)}"].add(name)
+                inside[f".{self._modules[type_]}"].add(name)
             else:
-                inside[f"..{type_.kind}.{self._homes.of(type_)}"].add(name)
+                inside[f"..{type_.kind}.{self._modules[type_]}"].add(name)
         return (
             [
                 line
@@ -177,7 +161,7 @@ def _nearness(statement: tuple[str, set[str]]) -> tuple[int, str]:
     return len(module.lstrip(".")) - len(module), module
 
 
-def _closure(own: set[ir.TypeName], messages: plan.Messages) -> set[ir.TypeName]:
+def _closure(own: set[ir.TypeName], messages: Messages) -> set[ir.TypeName]:
     closure: set[ir.TypeName] = set()
     waiting = list(own)
     while waiting:

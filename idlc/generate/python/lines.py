@@ -17,18 +17,6 @@ class Group(msgspec.Struct, frozen=True):
     items: tuple[Node, ...]
     brackets: str = "()"
 
-    @property
-    def is_flat(self) -> bool:
-        """True if it is on one line."""
-        return len(self.items) < 2 and all(isinstance(i, str) or i.is_flat for i in self.items)
-
-    def flat(self) -> str:
-        """Return the group on one line."""
-        inner = ", ".join([item if isinstance(item, str) else item.flat() for item in self.items])
-        if len(self.items) == 1 and self.brackets == "()" and not self.before:
-            inner += ","
-        return f"{self.before}{self.brackets[0]}{inner}{self.brackets[1]}"
-
 
 class Comprehension(msgspec.Struct, frozen=True):
     """A list comprehension: its element; the targets and iterable of each `for`."""
@@ -37,19 +25,9 @@ class Comprehension(msgspec.Struct, frozen=True):
     loops: tuple[tuple[str, str], ...]
 
     @property
-    def is_flat(self) -> bool:
-        """True if it is on one line."""
-        return isinstance(self.element, str) or self.element.is_flat
-
-    @property
     def clauses(self) -> list[str]:
         """All that follows the element."""
         return [f"for {targets} in {values}" for targets, values in self.loops]
-
-    def flat(self) -> str:
-        """Return the comprehension on one line."""
-        element = self.element if isinstance(self.element, str) else self.element.flat()
-        return f"[{element} {' '.join(self.clauses)}]"
 
 
 Node: TypeAlias = str | Group | Comprehension
@@ -92,13 +70,34 @@ def call(function: str, *arguments: str) -> str:
     return f"{function}({', '.join(arguments)})"
 
 
+def is_flat(node: Node) -> bool:
+    """Return whether a node is on one line."""
+    match node:
+        case Group(_, items):
+            return len(items) < 2 and all(map(is_flat, items))
+        case Comprehension(element):
+            return is_flat(element)
+        case _:
+            return True
+
+
+def flat(node: Node) -> str:
+    """Return a node on one line."""
+    match node:
+        case Group(before, items, brackets):
+            comma = "," if len(items) == 1 and not before and brackets == "()" else ""
+            return f"{before}{brackets[0]}{', '.join(map(flat, items))}{comma}{brackets[1]}"
+        case Comprehension(element):
+            return f"[{flat(element)} {' '.join(node.clauses)}]"
+        case _:
+            return node
+
+
 def layout_lines(node: Node, indent: int, before: str = "", after: str = "") -> list[str]:
     """Return `before`, the node and `after` as lines, indented by `indent` columns."""
     margin = " " * indent
-    if isinstance(node, str):
-        return [f"{margin}{before}{node}{after}"]
-    if node.is_flat:
-        return [f"{margin}{before}{node.flat()}{after}"]
+    if isinstance(node, str) or is_flat(node):
+        return [f"{margin}{before}{flat(node)}{after}"]
     if isinstance(node, Comprehension):
         inner = layout_lines(node.element, indent + 4)
         inner += [f"{margin}    {clause}" for clause in node.clauses]

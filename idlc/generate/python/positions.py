@@ -65,7 +65,7 @@ class Cursor(msgspec.Struct, frozen=True):
         return replace(self, alignment=alignment)
 
 
-class Run:
+class ValueRun:
     """Fixed-size values that are written or read together; `path` is that of the first.
 
     `values` are what is written, or where what is read is stored.

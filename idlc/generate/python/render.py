@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 import jinja2
 import msgspec
 
+from idlc.generate.idl import idl_text
 from idlc.generate.python import classes, fields, imports
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
 from idlc.generate.python.encode import encode
-from idlc.generate.python.imports import ALONE, Homes, References, Surroundings
+from idlc.generate.python.imports import ALONE, References, Surroundings
 from idlc.generate.python.lines import call, text_of
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.positions import Tables
@@ -31,6 +32,7 @@ from idlc.runtime import PROTOCOL
 from idlc.runtime.names import stamp
 from idlc.version import RUNTIME, __version__
 from idlc.wire import plan
+from idlc.wire.layout import Messages
 
 
 class CodecView(msgspec.Struct, frozen=True):
@@ -47,7 +49,7 @@ class CodecView(msgspec.Struct, frozen=True):
     has_texts: bool
 
 
-def codec(structure: ir.Message, references: References, messages: plan.Messages) -> CodecView:
+def codec(structure: ir.Message, references: References, messages: Messages) -> CodecView:
     """Return the view of a structure's codec."""
     names = python_names.Locals()
     steps = plan.steps(structure, messages, names)
@@ -84,7 +86,7 @@ def _makers(
     own: ir.Message,
     steps: tuple[plan.Step, ...],
     references: References,
-    messages: plan.Messages,
+    messages: Messages,
     tables: Tables,
 ) -> dict[ir.TypeName, str]:
     """Return the functions that make empty objects of the message and of those in it.
@@ -92,7 +94,8 @@ def _makers(
     They demand that classes of the package have the fields that the codec was made for.
     """
     makers: dict[ir.TypeName, str] = {}
-    for type_ in (own.name, *_types(steps)):
+    nested = (step.type for step in plan.walk(steps) if isinstance(step, (plan.Enter, plan.Items)))
+    for type_ in (own.name, *nested):
         if type_ not in makers:
             name = "kind" if type_ == own.name else references.name(type_)
             stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
@@ -104,17 +107,7 @@ def _makers(
 
 
 def _stamp(message: ir.Message) -> int:
-    return stamp({field.name: fields.idl_text(field.type) for field in message.fields})
-
-
-def _types(steps: tuple[plan.Step, ...]) -> list[ir.TypeName]:
-    types: list[ir.TypeName] = []
-    for step in steps:
-        if isinstance(step, plan.Enter):
-            types.append(step.type)
-        elif isinstance(step, plan.Items):
-            types += [step.type, *_types(step.body)]
-    return types
+    return stamp({field.name: idl_text(field.type) for field in message.fields})
 
 
 def type_data_source(model: link.Model, surroundings: Surroundings = ALONE) -> str:
@@ -186,7 +179,7 @@ HIDING_PRAGMAS = (Code("# pyright: reportIncompatibleMethodOverride=false"),)
 
 def module_views(
     interface: ir.Interface,
-    messages: plan.Messages,
+    messages: Messages,
     names: python_names.Modules,
     surroundings: Surroundings = ALONE,
     *,
@@ -196,12 +189,12 @@ def module_views(
 
     With `converts`, classes convert values as Lyrical's do.
     """
-    homes = Homes(interface, names, surroundings)
-    written = derive.sections(interface)
-    view = _classes(interface, written, References(interface, written, messages, homes), converts)
-    yield Module(interface.name.kind, f"{interface.name.kind}/{homes.classes}.py", view)
+    home, written = names[interface.name], derive.sections(interface)
+    references = References(interface, written, messages, names, surroundings)
+    view = _classes(interface, written, references, converts)
+    yield Module(interface.name.kind, f"{interface.name.kind}/{home}.py", view)
     sent = written + derive.composites(interface)
-    references = References(interface, sent, messages, homes)
+    references = References(interface, sent, messages, names, surroundings)
     codecs = tuple(codec(structure, references, messages) for structure in sent)
     view = ModuleView(
         origin=Text(f"{interface.name}.{interface.name.kind}"),
@@ -211,7 +204,7 @@ def module_views(
         codecs=codecs,
         has_texts=any(codec.has_texts for codec in codecs),
     )
-    path = f"{interface.name.kind}/{python_names.codec_module(homes.classes)}.py"
+    path = f"{interface.name.kind}/{python_names.codec_module(home)}.py"
     yield Module("codec", path, view)
 
 
