@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from idlc.check import names, portability, style
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.model import ir
 from idlc.model.link import Model, dependents
-
-if TYPE_CHECKING:
-    from idlc.project.package_xml import Facts
+from idlc.project.package_xml import Facts
 
 Rule: TypeAlias = Callable[[Model], Iterable[Diagnostic]]
 Findings: TypeAlias = dict[ir.TypeName, tuple[Diagnostic, ...]]

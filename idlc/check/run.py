@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.check.compiler import Compiler, library_for, stage
 from idlc.check.package.facts import facts
+from idlc.check.registry import IncrementalFindings
 from idlc.check.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.source import Source
+from idlc.model import link
+from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import KINDS, list_files, no_interfaces
+from idlc.project.package_xml import Facts
 from idlc.project.settings import Scope
-
-if TYPE_CHECKING:
-    from idlc.check.registry import IncrementalFindings
-    from idlc.diagnostics.source import Source
-    from idlc.model import link
-    from idlc.model.link import Model
-    from idlc.project.package_xml import Facts
 
 #: Rounds of fixes: one may depend on another, or edit the same range.
 _ROUNDS = 5

@@ -5,21 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Severity
+from idlc.diagnostics.report import Diagnostic, Edit, Report, Severity
 from idlc.diagnostics.source import Source, Span
 from idlc.language import tree
 from idlc.language.parse import parse
-from idlc.project.settings import Table, Texts, command_table, read_value
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Report
-    from idlc.project.settings import Config
+from idlc.project.settings import Config, Table, Texts, command_table, read_value
 
 
 def is_selector(word: str) -> bool:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import datetime
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -38,9 +39,6 @@ from idlc.project.package_xml import read_statements
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope
 from idlc.wire.layout import ContentSizes, oversized
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 GIT = "git:"
 _CHECK_OUT = "`git sparse-checkout disable` checks out all files"

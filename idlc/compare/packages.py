@@ -6,7 +6,7 @@ import datetime
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -20,10 +20,7 @@ from idlc.diagnostics.text import edit_distance
 from idlc.model import derive, ir
 from idlc.model.ir import meaning
 from idlc.model.link import Model
-from idlc.project.settings import TableLocation, Tables, Text, command_table, read_table
-
-if TYPE_CHECKING:
-    from idlc.project.settings import Config
+from idlc.project.settings import Config, TableLocation, Tables, Text, command_table, read_table
 
 #: A renamed interface is searched among this many interfaces of equal content.
 CANDIDATES = 50

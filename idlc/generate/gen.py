@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -36,9 +37,6 @@ from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
 from idlc.recordings.find import split_recordings
 from idlc.version import __version__
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class GenOptions(NamedTuple):

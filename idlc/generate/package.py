@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from msgspec import UNSET
 
@@ -13,13 +13,11 @@ from idlc.diagnostics.report import Report
 from idlc.generate.target import Target, dependencies
 from idlc.model import derive, ir
 from idlc.model.distros import Distro
+from idlc.model.link import Model
 from idlc.project import lock
 from idlc.project.library import Library
 from idlc.project.write import Plan
 from idlc.version import __version__
-
-if TYPE_CHECKING:
-    from idlc.model.link import Model
 
 
 class Package(NamedTuple):

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from idlc.check.compiler import Compiler
 from idlc.diagnostics.report import Report
 from idlc.generate.package import Package, as_inputs, package_of
 from idlc.generate.target import Target
 from idlc.model import derive
+from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.inputs import accept_name
 from idlc.project.lock import Vendoring
 from idlc.project.write import Plan
-
-if TYPE_CHECKING:
-    from idlc.model.link import Model
 
 
 def planned(

@@ -12,13 +12,10 @@ import stat
 import sys
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic, Report
 
 
 @cache

@@ -10,20 +10,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.text import closest
+from idlc.model.ir import Kind
 from idlc.project.files import entries, is_file, is_folder, kind_of, unreadable
-from idlc.project.root import MANIFEST
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic
-    from idlc.model.ir import Kind
-    from idlc.project.root import Root
+from idlc.project.root import MANIFEST, Root
 
 
 class Exclusion(msgspec.Struct, frozen=True):

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import closest, did_you_mean, including
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
@@ -20,11 +21,8 @@ from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
 from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import installed
+from idlc.project.root import Root
 from idlc.project.settings import Scope
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.source import Source
-    from idlc.project.root import Root
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 

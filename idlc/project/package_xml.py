@@ -7,21 +7,18 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from xml.parsers import expat
 
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Edit, Report, apply
+from idlc.diagnostics.report import Diagnostic, Edit, Report, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.project.edits import Edited, Outcome, Refused
 from idlc.project.files import read_bytes
 from idlc.project.lock import Runtime
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic
-    from idlc.project.root import Root
+from idlc.project.root import Root
 
 
 class Statement(msgspec.Struct, frozen=True):

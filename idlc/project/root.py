@@ -9,14 +9,11 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.project import files, lock
 from idlc.project.files import is_file
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.source import Source
 
 MANIFEST = "package.xml"
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import (
-    TYPE_CHECKING,
     Annotated,
     Any,
     Literal,
@@ -25,7 +24,7 @@ from msgspec import Meta
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.codes import BAD_CONFIG
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, DEFAULT, Distro, split_names, unknown_distro
@@ -33,10 +32,7 @@ from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
 from idlc.project.lock import Runtime, Vendoring
 from idlc.project.prefixes import distribution
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic
-    from idlc.project.root import Root
+from idlc.project.root import Root
 
 Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]

@@ -12,17 +12,15 @@ import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from idlc.diagnostics import codes
 from idlc.diagnostics import report as diagnostics
+from idlc.diagnostics.report import Diagnostic, Edit, Report
 from idlc.project.atomic import create, exclusive, make_folder, move_over, uninterrupted
 from idlc.project.files import entries, reason
 from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic, Edit, Report
-    from idlc.project.root import Root
+from idlc.project.root import Root
 
 #: Files of a package that are the user's where they exist already.
 YIELDING = frozenset({"__init__.py", "py.typed"})

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.project import lock
 from idlc.project.files import entries
 from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import Facts, GeneratedOutput, statements
+from idlc.project.root import Root
 from idlc.project.settings import Scope
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.source import Source
-    from idlc.project.root import Root
 
 #: Python packages of ROS 2 that have no interfaces.
 _LIBRARIES = frozenset(
