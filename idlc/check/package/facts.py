@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.project import lock
+from idlc.project.files import entries
 from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
@@ -136,15 +137,12 @@ def _files(folder: Path) -> Iterator[Path]:
     waiting = [folder]
     while waiting:
         current = waiting.pop()
-        try:
-            entries = sorted(current.iterdir())
-        except OSError:
-            continue
+        inside = entries(current)
         if current != folder and any(
-            entry.name in CLOSING or entry.name == "package.xml" for entry in entries
+            entry.name in CLOSING or entry.name == "package.xml" for entry in inside
         ):
             continue
-        for entry in entries:
+        for entry in inside:
             if entry.name.startswith(".") or entry.name in SKIPPED:
                 continue
             if entry.is_dir() and not entry.is_symlink():
