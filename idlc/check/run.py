@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -116,15 +116,10 @@ def _check_once(options: CheckOptions, report: Report) -> tuple[CheckResult, lis
     for path in listing.empty:
         if not any(package.home.is_relative_to(root.absolute(path)) for package in packages):
             report.add(no_interfaces(path, root, scope.exclude, also="package.xml and no "))
-    reports: dict[str, Report] = {}
-    models: list[Model] = []
-    for distro, checker in checkers(packages, scope).items():
-        reports[distro] = Report()
-        models += checker.check(packages, reports[distro])
+    problems, models = check_all(checkers(packages, scope), packages, options.selection)
     files = tuple(file.shown for file in listing.files)
-    distros = tuple(reports) if len(reports) > 1 else ()
-    checked = CheckResult(files, len(packages), distros=distros)
-    return checked, select_problems(reports, models, options.selection)
+    distros = tuple(models) if len(models) > 1 else ()
+    return CheckResult(files, len(packages), distros=distros), problems
 
 
 def checkers(
@@ -191,23 +186,28 @@ class Checker:
         return msgspec.structs.replace(current, inputs=package.digests)
 
 
-def select_problems(
-    reports: Mapping[str, Report], models: Iterable[Model], selection: Selection
-) -> list[Diagnostic]:
-    """Return the problems to show from the reports of all distributions, each once."""
+def check_all(
+    checkers: Mapping[str, Checker], packages: Sequence[inputs.Inputs], selection: Selection
+) -> tuple[list[Diagnostic], dict[str, list[Model]]]:
+    """Return the problems to show, each once, and the models for each distribution."""
+    reports = {distro: Report() for distro in checkers}
+    models = {
+        distro: checker.check(packages, reports[distro]) for distro, checker in checkers.items()
+    }
     texts = {
         interface.source.path: interface.source
-        for model in models
+        for some in models.values()
+        for model in some
         for interface in model.own
         if interface.source
     }
     sources = list(texts.values())
     if len(reports) == 1:
         (everything,) = reports.values()
-        return _selected(everything, sources, selection)
+        return _selected(everything, sources, selection), models
     from idlc.diagnostics.report import merge, without_overruled
 
-    return list(without_overruled(_selected(merge(reports), sources, selection)))
+    return list(without_overruled(_selected(merge(reports), sources, selection))), models
 
 
 def _selected(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:

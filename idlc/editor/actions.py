@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from idlc.check.format import laid_out
 from idlc.check.package.manifest import dependency
@@ -26,11 +26,11 @@ from idlc.editor.parts import (
     RangeParams,
     TextEdit,
 )
-from idlc.editor.problems import DocumentDiagnostic, problems, to_diagnostic
+from idlc.editor.problems import DocumentDiagnostic, Problem, problems
 from idlc.editor.protocol import INVALID_PARAMS, REQUEST_FAILED, RequestError
 from idlc.editor.rename import can_move_files, rename_interface
 from idlc.editor.state import InterfaceContext, ServerState
-from idlc.editor.workspace import Snapshot
+from idlc.editor.workspace import in_folder
 
 if TYPE_CHECKING:
     from idlc.generate.gen import Run
@@ -57,35 +57,12 @@ class CodeAction(Part, frozen=True):
     command: dict[str, object] | None = None
 
 
-class ProblemInContext(NamedTuple):
-    """A problem of a document, with the snapshot and the state that its edits need."""
-
-    diagnostic: Diagnostic
-    snapshot: Snapshot
-    path: Path
-    state: ServerState
-
-    @property
-    def shown(self) -> DocumentDiagnostic:
-        """The problem as the client has it."""
-        return to_diagnostic(self.diagnostic, self.snapshot.folder, self.state)
-
-    def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> CodeAction:
-        """Return an action on this problem."""
-        change = workspace_edit(by_uri(edits, self.snapshot, self.state), self.state)
-        return CodeAction(title, _FIX, change, (self.shown,), best)
-
-
 def actions(state: ServerState, params: CodeActionParams) -> list[CodeAction]:
     """Return actions on the problems in a range, and on all of a document."""
     state.notice_changes()  # or edits may be of older files
     uri, only = params.text_document.uri, params.context.only
     path = state.path(uri)
-    all_ = [
-        ProblemInContext(diagnostic, snapshot, at, state)
-        for at, diagnostic, snapshot in problems(state)
-        if at == path
-    ]
+    all_ = [problem for problem in problems(state) if problem.path == path]
     offered: list[CodeAction] = []
     if _is_requested(_FIX, only):
         for problem in all_:
@@ -110,24 +87,31 @@ def _touch(range_: Range, other: Range) -> bool:
     return start <= last and first <= end
 
 
-def _about(problem: ProblemInContext) -> Iterator[CodeAction]:
+def _action(
+    problem: Problem, title: str, edits: Iterable[Edit], *, best: bool = False
+) -> CodeAction:
+    change = workspace_edit(by_uri(edits, problem.workspace.folder, problem.state), problem.state)
+    return CodeAction(title, _FIX, change, (problem.shown,), best)
+
+
+def _about(problem: Problem) -> Iterator[CodeAction]:
     diagnostic = problem.diagnostic
     if diagnostic.edits:
         hint = diagnostic.hint or f"fix {diagnostic.code}"
-        yield problem.action(hint[:1].upper() + hint[1:], diagnostic.edits, best=True)
+        yield _action(problem, hint[:1].upper() + hint[1:], diagnostic.edits, best=True)
     elif diagnostic.span is not None:
         best = bool(_MEANT.match(diagnostic.hint or ""))
         for title, edit in _offers(diagnostic.hint or "", diagnostic.span):
             if _helps(problem, edit):
-                yield problem.action(title, [edit], best=best)
+                yield _action(problem, title, [edit], best=best)
     if can_move_files(problem.state) and (moved := _moved(problem)):
         yield moved
     remark = _remark(problem) if diagnostic.severity is Severity.WARNING else None
     if remark is not None and _helps(problem, remark):
-        yield problem.action(f"Ignore {diagnostic.code} here", [remark])
+        yield _action(problem, f"Ignore {diagnostic.code} here", [remark])
 
 
-def _moved(problem: ProblemInContext) -> CodeAction | None:
+def _moved(problem: Problem) -> CodeAction | None:
     """Return the action that gives a file the name that a hint says, if nothing has it."""
     hint = _OTHER_FILE.match(problem.diagnostic.hint or "")
     if hint is None or os.path.lexists(problem.path.with_name(hint[1])):
@@ -177,12 +161,14 @@ def _instead(span: Span, word: str) -> Edit:
     return Edit(span, word)
 
 
-def _helps(problem: ProblemInContext, edit: Edit) -> bool:
+def _helps(problem: Problem, edit: Edit) -> bool:
     """Return whether a check of the text after an edit finds fewer problems."""
-    workspace = problem.state.workspace_of(problem.path)
     text, _ = apply(edit.span.source.text, [edit])
-    after = workspace.snapshot_with(problem.path, text) if workspace else None
-    return after is not None and _count(after.problems) < _count(problem.snapshot.problems)
+    before = problem.workspace.snapshot()
+    after = problem.workspace.snapshot_with(problem.path, text)
+    if before is None or after is None:
+        return False
+    return _count(after.problems) < _count(before.problems)
 
 
 def _count(diagnostics: Iterable[Diagnostic]) -> tuple[int, int]:
@@ -191,11 +177,12 @@ def _count(diagnostics: Iterable[Diagnostic]) -> tuple[int, int]:
     return severities.count(Severity.ERROR), len(severities)
 
 
-def _remark(problem: ProblemInContext) -> Edit | None:
+def _remark(problem: Problem) -> Edit | None:
     """Return the edit that adds a remark to the line of a problem, or to the head of its file."""
-    if problem.path not in problem.snapshot.interfaces:
+    snapshot = problem.workspace.snapshot()
+    if snapshot is None or problem.path not in snapshot.interfaces:
         return None
-    source = problem.snapshot.interfaces[problem.path][1]
+    source = snapshot.interfaces[problem.path][1]
     code, span = problem.diagnostic.code, problem.diagnostic.span
     if span is None or not span.text:
         return Edit(Span(source, 0, 0), f"# idlc: ignore[{code}] TODO: say why\n")
@@ -212,14 +199,14 @@ def _remark(problem: ProblemInContext) -> Edit | None:
     return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: say why")
 
 
-def _everything(all_: list[ProblemInContext], uri: str, state: ServerState) -> Iterator[CodeAction]:
+def _everything(all_: list[Problem], uri: str, state: ServerState) -> Iterator[CodeAction]:
     """Yield the action that applies every fix of a document, as `idlc check --fix` does."""
     fixed = [problem for problem in all_ if problem.diagnostic.edits]
     edits = [
         edit
         for problem in fixed
         for edit in problem.diagnostic.edits
-        if problem.snapshot.path_of(edit.span.source) == problem.path
+        if in_folder(problem.workspace.folder, edit.span.source.path) == problem.path
     ]
     if not edits:
         return
@@ -257,7 +244,7 @@ def _declare(context: InterfaceContext | None, package: str) -> None:
     edit = dependency(facts, package) if facts else None
     if context is not None and edit is not None:
         state = context.state
-        change = workspace_edit(by_uri([edit], context.snapshot, state), state)
+        change = workspace_edit(by_uri([edit], context.workspace.folder, state), state)
         state.ask("workspace/applyEdit", {"label": f"declare {package}", "edit": change})
 
 

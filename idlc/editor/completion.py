@@ -15,7 +15,7 @@ from idlc.check.style import QUANTITIES, expects_unit
 from idlc.diagnostics.codes import CODES
 from idlc.diagnostics.report import Severity
 from idlc.diagnostics.terminal import counted
-from idlc.editor.descriptions import code, markdown, shortened
+from idlc.editor.descriptions import code, markdown
 from idlc.editor.documents import Document, characters, in_lines, lines_of, units
 from idlc.editor.elements import has_letters
 from idlc.editor.parts import Part, Position, PositionParams, Range, TextEdit
@@ -114,10 +114,6 @@ class TypedLine(NamedTuple):
             self.undeclared[package] = edit is not None
         return self.undeclared[package]
 
-    def after(self, start: int) -> str:
-        """Return the text that was typed after a position in the line."""
-        return self.before[characters(self.before, start, self.state.encoding) :]
-
     def replacing(self, length: int, text: str) -> TextEdit:
         """Return the edit that puts a text in the place of the last characters."""
         encoding = self.state.encoding
@@ -137,15 +133,15 @@ def complete(state: ServerState, params: PositionParams) -> dict[str, object]:
     line, at = in_lines(lines, params.position, state.encoding)
     typed = TypedLine(state, document, path, workspace, lines, line, lines[line][:at], {})
     items = list(_items(typed))
-    starts = {item.text_edit.range.start.character for item in items}
-    words = {start: typed.after(start) for start in starts}
-    # not all editors filter items themselves
-    fitting = [
-        item
-        for item in items
-        if has_letters(item.filter_text or item.label, words[item.text_edit.range.start.character])
-    ]
+    fitting = [item for item in items if _fits(item, typed)]
     return {"isIncomplete": len(items) >= MOST, "items": fitting}
+
+
+def _fits(item: Item, typed: TypedLine) -> bool:
+    """Return whether an item has the letters that it replaces: not all editors filter."""
+    start = item.text_edit.range.start.character
+    word = typed.before[characters(typed.before, start, typed.state.encoding) :]
+    return has_letters(item.filter_text or item.label, word)
 
 
 def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
@@ -154,7 +150,7 @@ def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
         case [str(uri), str(package), str(name)] if context := state.context(uri):
             source = context.snapshot.source(ir.TypeName(package, "msg", name))
             if source and (lines := source.text.splitlines()):
-                return {**item, "documentation": markdown([code(shortened(lines))])}
+                return {**item, "documentation": markdown([code(lines)])}
     return item
 
 

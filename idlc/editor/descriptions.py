@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from idlc.compare.changes import levels_of
 from idlc.compare.packages import compare
@@ -20,9 +19,6 @@ from idlc.model import derive, ir
 from idlc.model.ir import is_range, spell, spell_value
 from idlc.model.link import Model
 from idlc.wire.layout import Placed, layout
-
-if TYPE_CHECKING:
-    from idlc.compare.breaking import Baseline
 
 #: Lines of a message that are shown.
 MOST_LINES = 40
@@ -41,11 +37,10 @@ def hover(context: InterfaceContext, params: PositionParams) -> dict[str, object
         return {"contents": markdown(_interface(context.interface, snapshot))}
     element = spot.element
     if spot.part == "type" and element.target is not None:
-        models = (m for m in snapshot.models.values() if element.target in m.interfaces)
-        model = next(models, None)
-        if model is None:
+        interface = snapshot.interface(element.target)
+        if interface is None:
             return None
-        text = markdown(_interface(model.interfaces[element.target], snapshot))
+        text = markdown(_interface(interface, snapshot))
     elif element.meaning is not None:
         text = markdown(_definition(element.meaning, context))
     else:
@@ -100,7 +95,7 @@ def _interface(interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
     if model is None:
         yield prose(derive.sections(interface)[0].comment)
         return
-    yield code(shortened(list(outline(interface, model))))
+    yield code(list(outline(interface, model)))
     yield "  \n".join(_sizes(interface, model))
     if model.distro.has_hashes:
         yield f"`{model.describer.hash(str(interface.name))}`"
@@ -118,22 +113,12 @@ def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
         yield f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}"
 
 
-def shortened(lines: list[str]) -> list[str]:
-    """Return the first lines of a definition, with a remark that counts the others."""
-    more = [f"# {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else []
-    return lines[:MOST_LINES] + more
-
-
 def code(lines: list[str]) -> str:
-    """Return lines as a code block, with a fence that they cannot end."""
-    text = "\n".join(lines)
-    fence = "`" * max(3, 1 + max((len(run) for run in _runs(text)), default=0))
+    """Return the first lines as a code block, with a fence that they cannot end."""
+    more = [f"# {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else []
+    text = "\n".join(lines[:MOST_LINES] + more)
+    fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
     return f"{fence}rosmsg\n{text}\n{fence}"
-
-
-def _runs(text: str) -> Iterator[str]:
-    """Yield each run of backticks."""
-    return iter(re.findall("`+", text))
 
 
 #: The start of a heading, list, quotation, table, rule or fenced code, at the start of a line.
@@ -201,7 +186,7 @@ def lenses(context: InterfaceContext, params: DocumentParams) -> list[Lens]:
         return []
     kinds = [_HASH] if context.snapshot.library.distro.has_hashes else []
     kinds += [_USERS] if context.interface.name.kind == "msg" else []
-    kinds += [_BREAKS] if baseline(context).name else []
+    kinds += [_BREAKS] if context.workspace.baseline.name else []
     of_file = [Lens(TOP, data=[params.text_document.uri, kind]) for kind in kinds]
     return [*of_file, *(_defaults(context) if settings.default_lens else ())]
 
@@ -256,15 +241,10 @@ def _text(context: InterfaceContext, kind: str) -> str:
     return model.describer.hash(str(name)) if model else "no type hash: there are errors"
 
 
-def baseline(context: InterfaceContext) -> Baseline:
-    """Return the version that a file's folder is compared with, without a name if with none."""
-    return context.workspace.baseline(context.state.settings.against)
-
-
 def _what_breaks(context: InterfaceContext) -> str:
     """Return a sentence on what a file's changes break against the version of the settings."""
-    name, against = context.interface.name, baseline(context)
-    side = context.workspace.before(context.state.settings.against)
+    name, against = context.interface.name, context.workspace.baseline
+    side = context.workspace.before()
     before = side.models.get(name.package)
     after = context.model
     if after is None:

@@ -12,8 +12,8 @@ from bisect import bisect_right
 from codecs import BOM_UTF8
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from pathlib import Path, PurePath
-from urllib.parse import quote, unquote, urlsplit
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 from idlc.diagnostics.source import Source
 from idlc.editor.parts import Change, DocumentItem, Position, Range
@@ -25,10 +25,7 @@ from idlc.project.find import KINDS
 from idlc.project.lock import digest
 from idlc.project.root import Root
 
-# Paths ↔ `file:` URIs, as editors on any system write them.
-
-#: Names that are no text are kept as Python keeps them.
-_ERRORS = "surrogateescape"
+# `file:` URIs, as editors on any system write them.
 
 
 def to_path(uri: str) -> Path | None:
@@ -44,7 +41,7 @@ def path_text(uri: str, *, on_windows: bool) -> str:
         parts = urlsplit(uri)
     except ValueError:
         return ""
-    path = unquote(parts.path, errors=_ERRORS)
+    path = unquote(parts.path, errors="surrogateescape")
     host = "" if parts.netloc == "localhost" else unquote(parts.netloc)
     if parts.scheme != "file" or not path or "\0" in path + host:
         return ""
@@ -55,16 +52,6 @@ def path_text(uri: str, *, on_windows: bool) -> str:
     if drive := re.match(r"/+([A-Za-z]:)(?=/|$)", path):
         return f"{drive[1].upper()}{path[drive.end() :] or '/'}"
     return path
-
-
-def to_uri(path: PurePath) -> str:
-    """Return the URI of an absolute path."""
-    text = path.as_posix()
-    if text.startswith("//"):
-        return "file:" + quote(text, errors=_ERRORS)
-    if path.drive:
-        return f"file:///{path.drive}{quote(text.removeprefix(path.drive), errors=_ERRORS)}"
-    return "file://" + quote(text, errors=_ERRORS)
 
 
 # Positions in a text, as the protocol counts them and as Python does.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import SequenceMatcher
+from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
 from idlc.diagnostics.report import Edit
@@ -11,7 +12,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.editor.documents import Places, lines_of
 from idlc.editor.parts import Position, TextEdit
 from idlc.editor.state import InterfaceContext, ServerState
-from idlc.editor.workspace import Snapshot
+from idlc.editor.workspace import Snapshot, in_folder
 from idlc.language import tree
 from idlc.language.parse import parse, parse_definition
 from idlc.model import derive, ir
@@ -36,13 +37,11 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
     ]
 
 
-def by_uri(
-    edits: Iterable[Edit], snapshot: Snapshot, state: ServerState
-) -> dict[str, list[TextEdit]]:
-    """Return edits of any files by the URI of their document."""
+def by_uri(edits: Iterable[Edit], folder: Path, state: ServerState) -> dict[str, list[TextEdit]]:
+    """Return edits of files of a folder by the URI of their document."""
     edited: dict[str, list[TextEdit]] = {}
     for edit in dict.fromkeys(edits):
-        uri = state.uri(snapshot.path_of(edit.span.source))
+        uri = state.uri(in_folder(folder, edit.span.source.path))
         edited.setdefault(uri, []).append(TextEdit(state.range(edit.span), edit.text))
     return edited
 
@@ -171,7 +170,8 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     """
     offset = context.state.offset(context.source, position)
     for element in elements(context):
-        if not element.line.start <= offset <= element.comment.end:
+        end = element.line.start + len(element.line.code) + len(element.line.comment)
+        if not element.line.start <= offset <= end:
             continue
         parts: list[tuple[Part, Span | None]] = [
             ("name", element.name),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -198,12 +199,11 @@ def built_in_text(_state: ServerState, params: Uri) -> dict[str, str]:
     """Return the text of `idlc:/jazzy/std_msgs/msg/Header.msg`."""
     scheme, _, path = params.uri.partition(":")
     distro, _, name = path.strip("/").partition("/")
-    stem, _, _kind = name.rpartition(".")
     source = None
-    if scheme == "idlc" and distro in BY_NAME and stem.count("/") == 2:
-        package, kind, interface = stem.split("/")
-        if kind in ir.KINDS:
-            source = catalog.source(ir.TypeName(package, kind, interface), BY_NAME[distro])
+    if scheme == "idlc" and distro in BY_NAME:
+        with suppress(ValueError):
+            type_name = ir.TypeName.parse(name.rpartition(".")[0])
+            source = catalog.source(type_name, BY_NAME[distro])
     if source is None:
         raise RequestError(INVALID_PARAMS, f"there is no document `{params.uri}`")
     return {"text": source.text}

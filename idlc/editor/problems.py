@@ -8,18 +8,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 from zlib import crc32
 
 import msgspec
 
 from idlc.diagnostics import codes, explain
 from idlc.diagnostics.report import Diagnostic, Severity
-from idlc.editor.documents import TOP, Document, to_uri
+from idlc.editor.documents import TOP, Document
 from idlc.editor.elements import uses
 from idlc.editor.parts import DocumentParams, Location, Part, Range, WorkspaceDiagnosticParams
 from idlc.editor.protocol import requests_problems
 from idlc.editor.state import ServerState
-from idlc.editor.workspace import Snapshot, Workspace, in_folder
+from idlc.editor.workspace import Workspace, in_folder
 
 _SEVERITIES = {Severity.ERROR: 1, Severity.WARNING: 2}
 _UNNECESSARY = 1
@@ -55,50 +56,55 @@ class DocumentDiagnostic(Part, frozen=True):
     related_information: tuple[RelatedInformation, ...] = ()
 
 
-def diagnostics(state: ServerState) -> dict[str, list[DocumentDiagnostic]]:
-    """Return the problems of all documents that have any, by URI."""
-    by_uri: dict[str, dict[DocumentDiagnostic, None]] = {}
-    every = [(path, problem, snapshot.folder) for path, problem, snapshot in problems(state)]
-    every += [
-        (each.folder / each.failure.path, each.failure, each.folder)
-        for each in state.workspaces()
-        if each.failure is not None
-    ]
-    for path, problem, folder in every:
-        by_uri.setdefault(state.uri(path), {})[to_diagnostic(problem, folder, state)] = None
-    return {uri: list(some) for uri, some in by_uri.items()}
+class Problem(NamedTuple):
+    """A problem in a file, with the workspace that it was found in."""
+
+    diagnostic: Diagnostic
+    path: Path
+    workspace: Workspace
+    state: ServerState
+
+    @property
+    def shown(self) -> DocumentDiagnostic:
+        """The problem as the client has it; one with a whole file is shown at its top."""
+        problem, state = self.diagnostic, self.state
+        lines = [problem.message, problem.breaks, problem.holds_for, problem.detail]
+        lines += [f"hint: {problem.hint}"] if problem.hint else []
+        return DocumentDiagnostic(
+            range=state.range(problem.span) if problem.span else TOP,
+            severity=_SEVERITIES[problem.severity],
+            code=problem.code,
+            code_description=Page((_PAGES / f"{problem.code}.md").as_uri()),
+            source="idlc",
+            message="\n".join(filter(None, lines)),
+            tags=(_UNNECESSARY,) if problem.code in _NEEDLESS else (),
+            related_information=tuple(
+                RelatedInformation(state.location(label.span, self.workspace.folder), label.text)
+                for label in problem.labels
+            ),
+        )
 
 
-def problems(state: ServerState) -> Iterator[tuple[Path, Diagnostic, Snapshot]]:
-    """Yield the problems of all folders, each with its file; of two folders, the innermost's."""
+def problems(state: ServerState) -> Iterator[Problem]:
+    """Yield the problems of all folders; of two folders with a file, the innermost's."""
     inner: list[Workspace] = []
     for workspace in state.workspaces():
-        if snapshot := workspace.snapshot():
-            for problem in snapshot.problems:
-                source = problem.span.source.path if problem.span else problem.path
-                path = in_folder(snapshot.folder, source)
-                if source and not any(other.has(path) for other in inner):
-                    yield path, problem, snapshot
+        snapshot = workspace.snapshot()
+        failures = (workspace.failure,) if workspace.failure else ()
+        for diagnostic in snapshot.problems if snapshot else failures:
+            name = diagnostic.span.source.path if diagnostic.span else diagnostic.path
+            path = in_folder(workspace.folder, name)
+            if name and not any(other.has(path) for other in inner):
+                yield Problem(diagnostic, path, workspace, state)
         inner.append(workspace)
 
 
-def to_diagnostic(problem: Diagnostic, folder: Path, state: ServerState) -> DocumentDiagnostic:
-    """Return a problem as a diagnostic; one with a whole file is shown at its top."""
-    lines = [problem.message, problem.breaks, problem.holds_for, problem.detail]
-    lines += [f"hint: {problem.hint}"] if problem.hint else []
-    return DocumentDiagnostic(
-        range=state.range(problem.span) if problem.span else TOP,
-        severity=_SEVERITIES[problem.severity],
-        code=problem.code,
-        code_description=Page(to_uri(_PAGES / f"{problem.code}.md")),
-        source="idlc",
-        message="\n".join(filter(None, lines)),
-        tags=(_UNNECESSARY,) if problem.code in _NEEDLESS else (),
-        related_information=tuple(
-            RelatedInformation(state.location(label.span, folder), label.text)
-            for label in problem.labels
-        ),
-    )
+def diagnostics(state: ServerState) -> dict[str, list[DocumentDiagnostic]]:
+    """Return the problems of all documents that have any, by URI."""
+    by_uri: dict[str, dict[DocumentDiagnostic, None]] = {}
+    for problem in problems(state):
+        by_uri.setdefault(state.uri(problem.path), {})[problem.shown] = None
+    return {uri: list(some) for uri, some in by_uri.items()}
 
 
 def document(state: ServerState, params: DocumentParams) -> dict[str, object]:
@@ -198,7 +204,7 @@ def _fingerprints(
             shown[opened.uri] = (opened.version, None)
             continue
         name, model = context.interface.name, context.model
-        against = context.workspace.baseline(state.settings.against).name
+        against = context.workspace.baseline.name
         hash_ = model.describer.hash(str(name)) if model else ""
         shown[opened.uri] = (opened.version, (hash_, counts[name], against))
     return shown

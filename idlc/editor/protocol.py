@@ -36,12 +36,8 @@ MAX_LINE = 8192
 _LENGTH = re.compile(rb"content-length\s*:\s*(\d{1,15})\s*", re.IGNORECASE)
 
 
-class TooLongError(Exception):
-    """A message was too long and was skipped."""
-
-
 def read(stream: BinaryIO) -> bytes | None:
-    """Return the next message, `None` at the end of the stream; raises TooLongError.
+    """Return the next message, `None` at the end of the stream; raises RequestError if it is long.
 
     Lines that are no header are skipped.
     """
@@ -63,7 +59,7 @@ def _body(stream: BinaryIO, length: int) -> bytes | None:
         if not passed:
             return None
         length -= passed
-    raise TooLongError
+    raise RequestError(INVALID_REQUEST, "the message is too long")
 
 
 def write(stream: BinaryIO, body: bytes) -> None:

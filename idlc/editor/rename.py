@@ -15,7 +15,7 @@ from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
-from idlc.editor.documents import to_path, to_uri
+from idlc.editor.documents import to_path
 from idlc.editor.elements import Element, by_uri, spot_at, users, uses, workspace_edit
 from idlc.editor.navigation import mentions
 from idlc.editor.parts import PositionParams, RenameFilesParams, RenameParams, TextEdit
@@ -101,7 +101,7 @@ def _rename_definition(element: Element, context: InterfaceContext, new: str) ->
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
     edits = [Edit(span, new) for span in mentions(element, context)]
     changes = _changes(context, apply(context.source.text, edits)[0])
-    edited = by_uri(edits, context.snapshot, context.state)
+    edited = by_uri(edits, context.workspace.folder, context.state)
     return _answer(edited, None, f"Rename {element.body.name.text} to {new}", changes, context)
 
 
@@ -147,7 +147,7 @@ def rename_interface(
     own = dict.fromkeys(Edit(Span(asking.source, span.start, span.end), new) for span in spans)
     after = apply(asking.source.text, list(own))[0]
     state.renaming = Renaming(path, target, state.uri(asking.path), after)
-    move = {"oldUri": state.uri(path), "newUri": to_uri(target)}
+    move = {"oldUri": state.uri(path), "newUri": target.as_uri()}
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
     changes = [renamed_interface(home.interface, renamed)]
     return _answer(edits, move, f"Rename {old.name} to {new}", changes, home)

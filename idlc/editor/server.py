@@ -17,16 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 from idlc.editor import protocol
-from idlc.editor.protocol import (
-    CANCELLED,
-    INTERNAL_ERROR,
-    INVALID_PARAMS,
-    INVALID_REQUEST,
-    METHOD_NOT_FOUND,
-    NOT_INITIALIZED,
-    PARSE_ERROR,
-    RequestError,
-)
+from idlc.editor.protocol import RequestError
 
 if TYPE_CHECKING:
     from idlc.editor.state import ServerState
@@ -166,21 +157,21 @@ class Server:
     def answer(self, name: str, params: object) -> object:
         """Return the answer to a request; raises RequestError."""
         if self._is_shut_down or (self._initialize is not None and name == "initialize"):
-            raise RequestError(INVALID_REQUEST, f"`{name}` is not for now")
+            raise RequestError(protocol.INVALID_REQUEST, f"`{name}` is not for now")
         if name == "initialize":
             if not isinstance(params, dict):
-                raise RequestError(INVALID_PARAMS, "`initialize` needs an object")
+                raise RequestError(protocol.INVALID_PARAMS, "`initialize` needs an object")
             self._initialize = params
             self._client_process = params.get("processId")
             client = params.get("capabilities")
             return protocol.initialize_result(client if isinstance(client, dict) else {})
         if self._initialize is None:
-            raise RequestError(NOT_INITIALIZED, "`initialize` comes first")
+            raise RequestError(protocol.NOT_INITIALIZED, "`initialize` comes first")
         if name == "shutdown":
             self._is_shut_down = True
             return None
         if name not in METHODS and name not in FILE_METHODS:
-            raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
+            raise RequestError(protocol.METHOD_NOT_FOUND, f"there is no method `{name}`")
         return self._call(name, params)
 
     def _call(self, name: str, params: object) -> object:
@@ -259,8 +250,6 @@ class Server:
                     with self._lock:
                         self._waiting[message["id"]] += 1
                 self._arrivals.put(message)
-            except protocol.TooLongError:
-                self._arrivals.put(RequestError(INVALID_REQUEST, "the message is too long"))
             except RequestError as error:
                 self._arrivals.put(error)
             except (OSError, ValueError):  # the stream was closed
@@ -288,13 +277,13 @@ class Server:
     def _answer(self, request: Message) -> None:
         id_, name = request["id"], request["method"]
         if self._is_cancelled(id_):
-            self._fail(id_, RequestError(CANCELLED, "cancelled"))
+            self._fail(id_, RequestError(protocol.CANCELLED, "cancelled"))
             return
         failure, result = self._result(lambda: self.answer(name, _params(request)))
         if failure is None:
             self._write({"jsonrpc": "2.0", "id": id_, "result": result})
             return
-        if failure.code == INTERNAL_ERROR:
+        if failure.code == protocol.INTERNAL_ERROR:
             self._log(f"{name}: {failure.message}")
         self._fail(id_, failure)
 
@@ -324,8 +313,8 @@ class Server:
         except Exception as error:
             kind = type(error).__name__
             if kind == "ValidationError":  # msgspec's, which is not imported here
-                return RequestError(INVALID_PARAMS, str(error)), None
-            return RequestError(INTERNAL_ERROR, f"{kind}: {error}"), None
+                return RequestError(protocol.INVALID_PARAMS, str(error)), None
+            return RequestError(protocol.INTERNAL_ERROR, f"{kind}: {error}"), None
 
     def _fail(self, id_: int | str | None, error: RequestError) -> None:
         details = {"code": error.code, "message": error.message}
@@ -355,21 +344,21 @@ def _message(body: bytes) -> Message:
     try:
         message = json.loads(body)
     except (ValueError, RecursionError) as error:
-        raise RequestError(PARSE_ERROR, str(error)) from error
+        raise RequestError(protocol.PARSE_ERROR, str(error)) from error
     if not isinstance(message, dict):
-        raise RequestError(INVALID_REQUEST, "a message is an object")
+        raise RequestError(protocol.INVALID_REQUEST, "a message is an object")
     if not isinstance(message.get("method", ""), str):
-        raise RequestError(INVALID_REQUEST, "the name of a method is a string")
+        raise RequestError(protocol.INVALID_REQUEST, "the name of a method is a string")
     id_ = message.get("id")
     if type(id_) not in (int, str, type(None)) or not _is_text(id_):
-        raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
+        raise RequestError(protocol.INVALID_REQUEST, "an id is an integer or a string")
     return message
 
 
 def _params(request: Message) -> object:
     """Return the parameters of a request; raises RequestError for malformed strings."""
     if not _is_text(request):
-        raise RequestError(INVALID_PARAMS, "a string has one half of a surrogate pair")
+        raise RequestError(protocol.INVALID_PARAMS, "a string has one half of a surrogate pair")
     return request.get("params")
 
 
@@ -387,7 +376,7 @@ def _cancelled(message: Message) -> int | str:
     params = message.get("params")
     id_ = params.get("id") if isinstance(params, dict) else None
     if not isinstance(id_, (int, str)):
-        raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
+        raise RequestError(protocol.INVALID_REQUEST, "an id is an integer or a string")
     return id_
 
 

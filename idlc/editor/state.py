@@ -18,7 +18,6 @@ from idlc.editor.documents import (
     is_built_in,
     places,
     to_path,
-    to_uri,
 )
 from idlc.editor.protocol import INVALID_REQUEST, RequestError
 from idlc.editor.workspace import (
@@ -234,7 +233,7 @@ class ServerState:
     def uri(self, path: Path) -> str:
         """Return the URI of a file, as the client spells it if it is open."""
         document = self.document_at(path)
-        return document.uri if document else to_uri(path)
+        return document.uri if document else path.as_uri()
 
     def offset(self, source: Source, position: parts.Position) -> int:
         """Return the character of a text at a position."""
@@ -259,7 +258,7 @@ class ServerState:
         source = span.source
         if is_built_in(source):
             path = None if self.supports("workspace", CONTENT) else file_of(source)
-            uri = to_uri(path) if path else f"idlc:/{inside(source)}"
+            uri = path.as_uri() if path else f"idlc:/{inside(source)}"
             return parts.Location(uri, self.range(span))
         return parts.Location(self.uri(in_folder(folder, source.path)), self.range(span))
 

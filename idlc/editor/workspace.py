@@ -19,7 +19,7 @@ import msgspec
 
 from idlc.check import select
 from idlc.check.compiler import internal_error
-from idlc.check.run import checkers, select_problems
+from idlc.check.run import check_all, checkers
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
 from idlc.model import ir
@@ -31,7 +31,6 @@ from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
-    from idlc.check.select import Selection
     from idlc.compare.breaking import Baseline, Side
     from idlc.diagnostics.report import Diagnostic
     from idlc.diagnostics.source import Source
@@ -81,7 +80,6 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
     problems: tuple[Diagnostic, ...]
     models: Mapping[str, Model]
     library: Library
-    selection: Selection
 
     @cached_property
     def interfaces(self) -> Mapping[Path, tuple[ir.Interface, Source]]:
@@ -109,13 +107,15 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
                 return model.restricted_to(interface, self._broken)
         return None
 
+    def interface(self, name: ir.TypeName) -> ir.Interface | None:
+        """Return an interface that the folder has or uses."""
+        models = self.models.values()
+        return next((m.interfaces[name] for m in models if name in m.interfaces), None)
+
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface of any package, those of the folder first."""
-        for model in self.models.values():
-            interface = model.interfaces.get(name)
-            if interface is not None and interface.source is not None:
-                return interface.source
-        return self.library.source(name)
+        interface = self.interface(name)
+        return (interface and interface.source) or self.library.source(name)
 
     def path_of(self, source: Source) -> Path:
         """Return the absolute path of a file's text."""
@@ -143,8 +143,8 @@ class Workspace:
         self._options = options
         self._texts = texts
         self._paths = paths
-        self._baselines: dict[str, Baseline] = {}
-        self._old_baselines: dict[str, Baseline] = {}
+        self._baseline: Baseline | None = None
+        self._old_baseline: Baseline | None = None
         self._snapshot: Snapshot | None = None
 
     def load(self) -> None:
@@ -152,8 +152,7 @@ class Workspace:
         if self.is_loaded:
             return
         self._fixed = report = Report()  # problems that do not depend on texts
-        self._old_baselines |= self._baselines
-        self._baselines = {}
+        self._old_baseline, self._baseline = self._baseline or self._old_baseline, None
         self._packages: tuple[Inputs, ...] = ()
         files = Listing((), (), (), {})
         begun = time.time_ns()
@@ -292,24 +291,25 @@ class Workspace:
         """Return what package.xml of a file's package says."""
         return next(iter(self._checkers.values())).package_facts(self.inputs(path)[0])
 
-    def baseline(self, against: str = "") -> Baseline:
-        """Return the version to compare with: `against`, or the one of pyproject.toml."""
-        if against not in self._baselines:
+    @property
+    def baseline(self) -> Baseline:
+        """The version to compare with: that of the options, or the one of pyproject.toml."""
+        if self._baseline is None:
             from idlc.compare.breaking import Baseline
 
-            baseline = Baseline(self.folder, against, self._settings, self._scope)
-            baseline.follow(self._old_baselines.get(against))
-            self._baselines[against] = baseline
-        return self._baselines[against]
+            against = self._options.against
+            self._baseline = Baseline(self.folder, against, self._settings, self._scope)
+            self._baseline.follow(self._old_baseline)
+        return self._baseline
 
-    def before(self, against: str = "") -> Side:
+    def before(self) -> Side:
         """Return the packages as they were in the version to compare with."""
-        return self.baseline(against).side(self._packages)
+        return self.baseline.side(self._packages)
 
     def has_moved(self) -> bool:
-        """Return whether a version that was compared with is another commit now."""
-        names = {*self._old_baselines, *self._baselines} if self.is_loaded else ()
-        return bool([name for name in names if self.baseline(name).has_moved()])
+        """Return whether the version that was compared with is another commit now."""
+        is_known = self.is_loaded and bool(self._baseline or self._old_baseline)
+        return is_known and self.baseline.has_moved()
 
     @property
     def library(self) -> Library:
@@ -318,22 +318,15 @@ class Workspace:
 
     def _checked(self) -> Snapshot:
         """Return the folder, checked with its current texts."""
-        reports: dict[str, Report] = {}
-        models: dict[str, list[Model]] = {}
         with without_options():
-            for distro, checker in self._checkers.items():
-                reports[distro] = Report()
-                models[distro] = checker.check(self._packages, reports[distro])
-            every = [model for some in models.values() for model in some]
-            problems = [*self._fixed, *select_problems(reports, every, self._selection)]
+            problems, models = check_all(self._checkers, self._packages, self._selection)
         first = next(iter(self._checkers))
         return Snapshot(
             self.folder,
             self._root,
-            tuple(problems),
+            (*self._fixed, *problems),
             {model.package: model for model in models[first]},
             self._checkers[first].library,
-            self._selection,
         )
 
 
