@@ -28,14 +28,10 @@ class Package(NamedTuple):
     lock: lock.Lock
 
 
-def _key(name: ir.TypeName) -> str:
-    return f"{name.kind}/{name.name}.{name.kind}"
-
-
 def as_inputs(names: Iterable[ir.TypeName], library: Library) -> dict[str, str]:
     """Return the digests of a library's interfaces, keyed like input files in a lock."""
     digests = dependencies(names, library)
-    return {_key(name): digests[str(name)] for name in names}
+    return {name.file: digests[str(name)] for name in names}
 
 
 def package_of(
@@ -77,7 +73,7 @@ def package_of(
     if plan is None:
         return None
     own = {
-        ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if _key(n) in digests
+        ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if n.file in digests
     }
     others = {name for each in (model, *copies) for name in each.interfaces if name not in own}
     return Package(

@@ -9,18 +9,13 @@ and arrives at the same value as rosidl.
 from __future__ import annotations
 
 import re
-import unicodedata
+import warnings
 
 # compiled when a backslash is met, which few files have
-_WRITTEN = r"""(?xs)
-    \\(?:
-        (?P<simple>[\\'"abfnrtv\n]) | (?P<octal>[0-7]{1,3})
-        | x(?P<x>[0-9a-fA-F]{2}) | u(?P<u>[0-9a-fA-F]{4}) | U(?P<U>[0-9a-fA-F]{8})
-        | N\{(?P<N>[^}]+)\} | (?P<truncated>[xuUN]|$) | (?P<unknown>.)
-    )"""
+_REFUSED = rb"(?s)\\(?:N\{([^}]+)\}|U[0-9a-fA-F]{8}|.?)"
 _READ = r"""\\(?:([ntvbrfa\\'"])|(\?)|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))"""
 _CLOSING_QUOTE = r'(?<!\\)(?:\\\\)*"'
-_SIMPLE = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v", "\n": ""}
+_SIMPLE = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v"}
 
 
 class EscapeError(ValueError):
@@ -39,9 +34,23 @@ def through_idl(text: str) -> str:
     """
     if "\\" not in text and "\n" not in text:
         return text
-    # B: the escapes are interpreted over the UTF-8 bytes
-    written = re.sub(_WRITTEN, _interpret, text.encode().decode("latin-1"))
-    return read_back(written.replace('"', '\\"'), text)
+    return read_back(_interpreted(text).replace('"', '\\"'), text)
+
+
+def _interpreted(text: str) -> str:
+    """Return the text with the escapes interpreted over its UTF-8 bytes (step B)."""
+    data = text.encode()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # unknown escapes, which stay
+        try:
+            return data.decode("unicode_escape")
+        except UnicodeDecodeError as error:
+            refused = re.compile(_REFUSED).match(data, error.start)
+    assert refused is not None, text
+    start, end = (len(data[:at].decode("utf-8", "ignore")) for at in refused.span())
+    escape, name = ((part or b"").decode("utf-8", "replace") for part in refused.group(0, 1))
+    message = f"an unknown character name `{name}`" if name else f"an incomplete escape `{escape}`"
+    raise EscapeError(message, start, end)
 
 
 def read_back(literal: str, text: str) -> str:
@@ -76,40 +85,6 @@ def inside_literal(literal: str) -> str:
 def plain_meaning(text: str) -> str:
     """Return `text` as a reader would understand it: each escape interpreted once."""
     return re.sub(_READ, _reread, text)
-
-
-def _interpret(match: re.Match[str]) -> str:
-    kind, value = match.lastgroup, match.group(match.lastgroup or 0)
-    if kind == "simple":
-        return _SIMPLE.get(value, value)
-    if kind == "octal":
-        return chr(int(value, 8))
-    if kind == "unknown":
-        return match.group()
-    if kind == "N":
-        return _named(match, value)
-    if kind == "truncated" or int(value, 16) > 0x10FFFF:
-        raise _error(match, f"an incomplete escape `{match.group()}`")
-    return chr(int(value, 16))
-
-
-def _named(match: re.Match[str], name: str) -> str:
-    try:
-        character = unicodedata.lookup(name)
-    except KeyError:
-        character = ""
-    if len(character) != 1:
-        raise _error(match, f"an unknown character name `{name}`")
-    return character
-
-
-def _error(match: re.Match[str], message: str) -> EscapeError:
-    """Return an error at a match in UTF-8 bytes, its location counted in characters."""
-
-    def characters(byte_offset: int) -> int:
-        return len(match.string[:byte_offset].encode("latin-1").decode("utf-8", "ignore"))
-
-    return EscapeError(message, characters(match.start()), characters(match.end()))
 
 
 def _reread(match: re.Match[str]) -> str:

@@ -66,28 +66,20 @@ class Annotation(msgspec.Struct, frozen=True):
     parameters: Mapping[str, Value]
 
 
-class IdlConstant(msgspec.Struct, frozen=True):
-    """`const TYPE NAME = VALUE;`."""
+class Member(msgspec.Struct, frozen=True):
+    """`TYPE NAME;`, or with a value `const TYPE NAME = VALUE;`."""
 
     annotations: tuple[Annotation, ...]
     type: Element | Sequence
     name: Piece
-    value: Value
+    value: Value | None = None
 
 
 class Constants(msgspec.Struct, frozen=True):
     """The module of a structure's constants."""
 
     name: Piece
-    constants: tuple[IdlConstant, ...]
-
-
-class Member(msgspec.Struct, frozen=True):
-    """`TYPE NAME;`."""
-
-    annotations: tuple[Annotation, ...]
-    type: Element | Sequence
-    name: Piece
+    constants: tuple[Member, ...]
 
 
 class Structure(msgspec.Struct, frozen=True):
@@ -139,12 +131,12 @@ class _IdlBuilder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x
     def typedef(self, type_: Any, name: Token, size: Token | None = None) -> Typedef:
         return Typedef(type_, _piece(name), _optional(size))
 
-    def constants(self, name: Token, *constants: IdlConstant) -> Constants:
+    def constants(self, name: Token, *constants: Member) -> Constants:
         return Constants(_piece(name), constants)
 
-    def constant(self, *parts: Any) -> IdlConstant:
+    def constant(self, *parts: Any) -> Member:
         *annotations, type_, name, value = parts
-        return IdlConstant(tuple(annotations), type_, _piece(name), value)
+        return Member(tuple(annotations), type_, _piece(name), value)
 
     def struct(self, *parts: Any) -> Structure:
         at = next(i for i, part in enumerate(parts) if isinstance(part, Token))

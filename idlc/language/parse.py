@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: The characters that end a line, as `str.splitlines` has it (language 1.1).
 LINE_ENDS = "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
-#: Longer lines are parsed again rather than remembered.
-REMEMBERED_LENGTH = 1000
 
 
 @lru_cache(maxsize=1)
@@ -74,10 +72,6 @@ def parse_any(source: Source) -> tree.File | idl.IdlFile:
 
 def parse_definition(text: str) -> tree.Body:
     """Return the definition on one line; `text` is a `Line.definition` and not empty."""
-    return _remembered(text) if len(text) < REMEMBERED_LENGTH else _definition(text)
-
-
-def _definition(text: str) -> tree.Body:
     type_, space, rest = text.partition(" ")
     if text[0].isspace() or not space or not _type_pattern().fullmatch(type_):
         return _fault(text, type_)
@@ -92,9 +86,6 @@ def _definition(text: str) -> tree.Body:
     value = value.lstrip()
     default = tree.Piece(value, len(text) - len(value)) if value else None
     return tree.Field(_type(type_), tree.Piece(name, at), default)
-
-
-_remembered = lru_cache(maxsize=4096)(_definition)
 
 
 @lru_cache(maxsize=1)

@@ -82,7 +82,8 @@ def _messages(
 
 def _message(part: IndividualDict, program: str) -> ir.Message:
     name = _type_name(part["type_name"])
-    written = part["fields"] if [*map(_bare, part["fields"])] != [_DUMMY] else []
+    bare: list[FieldDict] = [{**field, "default_value": ""} for field in part["fields"]]
+    written = part["fields"] if bare != [_DUMMY] else []
     types: dict[str, ir.FieldType] = {}
     for field in written:
         if not _NAME.fullmatch(field["name"]) or field["name"] in types:
@@ -100,10 +101,6 @@ def _message(part: IndividualDict, program: str) -> ir.Message:
         fields.append(ir.Field(name=own, type=type_, type_span=spans[0], name_span=spans[1]))
         start = end + 1
     return ir.Message(name=name, source=source, fields=tuple(fields))
-
-
-def _bare(field: FieldDict) -> FieldDict:
-    return {**field, "default_value": ""}
 
 
 def _type_name(text: str) -> ir.TypeName:

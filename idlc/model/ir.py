@@ -34,6 +34,11 @@ class TypeName(NamedTuple):
     def __str__(self) -> str:
         return f"{self.package}/{self.kind}/{self.name}"
 
+    @property
+    def file(self) -> str:
+        """The name of an interface's file within the package, such as `msg/RobotCommand.msg`."""
+        return f"{self.kind}/{self.name}.{self.kind}"
+
     @classmethod
     def parse(cls, text: str) -> TypeName:
         """Return the name that `text` spells as package/kind/Name; raise ValueError otherwise."""

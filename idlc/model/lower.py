@@ -18,7 +18,7 @@ from idlc.language.tree import Fault
 from idlc.model import ir, lower_types
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.distros import DEFAULT, Distro
-from idlc.model.lower_types import STRINGS, as_parsed, lower_type
+from idlc.model.lower_types import STRINGS, as_parsed, fault_at, lower_type
 from idlc.model.lower_values import Text, default, scalar
 
 if TYPE_CHECKING:
@@ -179,11 +179,6 @@ class _Section:
             span = self._span(line, offset + fault.start, offset + fault.end)
             self.report.add(fault.code.at(span, fault.message, hint=fault.hint, edits=edits))
 
-    def _refuse(
-        self, line: tree.Line, code: codes.Code, piece: tree.Piece, message: str, hint: str
-    ) -> None:
-        self.report.add(code.at(self.file.span(line, piece), message, hint=hint))
-
     def _add_value(self, line: tree.Line, piece: tree.Piece, fault: Fault) -> None:
         if lower_types.has_comment(piece.text):
             fault = msgspec.structs.replace(fault, hint=lower_types.COMMENT_HINT)
@@ -198,7 +193,9 @@ class _Section:
             bound = type_.bound.text
             message = f"ROS 2 reads this as a sequence of at most {bound} elements"
             hint = f"write `[<={bound}]` to say so, or remove the string's bound"
-            self._refuse(line, codes.WSTRING_SEQUENCE_BOUND, type_.brackets, message, hint)
+            self._add(
+                line, 0, fault_at(codes.WSTRING_SEQUENCE_BOUND, type_.brackets, message, hint)
+            )
         return lowered
 
     def _field(
@@ -227,7 +224,7 @@ class _Section:
         if isinstance(element, ir.Ref):
             message = "a field of a message type cannot have a default value"
             hint = "give the defaults inside that message"
-            self._refuse(line, codes.DEFAULT_ON_MESSAGE, piece, message, hint)
+            self._add(line, 0, fault_at(codes.DEFAULT_ON_MESSAGE, piece, message, hint))
             return None
         lowered = default(type_, piece.text)
         if isinstance(lowered, Fault):
@@ -241,7 +238,7 @@ class _Section:
         if name not in ir.PRIMITIVES and name not in STRINGS:
             message = f"a constant cannot be of type `{name}`"
             hint = "use bool, byte, char, an integer, a float, string or wstring"
-            self._refuse(line, codes.CONSTANT_TYPE, body.type.whole, message, hint)
+            self._add(line, 0, fault_at(codes.CONSTANT_TYPE, body.type.whole, message, hint))
             return None
         type_ = ir.String(STRINGS[name]) if name in STRINGS else ir.Primitive(name)
         value = scalar(type_, body.value.text)

@@ -61,15 +61,6 @@ def _inside(piece: Piece) -> str:
         return piece.text[1:-1]
 
 
-def scalar(type_: ir.Primitive | ir.String, value: idl.Value) -> ir.Scalar | Fault:
-    """Return the value of a constant, or its fault."""
-    lowered = default(type_, value)
-    if isinstance(lowered, Fault):
-        return lowered
-    assert not isinstance(lowered.value, tuple)
-    return lowered.value
-
-
 def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
     """Return the value of `@default`, or its fault."""
     words = text(value)
@@ -240,17 +231,14 @@ class _Lowering:
         self._foreign(piece, f"the type `{piece.text}`")
         return _Type(ir.Unknown(), piece)
 
-    def _check(self, element: idl.Member | idl.IdlConstant) -> None:
+    def _check(self, member: idl.Member) -> None:
         """Report unknown annotations, and a name that ROS 2 does not allow."""
-        for annotation in element.annotations:
+        for annotation in member.annotations:
             if annotation.name.text not in ANNOTATIONS:
                 self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
-        is_field = isinstance(element, idl.Member)
-        fault = (lower_types.field_name if is_field else lower_types.constant_name)(
-            element.name.text
-        )
-        if fault is not None:
-            self._fault(fault.moved(element.name.start))
+        fault_of = lower_types.constant_name if member.value else lower_types.field_name
+        if fault := fault_of(member.name.text):
+            self._fault(fault.moved(member.name.start))
 
     def _field(self, member: idl.Member) -> ir.Field:
         self._check(member)
@@ -284,20 +272,21 @@ class _Lowering:
             return None
         return lowered
 
-    def _constant(self, constant: idl.IdlConstant) -> ir.Constant | None:
+    def _constant(self, constant: idl.Member) -> ir.Constant | None:
         self._check(constant)
         type_, piece = self._type(constant.type)
-        if not isinstance(type_, (ir.Primitive, ir.String)):
+        if not isinstance(type_, (ir.Primitive, ir.String)) or constant.value is None:
             self._foreign(piece, f"a constant of the type `{piece.text}`")
             return None
-        value = scalar(type_, constant.value)
-        if isinstance(value, Fault):
-            self._fault(value)
+        lowered = default(type_, constant.value)
+        if isinstance(lowered, Fault):
+            self._fault(lowered)
             return None
+        assert not isinstance(lowered.value, tuple)
         return ir.Constant(
             name=constant.name.text,
             type=type_,
-            value=value,
+            value=lowered.value,
             comment=comment(constant.annotations),
             name_span=self.file.span(constant.name),
         )

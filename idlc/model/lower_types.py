@@ -160,16 +160,16 @@ def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
         listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
         definitions = [f"`{type_} {part.strip()}`" for part in listed if part.strip()]
         hint = f"write each on a line of its own: {', '.join(definitions[:4])}"
-        return _fault(codes.INVALID_FIELD_NAME, name, "a line defines one field", hint)
+        return fault_at(codes.INVALID_FIELD_NAME, name, "a line defines one field", hint)
     plain, bracket, size = name.text.partition("[")
     if bracket and size.endswith("]"):
         hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
         message = f"`{name.text}` cannot be a field name"
-        return _fault(codes.INVALID_FIELD_NAME, name, message, hint)
+        return fault_at(codes.INVALID_FIELD_NAME, name, message, hint)
     if type_.endswith(":"):
         hint = f"the type comes first: `{name.text} {type_[:-1]}`"
         message = f"`{type_}` cannot be a type name"
-        return _fault(codes.INVALID_TYPE_NAME, body.type.whole, message, hint)
+        return fault_at(codes.INVALID_TYPE_NAME, body.type.whole, message, hint)
     return None
 
 
@@ -186,7 +186,7 @@ def _constant(body: tree.Constant) -> Fault | None:
         hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
         if type_ in (*ir.PRIMITIVES, "string", "wstring"):
             hint += f"; a constant is called `{name.text.upper()}`"
-        return _fault(codes.INVALID_CONSTANT_NAME, name, message, hint)
+        return fault_at(codes.INVALID_CONSTANT_NAME, name, message, hint)
     return None
 
 
@@ -244,13 +244,13 @@ def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
     if type_.bound is not None:
         piece = tree.Piece("<=" + type_.bound.text, type_.bound.start - 2)
         hint = f"for at most {type_.bound.text} elements write `{name}[<={type_.bound.text}]`"
-        return _fault(codes.BOUND_ON_NON_STRING, piece, f"`{name}` cannot have a bound", hint)
+        return fault_at(codes.BOUND_ON_NON_STRING, piece, f"`{name}` cannot have a bound", hint)
     if name in ir.PRIMITIVES:
         return ir.Primitive(name)
     if name in ROS1_TYPES:
         message = f"`{name}` is a ROS 1 type"
         hint = f"write `builtin_interfaces/{name.capitalize()}`"
-        return _fault(codes.ROS1_TYPE, type_.name, message, hint)
+        return fault_at(codes.ROS1_TYPE, type_.name, message, hint)
     return _reference(type_.name, package)
 
 
@@ -262,11 +262,11 @@ def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
             hint = f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
         if len(parts) == 3 and parts[1] in _NO_FIELDS:
             hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
-        return _fault(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
+        return fault_at(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
     if len(parts) == 2 and not names.is_package_name(parts[0]):
         wrong = tree.Piece(parts[0], piece.start)
         message = f"`{parts[0]}` cannot be a package name"
-        return _fault(codes.INVALID_TYPE_NAME, wrong, message, names.PACKAGE_HINT)
+        return fault_at(codes.INVALID_TYPE_NAME, wrong, message, names.PACKAGE_HINT)
     name = parts[-1]
     if not names.is_message_name(name):
         return _bad_name(tree.Piece(name, piece.end - len(name)), qualified=len(parts) == 2)
@@ -278,12 +278,12 @@ def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
     if not qualified:
         if dotted := ros_spelling(name):
             message = f"`{name}` cannot be a type name"
-            return _fault(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
+            return fault_at(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
         if spelling := type_hint(name):
-            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", spelling)
+            return fault_at(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", spelling)
     like = names.message_name_like(name.removesuffix(".msg"))
     hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
-    return _fault(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
+    return fault_at(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 
 
 def positive(piece: tree.Piece, subject: str) -> int | Fault:
@@ -295,8 +295,9 @@ def positive(piece: tree.Piece, subject: str) -> int | Fault:
     if value > 0:
         return value
     message = f"{subject} is not a positive integer"
-    return _fault(codes.BAD_BOUND, piece, message, "write a decimal number above 0")
+    return fault_at(codes.BAD_BOUND, piece, message, "write a decimal number above 0")
 
 
-def _fault(code: codes.Code, piece: tree.Piece, message: str, hint: str) -> Fault:
+def fault_at(code: codes.Code, piece: tree.Piece, message: str, hint: str) -> Fault:
+    """Return the fault of a piece of a line."""
     return Fault(code, message, piece.start, piece.end, hint)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cache
 from typing import TypeAlias
 
 import msgspec
@@ -152,9 +151,9 @@ def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
     return ir.Default(value, str(value))
 
 
-@cache
-def _shape(name: str) -> re.Pattern[str]:
-    return re.compile(terminals()[name])
+def _is(name: str, text: str) -> bool:
+    """Return whether a text is a literal of a terminal's form."""
+    return re.fullmatch(terminals()[name], text) is not None
 
 
 def _fault(code: codes.Code, text: str, message: str, hint: str) -> Fault:
@@ -166,14 +165,14 @@ def _shown(text: str) -> str:
 
 
 def _bool(text: str) -> bool | Fault:
-    if _shape("BOOLEAN").fullmatch(text):
+    if _is("BOOLEAN", text):
         return text.lower() in ("true", "1")
     message = f"{_shown(text)} is not a bool" if text else "the value is missing"
     return _fault(codes.BAD_VALUE, text, message, "write `true`, `false`, `1` or `0`")
 
 
 def _float(text: str) -> float | Fault:
-    value = _real(text) if len(text) > LONG or _shape("REAL").fullmatch(text) else None
+    value = _real(text) if len(text) > LONG or _is("REAL", text) else None
     if value is not None:
         return value
     message = f"{_shown(text)} is not a number" if text else "the value is missing"
@@ -182,7 +181,7 @@ def _float(text: str) -> float | Fault:
 
 def _integer(type_: ir.Primitive, text: str) -> int | Fault:
     info = type_.info
-    value = _int(text) if len(text) > LONG or _shape("INTEGER").fullmatch(text) else None
+    value = _int(text) if len(text) > LONG or _is("INTEGER", text) else None
     if value is None:
         message = f"{_shown(text)} is not an integer" if text else "the value is missing"
         hint = "write a number such as `10`, `-3`, `0xff` or `0b101`"

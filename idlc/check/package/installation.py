@@ -76,10 +76,7 @@ def installed(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """setup.py installs interfaces, their classes, and the libraries for C++ tools."""
     setup = _built_by_setup(facts)
     if setup is not None and model.own:
-        names = sorted(
-            f"{interface.name.kind}/{interface.name.name}.{interface.name.kind}"
-            for interface in model.own
-        )
+        names = sorted(interface.name.file for interface in model.own)
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
         yield from check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)

@@ -100,7 +100,9 @@ class References:
         self.direct = named - self.own
         self.others = {name for name in self.direct if name.package != self.package}
         groups = {interface.name, *(service.name for service in derive.services(interface))}
-        self._names = self._named(self.own | groups, _closure(self.own, messages))
+        direct = (target for name in self.own for target in messages[name].references)
+        reached = derive.closure(direct, lambda name: messages[name].references)
+        self._names = self._named(self.own | groups, reached)
 
     def _named(
         self, own: set[ir.TypeName], others: set[ir.TypeName]
@@ -159,17 +161,6 @@ class References:
 def _nearness(statement: tuple[str, set[str]]) -> tuple[int, str]:
     module, _ = statement
     return len(module.lstrip(".")) - len(module), module
-
-
-def _closure(own: set[ir.TypeName], messages: Messages) -> set[ir.TypeName]:
-    closure: set[ir.TypeName] = set()
-    waiting = list(own)
-    while waiting:
-        for name in messages[waiting.pop()].references:
-            if name not in closure:
-                closure.add(name)
-                waiting.append(name)
-    return closure
 
 
 TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "Actions"}

@@ -216,7 +216,7 @@ def _classes(
 ) -> ModuleView:
     name = interface.name
     purposes = fields.purposes(interface)
-    file = f"{name.kind}/{name.name}.{name.kind}"
+    file = name.file
     return ModuleView(
         origin=Text(f"{name}.{name.kind}"),
         pragmas=(
