@@ -5,6 +5,7 @@ setup.py lists them, or setup.cfg, or pyproject.toml; otherwise setuptools searc
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 from collections.abc import Iterable, Mapping
@@ -12,15 +13,10 @@ from configparser import Error as ConfigError
 from configparser import RawConfigParser
 from fnmatch import fnmatchcase
 from posixpath import normpath
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from idlc.check.package.setup_py import name_of_call
+from idlc.check.package.setup_py import Setup, name_of_call
 from idlc.diagnostics.source import Source, Span
-
-if TYPE_CHECKING:
-    import ast
-
-    from idlc.check.package.setup_py import Setup
 
 _SEARCH = ("where", "include", "exclude")
 _FINDERS = ("find_packages", "find_namespace_packages")
@@ -172,8 +168,6 @@ def _of_setup(setup: Setup) -> PackagingConfig | None:
 
 def _finder(setup: Setup, node: ast.expr) -> Finder | None:
     """Return the search of a find_packages call; `None` if its arguments are computed."""
-    import ast
-
     call = setup.value(node)
     if not isinstance(call, ast.Call) or name_of_call(call) not in _FINDERS:
         return None
