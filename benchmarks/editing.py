@@ -17,7 +17,7 @@ from benchmarks.measure import IDLC, Goal, Row
 from benchmarks.processes import ENVIRONMENT
 from benchmarks.starting import place
 from benchmarks.work import Work
-from idlc.editor.protocol import framing
+from idlc.editor import protocol
 
 LARGE = 261
 LINES = 30
@@ -66,12 +66,12 @@ class Client:
         return self.until(lambda one: one.get("id") == self._number)["result"]
 
     def _send(self, message: object) -> None:
-        framing.write(self._process.stdin, json.dumps(message).encode())
+        protocol.write(self._process.stdin, json.dumps(message).encode())
 
     def until(self, wanted) -> dict:
         """Return the first message of the server that is wanted."""
         while True:
-            body = framing.read(self._process.stdout)
+            body = protocol.read(self._process.stdout)
             assert body is not None, "the server has ended"
             message = json.loads(body)
             if wanted(message):

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
 from idlc.diagnostics.source import Source
 from idlc.model import derive, ir
 from idlc.project import inputs
@@ -32,6 +32,16 @@ class InternalError(Exception):
         super().__init__(stage, subject)
         self.stage = stage
         self.subject = subject
+
+
+def internal_error(error: Exception, subject: str, hint: str) -> Diagnostic:
+    """Return an unexpected exception as a problem, of `subject` if it does not have one."""
+    cause, where = error, ""
+    if isinstance(error, InternalError):
+        where, subject = f" in stage `{error.stage}`", error.subject
+        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
+    message = f"idlc failed{where}: {type(cause).__name__}: {cause}"
+    return codes.INTERNAL_ERROR.of(subject, message, hint=hint)
 
 
 @contextmanager

@@ -80,26 +80,16 @@ def status_of(command: Callable[[], object]) -> int:
 
 def _internal(error: Exception) -> int:
     """Show an unexpected exception as IDL901."""
-    from idlc.check.compiler import InternalError
+    from idlc.check.compiler import internal_error
     from idlc.cli import output
-    from idlc.diagnostics import codes
     from idlc.diagnostics.report import Report
 
-    cause, where, subject = error, "", ""
-    if isinstance(error, InternalError):
-        where, subject = f" in stage `{error.stage}`", error.subject
-        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
     if os.environ.get("IDLC_DEBUG") == "1":
         import traceback
 
         traceback.print_exception(type(error), error, error.__traceback__)
     report = Report()
-    report.add(
-        codes.INTERNAL_ERROR.of(
-            subject,
-            f"idlc failed{where}: {type(cause).__name__}: {cause}",
-            hint="this is a bug in idlc, please report it; IDLC_DEBUG=1 shows where it happened",
-        )
-    )
+    hint = "this is a bug in idlc, please report it; IDLC_DEBUG=1 shows where it happened"
+    report.add(internal_error(error, "", hint))
     output.show(report, "text", sys.stderr)
     return INTERNAL

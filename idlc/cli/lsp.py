@@ -34,9 +34,9 @@ def command(check: bool) -> int:
     if check:
         import json
 
-        from idlc.editor.protocol.capabilities import answer
+        from idlc.editor.protocol import initialize_result
 
-        sys.stdout.write(json.dumps(answer({}), indent=2) + "\n")
+        sys.stdout.write(json.dumps(initialize_result({}), indent=2) + "\n")
         return 0
     from idlc.cli.direct import serve_editor
 

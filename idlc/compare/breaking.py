@@ -448,10 +448,6 @@ class Baseline:
         self._side = None
         return before is not None
 
-    def repository(self) -> tuple[Path, ...]:
-        """Return the folders in which git stores the commits of names, if there is a repository."""
-        return git.reference_folders(self._folder) if self.name.startswith(GIT) else ()
-
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Return the changes that the settings do not allow."""
         today = datetime.datetime.now().astimezone().date().isoformat()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import msgspec
@@ -63,6 +63,12 @@ class Change(NamedTuple):
             place=self.place,
             levels=tuple(level for level in LEVELS if level in self.levels),
         )
+
+
+def levels_of(changes: Iterable[Change]) -> str:
+    """Return the levels that changes break, such as `wire, hash`; empty for none."""
+    broken = {level for change in changes for level in change.levels}
+    return ", ".join(level for level in LEVELS if level in broken)
 
 
 class Named(Protocol):

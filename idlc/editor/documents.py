@@ -1,26 +1,154 @@
-"""The documents that a client has open, and how it changes them."""
+"""The documents of a client: their URIs, the positions in their texts, and how it changes them.
+
+The protocol's lines end at LF, CR LF or CR and nowhere else; its characters are bytes of UTF-8,
+units of UTF-16 or code points, as client and server agreed. Spans count code points of a text.
+"""
 
 from __future__ import annotations
 
 import os
 import re
-import tempfile
+from bisect import bisect_right
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
-from functools import cached_property
-from pathlib import Path
-from urllib.parse import unquote
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from pathlib import Path, PurePath
+from urllib.parse import quote, unquote, urlsplit
 
 from idlc.diagnostics.source import Source
-from idlc.editor.protocol import uris
-from idlc.editor.protocol.parts import Change, DocumentItem, Range
-from idlc.editor.protocol.positions import in_lines, lines_of
+from idlc.editor.parts import Change, DocumentItem, Position, Range
+from idlc.language.tree import BYTE_ORDER_MARK
 from idlc.model import ir
+from idlc.project.atomic import create, move_over
 from idlc.project.files import cache_folder
 from idlc.project.find import KINDS
 from idlc.project.lock import digest
 from idlc.project.root import Root
+
+# Paths ↔ `file:` URIs, as editors on any system write them.
+
+#: Names that are no text are kept as Python keeps them.
+_ERRORS = "surrogateescape"
+
+
+def to_path(uri: str) -> Path | None:
+    """Return the absolute path that a URI means, `None` for one that is not of a file."""
+    text = path_text(uri, on_windows=os.name == "nt")
+    # on Windows, a URI may lack the drive
+    return Path(os.path.abspath(text)) if text else None  # noqa: PTH100 - keeps links
+
+
+def path_text(uri: str, *, on_windows: bool) -> str:
+    """Return the path that a URI means, as the system writes it; empty for none."""
+    try:
+        parts = urlsplit(uri)
+    except ValueError:
+        return ""
+    path = unquote(parts.path, errors=_ERRORS)
+    host = "" if parts.netloc == "localhost" else unquote(parts.netloc)
+    if parts.scheme != "file" or not path or "\0" in path + host:
+        return ""
+    if not on_windows:
+        return "" if host else path
+    if host:
+        return f"//{host}{path}"
+    if drive := re.match(r"/+([A-Za-z]:)(?=/|$)", path):
+        return f"{drive[1].upper()}{path[drive.end() :] or '/'}"
+    return path
+
+
+def to_uri(path: PurePath) -> str:
+    """Return the URI of an absolute path."""
+    text = path.as_posix()
+    if text.startswith("//"):
+        return "file:" + quote(text, errors=_ERRORS)
+    if path.drive:
+        return f"file:///{path.drive}{quote(text.removeprefix(path.drive), errors=_ERRORS)}"
+    return "file://" + quote(text, errors=_ERRORS)
+
+
+# Positions in a text, as the protocol counts them and as Python does.
+
+TOP = Range(Position(0, 0), Position(0, 0))
+_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)")
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the lines with their ends; the last has none and may be empty."""
+    lines = _LINE.findall(text)
+    lines.append(text[sum(map(len, lines)) :])
+    return lines
+
+
+def units(text: str, encoding: str) -> int:
+    """Return the length of a text in an encoding."""
+    if encoding == "utf-32" or text.isascii():
+        return len(text)
+    if encoding == "utf-8":
+        return len(text.encode("utf-8", "surrogatepass"))
+    return len(text) + sum(character > "\uffff" for character in text)
+
+
+def characters(line: str, count: int, encoding: str) -> int:
+    """Return the number of characters in the first `count` units of a line, without its end.
+
+    A position within a character means its start.
+    """
+    content = line.rstrip("\r\n")
+    if encoding == "utf-32" or content.isascii():
+        return min(count, len(content))
+    passed = 0
+    for at, character in enumerate(content):
+        passed += units(character, encoding)
+        if passed > count:
+            return at
+    return len(content)
+
+
+def in_lines(lines: Sequence[str], position: Position, encoding: str) -> tuple[int, int]:
+    """Return the line and the character of a position; the last if it is beyond."""
+    if position.line >= len(lines):
+        return len(lines) - 1, len(lines[-1])
+    return position.line, characters(lines[position.line], position.character, encoding)
+
+
+class Places:
+    """The places of one text in one encoding.
+
+    With `skips_mark`, the positions do not count a byte order mark, as editors do not that drop it
+    when they read a file.
+    """
+
+    def __init__(self, text: str, encoding: str, *, skips_mark: bool = False) -> None:
+        self._encoding = encoding
+        self._skipped = int(skips_mark and text.startswith(BYTE_ORDER_MARK))
+        self._lines = lines_of(text[self._skipped :])
+        self._starts = [0]
+        for line in self._lines[:-1]:
+            self._starts.append(self._starts[-1] + len(line))
+
+    def position(self, offset: int) -> Position:
+        """Return the position of a character; within a line's end, that end."""
+        offset = max(offset - self._skipped, 0)
+        line = max(bisect_right(self._starts, offset) - 1, 0)
+        before = self._lines[line][: offset - self._starts[line]].rstrip("\r\n")
+        return Position(line, units(before, self._encoding))
+
+    def offset(self, position: Position) -> int:
+        """Return the character at a position."""
+        line, at = in_lines(self._lines, position, self._encoding)
+        return self._skipped + self._starts[line] + at
+
+    def range(self, start: int, end: int) -> Range:
+        """Return the range of some characters."""
+        return Range(self.position(start), self.position(end))
+
+
+@lru_cache(maxsize=256)
+def places(text: str, encoding: str, *, skips_mark: bool = False) -> Places:
+    """Return the places of a text."""
+    return Places(text, encoding, skips_mark=skips_mark)
+
 
 #: The language id of interface files.
 LANGUAGE = "rosmsg"
@@ -29,19 +157,15 @@ LANGUAGE = "rosmsg"
 class Document:
     """An open document.
 
-    `path` is its file, or where it would be saved; `None` for documents that are no files.
+    `path` is its file, or where it would be saved, below `root`; `None` for documents that are no
+    files.
     """
 
     def __init__(self, item: DocumentItem, root: Root) -> None:
         self.uri = item.uri
-        self.path = uris.to_path(item.uri) or _draft(item, root)
+        self.path = to_path(item.uri) or _draft(item, root)
         self.version: int | None = item.version
-        self._lines = lines_of(item.text)
-
-    @cached_property
-    def text(self) -> str:
-        """The whole text."""
-        return "".join(self._lines)
+        self.text = item.text
 
     @property
     def data(self) -> bytes:
@@ -59,27 +183,11 @@ class Document:
     def change(self, changes: Iterable[Change], encoding: str) -> None:
         """Apply changes in order."""
         for change in changes:
-            if change.range is None:
-                self._lines = lines_of(change.text)
-            else:
-                self._replace(change.range, change.text, encoding)
-        self.__dict__.pop("text", None)
-
-    def _replace(self, where: Range, new: str, encoding: str) -> None:
-        """Replace a range; only the lines around it are split again."""
-        lines = self._lines
-        first, start = in_lines(lines, where.start, encoding)
-        last, end = in_lines(lines, where.end, encoding)
-        if (last, end) < (first, start):
-            last, end = first, start
-        # CR and LF may come together or apart at either end
-        low, high = max(first - 1, 0), min(last + 1, len(lines) - 1)
-        before = "".join(lines[low:first]) + lines[first][:start]
-        after = lines[last][end:] + "".join(lines[last + 1 : high + 1])
-        merged = lines_of(before + new + after)
-        if high < len(lines) - 1 and not merged[-1]:
-            del merged[-1]
-        lines[low : high + 1] = merged
+            start, end = 0, len(self.text)
+            if change.range is not None:
+                current = places(self.text, encoding)
+                start, end = current.offset(change.range.start), current.offset(change.range.end)
+            self.text = self.text[:start] + change.text + self.text[max(start, end) :]
 
 
 def _draft(item: DocumentItem, root: Root) -> Path | None:
@@ -98,42 +206,15 @@ def _draft(item: DocumentItem, root: Root) -> Path | None:
     return root.absolute(f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}")
 
 
-class Documents:
-    """All open documents by URI; drafts without a file count as files in the base of a root."""
+# Texts of the catalogue.
 
-    def __init__(self, root: Root) -> None:
-        self._root = root
-        self._open: dict[str, Document] = {}
-
-    def __iter__(self) -> Iterator[Document]:
-        return iter(self._open.values())
-
-    def get(self, uri: str) -> Document | None:
-        """Return an open document."""
-        return self._open.get(uri)
-
-    def open(self, item: DocumentItem) -> Document:
-        """Open a document, again if it is open already."""
-        document = self._open[item.uri] = Document(item, self._root)
-        return document
-
-    def close(self, uri: str) -> Document | None:
-        """Close a document; `None` if it was not open."""
-        return self._open.pop(uri, None)
-
-    def at(self, path: Path) -> Document | None:
-        """Return the open document of a file; of two URIs for it, the one opened last."""
-        return next(
-            (document for document in reversed(self._open.values()) if document.path == path), None
-        )
-
-    def texts(self) -> dict[Path, bytes]:
-        """Return the texts that count instead of the files on disk."""
-        return {document.path: document.data for document in self if document.path is not None}
-
-
-#: Where texts of the catalogue are kept in the cache.
+#: Where they are kept in the cache.
 FOLDER = "interfaces"
+
+
+def is_built_in(source: Source) -> bool:
+    """Return whether a text is from the catalogue."""
+    return source.path.startswith("<")
 
 
 def inside(source: Source) -> str:
@@ -150,27 +231,11 @@ def file_of(source: Source) -> Path | None:
     data = source.text.encode()
     try:
         if not path.is_file() or path.read_bytes() != data:
-            _write(path, data)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            draft = path.with_suffix(f".{os.getpid()}")
+            create(str(draft), data)
+            draft.chmod(0o444)  # nobody is to edit it
+            move_over(str(draft), str(path))
     except OSError:
         return None
     return path
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Replace a file atomically with one that can only be read."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(name).chmod(0o444)
-        Path(name).replace(path)
-    except OSError:
-        with suppress(OSError):
-            Path(name).unlink()
-        raise
-
-
-def is_built_in(source: Source) -> bool:
-    """Return whether a text is from the catalogue."""
-    return source.path.startswith("<")

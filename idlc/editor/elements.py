@@ -1,4 +1,4 @@
-"""The elements of an interface file, and the one at a position."""
+"""The elements of an interface file, the one at a position, uses of interfaces, and edits."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from idlc.diagnostics.report import Edit
 from idlc.diagnostics.source import Source, Span
-from idlc.editor.protocol.parts import Position, TextEdit
-from idlc.editor.protocol.positions import Places, lines_of
+from idlc.editor.documents import Places, lines_of
+from idlc.editor.parts import Position, TextEdit
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot
 from idlc.language import tree
 from idlc.language.parse import parse, parse_definition
 from idlc.model import derive, ir
 from idlc.model.lower import SECTIONS
+
+_ANNOTATION = "idlc.rename"
 
 
 def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
@@ -34,29 +36,39 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
     ]
 
 
-def workspace_edit(
+def by_uri(
     edits: Iterable[Edit], snapshot: Snapshot, state: ServerState
-) -> dict[str, object]:
-    """Return edits of any files as one workspace edit, for the versions that are open."""
-    by_uri: dict[str, list[TextEdit]] = {}
+) -> dict[str, list[TextEdit]]:
+    """Return edits of any files by the URI of their document."""
+    edited: dict[str, list[TextEdit]] = {}
     for edit in dict.fromkeys(edits):
         uri = state.uri(snapshot.path_of(edit.span.source))
-        by_uri.setdefault(uri, []).append(TextEdit(state.range(edit.span), edit.text))
-    return of_documents(by_uri, state)
+        edited.setdefault(uri, []).append(TextEdit(state.range(edit.span), edit.text))
+    return edited
 
 
-def of_documents(edits: Mapping[str, list[TextEdit]], state: ServerState) -> dict[str, object]:
-    """Return edits by URI as one workspace edit, in the form that the client understands."""
-    if not state.supports("workspace", "workspaceEdit", "documentChanges"):
+def workspace_edit(
+    edits: Mapping[str, list[TextEdit]],
+    state: ServerState,
+    move: Mapping[str, str] | None = None,
+    note: Mapping[str, object] | None = None,
+) -> dict[str, object]:
+    """Return edits by URI as one workspace edit, in the form that the client understands.
+
+    `move` has the old and the new URI of a file that is renamed then; `note` annotates all of it.
+    """
+    if not (move or note or state.supports("workspace", "workspaceEdit", "documentChanges")):
         return {"changes": edits}
-    return {"documentChanges": [document_edit(uri, some, state) for uri, some in edits.items()]}
-
-
-def document_edit(uri: str, edits: Iterable[object], state: ServerState) -> dict[str, object]:
-    """Return the edits of one document."""
-    opened = state.documents.get(uri)
-    version = opened.version if opened else None
-    return {"textDocument": {"uri": uri, "version": version}, "edits": list(edits)}
+    mark = {"annotationId": _ANNOTATION} if note else {}
+    changes: list[object] = []
+    for uri, some in edits.items():
+        opened = state.documents.get(uri)
+        document = {"uri": uri, "version": opened.version if opened else None}
+        marked = [{"range": edit.range, "newText": edit.new_text, **mark} for edit in some]
+        changes.append({"textDocument": document, "edits": marked})
+    changes += [{"kind": "rename", **move, **mark}] if move else []
+    notes = {"changeAnnotations": {_ANNOTATION: note}} if note else {}
+    return {"documentChanges": changes, **notes}
 
 
 Part: TypeAlias = Literal["type", "name", "value", "comment"]
@@ -124,16 +136,14 @@ class Spot(NamedTuple):
     span: Span
 
 
-def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
+def elements(context: InterfaceContext) -> Iterator[Element]:
     """Yield the definitions of a file in order; lines that are none are left out."""
-    file = parse(source)
-    parts = derive.sections(interface)
+    file = parse(context.source)
+    parts = derive.sections(context.interface)
     meanings: dict[int, ir.Field | ir.Constant] = {}
     for part in parts:
-        meanings |= {field.name_span.start: field for field in part.fields if field.name_span}
-        meanings |= {
-            constant.name_span.start: constant for constant in part.constants if constant.name_span
-        }
+        definitions: tuple[ir.Field | ir.Constant, ...] = (*part.fields, *part.constants)
+        meanings |= {each.name_span.start: each for each in definitions if each.name_span}
     for section, message in zip(file.sections, parts, strict=False):
         for line in section.lines:
             code = line.after_optional or line
@@ -142,18 +152,26 @@ def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
             body = parse_definition(code.definition)
             if not isinstance(body, tree.Broken):
                 meaning = meanings.get(code.start + body.name.start)
-                yield Element(source, code, body, message, meaning)
+                yield Element(context.source, code, body, message, meaning)
 
 
-def spot_at(state: ServerState, context: InterfaceContext, position: Position) -> Spot | None:
+def comments(context: InterfaceContext) -> Iterator[tuple[tree.Line, Span]]:
+    """Yield every comment of a file, with its line."""
+    for section in parse(context.source).sections:
+        for line in section.lines:
+            if line.comment:
+                start = line.start + len(line.code)
+                yield line, Span(context.source, start, start + len(line.comment))
+
+
+def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     """Return the part of a definition at a position; `None` outside of definitions.
 
     A name includes the position after its last character.
     """
-    offset = state.offset(context.source, position)
-    for element in elements(context.source, context.interface):
-        end = element.line.start + len(element.line.code) + len(element.line.comment)
-        if not element.line.start <= offset <= end:
+    offset = context.state.offset(context.source, position)
+    for element in elements(context):
+        if not element.line.start <= offset <= element.comment.end:
             continue
         parts: list[tuple[Part, Span | None]] = [
             ("name", element.name),
@@ -168,21 +186,21 @@ def spot_at(state: ServerState, context: InterfaceContext, position: Position) -
     return None
 
 
+def has_letters(name: str, word: str) -> bool:
+    """Return whether a name has the letters of a word in their order, whatever their case."""
+    letters = iter(name.lower())
+    return all(letter in letters for letter in word.lower())
+
+
 def section_names(interface: ir.Interface) -> tuple[str, ...]:
     """Return the names of the sections of a file, such as `Request`; empty for a message."""
     names = SECTIONS[interface.name.kind]
     return tuple(name.lstrip("_") for name in names) if len(names) > 1 else ()
 
 
-def snapshots(state: ServerState) -> Iterator[Snapshot]:
-    """Yield the snapshot of each folder that can be read."""
-    candidates = (workspace.snapshot() for workspace in state.workspaces())
-    return (snapshot for snapshot in candidates if snapshot is not None)
-
-
 def uses(state: ServerState) -> Iterator[tuple[Snapshot, Span, ir.TypeName]]:
     """Yield each place where a field's type names a message, and the message."""
-    for snapshot in snapshots(state):
+    for snapshot in state.snapshots():
         for model in snapshot.models.values():
             for interface in model.own:
                 for section in derive.sections(interface):
@@ -196,23 +214,14 @@ def users(name: ir.TypeName, home: Snapshot, state: ServerState) -> Iterator[tup
 
     Fields of another folder that has its own message of this name refer to that one.
     """
-    source = text_of(name, home)
+    source = home.source(name)
     file = home.path_of(source).resolve() if source else None
     overriding = [
         snapshot
-        for snapshot in snapshots(state)
+        for snapshot in state.snapshots()
         for path, (own, _) in snapshot.interfaces.items()
         if own.name == name and path.resolve() != file
     ]
     for snapshot, span, target in uses(state):
         if target == name and not any(snapshot is other for other in overriding):
             yield snapshot, span
-
-
-def text_of(name: ir.TypeName, snapshot: Snapshot) -> Source | None:
-    """Return the text that defines an interface."""
-    for model in snapshot.models.values():
-        interface = model.interfaces.get(name)
-        if interface is not None and interface.source is not None:
-            return interface.source
-    return snapshot.source(name)

@@ -14,11 +14,10 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
-from idlc.editor.protocol import capabilities, framing
-from idlc.editor.protocol.framing import (
+from idlc.editor import protocol
+from idlc.editor.protocol import (
     CANCELLED,
     INTERNAL_ERROR,
     INVALID_PARAMS,
@@ -32,61 +31,51 @@ from idlc.editor.protocol.framing import (
 if TYPE_CHECKING:
     from idlc.editor.state import ServerState
 
-
-class Method(NamedTuple):
-    """A function of a module in `idlc.editor.features`, and the type of its parameters."""
-
-    module: str
-    function: str
-    params: str
-
-    def prepare(self) -> ModuleType:
-        """Import and return its module."""
-        return import_module(f"idlc.editor.features.{self.module}")
-
-    def call(self, state: ServerState, params: object) -> object:
-        """Return the function's answer; raises ValidationError for wrong parameters."""
-        import msgspec
-
-        request = msgspec.convert(
-            params, getattr(import_module("idlc.editor.protocol.parts"), self.params)
-        )
-        answer: object = getattr(self.prepare(), self.function)(state, request)
-        return answer
-
-
+#: Functions that answer, each with its module and the type of its parameters. The state is their
+#: first argument.
 METHODS = {
-    "textDocument/diagnostic": Method("diagnostics", "document", "DocumentParams"),
-    "workspace/diagnostic": Method("diagnostics", "workspace", "WorkspaceDiagnosticParams"),
-    "textDocument/completion": Method("completion", "complete", "PositionParams"),
-    "completionItem/resolve": Method("completion", "resolve", "CompletionItem"),
-    "textDocument/codeAction": Method("actions", "actions", "CodeActionParams"),
-    "textDocument/prepareRename": Method("rename", "prepare", "PositionParams"),
-    "textDocument/rename": Method("rename", "rename", "RenameParams"),
-    "workspace/willRenameFiles": Method("rename", "files", "RenameFilesParams"),
-    "workspace/executeCommand": Method("commands", "execute", "Command"),
-    "textDocument/hover": Method("hover", "hover", "PositionParams"),
-    "textDocument/definition": Method("navigation", "definition", "PositionParams"),
-    "textDocument/typeDefinition": Method("navigation", "type_definition", "PositionParams"),
-    "textDocument/references": Method("navigation", "references", "ReferenceParams"),
-    "textDocument/documentHighlight": Method("navigation", "highlights", "PositionParams"),
-    "textDocument/documentSymbol": Method("structure", "document", "DocumentParams"),
-    "workspace/symbol": Method("structure", "workspace", "WorkspaceSymbolParams"),
-    "textDocument/inlayHint": Method("lenses", "hints", "RangeParams"),
-    "textDocument/codeLens": Method("lenses", "lenses", "DocumentParams"),
-    "codeLens/resolve": Method("lenses", "resolve", "Lens"),
-    "textDocument/semanticTokens/full": Method("tokens", "document", "DocumentParams"),
-    "textDocument/semanticTokens/range": Method("tokens", "part", "RangeParams"),
-    "textDocument/foldingRange": Method("structure", "folds", "DocumentParams"),
-    "textDocument/selectionRange": Method("structure", "selections", "PositionsParams"),
-    "textDocument/documentLink": Method("structure", "links", "DocumentParams"),
-    "workspace/textDocumentContent": Method(
-        "navigation", "built_in_text", "TextDocumentContentParams"
-    ),
-    "textDocument/formatting": Method("formatting", "document", "DocumentParams"),
-    "textDocument/rangeFormatting": Method("formatting", "part", "RangeParams"),
-    "textDocument/onTypeFormatting": Method("formatting", "typed", "PositionParams"),
+    "textDocument/diagnostic": ("problems", "document", "DocumentParams"),
+    "workspace/diagnostic": ("problems", "workspace", "WorkspaceDiagnosticParams"),
+    "textDocument/completion": ("completion", "complete", "PositionParams"),
+    "completionItem/resolve": ("completion", "resolve", "CompletionItem"),
+    "textDocument/codeAction": ("actions", "actions", "CodeActionParams"),
+    "workspace/executeCommand": ("actions", "execute", "Command"),
+    "textDocument/prepareRename": ("rename", "prepare", "PositionParams"),
+    "textDocument/rename": ("rename", "rename", "RenameParams"),
+    "workspace/willRenameFiles": ("rename", "files", "RenameFilesParams"),
+    "textDocument/definition": ("navigation", "definition", "PositionParams"),
+    "textDocument/references": ("navigation", "references", "ReferenceParams"),
+    "workspace/textDocumentContent": ("navigation", "built_in_text", "Uri"),
+    "workspace/symbol": ("structure", "workspace", "WorkspaceSymbolParams"),
+    "textDocument/selectionRange": ("structure", "selections", "PositionsParams"),
+    "codeLens/resolve": ("descriptions", "resolve", "Lens"),
 }
+#: Those about an interface file: its context is their first argument. Last is the answer where no
+#: such file is checked.
+FILE_METHODS: dict[str, tuple[str, str, str, object]] = {
+    "textDocument/hover": ("descriptions", "hover", "PositionParams", None),
+    "textDocument/inlayHint": ("descriptions", "hints", "RangeParams", ()),
+    "textDocument/codeLens": ("descriptions", "lenses", "DocumentParams", ()),
+    "textDocument/typeDefinition": ("navigation", "type_definition", "PositionParams", None),
+    "textDocument/documentHighlight": ("navigation", "highlights", "PositionParams", ()),
+    "textDocument/documentSymbol": ("structure", "symbols", "DocumentParams", ()),
+    "textDocument/foldingRange": ("structure", "folds", "DocumentParams", ()),
+    "textDocument/documentLink": ("structure", "links", "DocumentParams", ()),
+    "textDocument/semanticTokens/full": ("structure", "tokens", "DocumentParams", {"data": ()}),
+    "textDocument/semanticTokens/range": ("structure", "tokens_in", "RangeParams", {"data": ()}),
+    "textDocument/formatting": ("actions", "format_document", "DocumentParams", ()),
+    "textDocument/rangeFormatting": ("actions", "format_range", "RangeParams", ()),
+    "textDocument/onTypeFormatting": ("actions", "format_typed", "PositionParams", ()),
+}
+
+
+def feature(name: str) -> Callable[[object, object], object]:
+    """Import and return the function that answers a method."""
+    module, function = (FILE_METHODS.get(name) or METHODS[name])[:2]
+    answering: Callable[[object, object], object] = getattr(
+        import_module(f"idlc.editor.{module}"), function
+    )
+    return answering
 
 
 #: No process has a higher number.
@@ -124,8 +113,9 @@ class Server:
         self._lock = threading.Lock()
         self._count = 0
         self._asked: dict[int, Answer] = {}
-        #: Makes the state after `initialize`, when it is needed: its imports take long.
-        self._make_state: Callable[[], ServerState] | None = None
+        #: The parameters of `initialize`. The state is made of them when it is needed: its imports
+        #: take long.
+        self._initialize: dict[str, Any] | None = None
         self._state: ServerState | None = None
         self._client_process: object = None
         self._is_shut_down = False
@@ -134,19 +124,11 @@ class Server:
     def state(self) -> ServerState:
         """The state, made at its first use; only after `initialize`."""
         if self._state is None:
-            assert self._make_state is not None
-            self._state = self._make_state()
+            from idlc.editor.state import ServerState
+
+            assert self._initialize is not None
+            self._state = ServerState(self._initialize, self.notify, self.ask)
         return self._state
-
-    def _begin(self, initialize: dict[str, Any]) -> ServerState:
-        from idlc.editor.state import ServerState
-
-        return ServerState(initialize, self.notify, self.ask)
-
-    @property
-    def _live_state(self) -> ServerState | None:
-        """The state if there is one and the client has not ended the session."""
-        return None if self._is_shut_down else self._state
 
     def run(self) -> int:
         """Serve, and return the exit status."""
@@ -161,17 +143,16 @@ class Server:
                     in_a_row = 0
                     self._attempt("problems", self.publish_problems)
                 if since >= MOST_IN_A_ROW:
-                    since = self._tidy()
+                    since = 0
+                    self._attempt("preparation", self.rest)
                 try:
                     arrival = self._arrivals.get(timeout=wait)
                 except queue.Empty:
                     wait = min(2 * wait, PATIENCE)
-                    if since:
-                        since = self._tidy()
-                    elif self._client_is_gone():
+                    if not since and self._client_is_gone():
                         return 1
-                    else:
-                        self._attempt("idle", self.idle)
+                    since = 0
+                    self._attempt("preparation", self.rest)
                     continue
                 in_a_row += 1
                 since += 1
@@ -184,27 +165,40 @@ class Server:
 
     def answer(self, name: str, params: object) -> object:
         """Return the answer to a request; raises RequestError."""
-        if self._is_shut_down or (self._make_state is not None and name == "initialize"):
+        if self._is_shut_down or (self._initialize is not None and name == "initialize"):
             raise RequestError(INVALID_REQUEST, f"`{name}` is not for now")
         if name == "initialize":
             if not isinstance(params, dict):
                 raise RequestError(INVALID_PARAMS, "`initialize` needs an object")
-            self._make_state = lambda: self._begin(params)
+            self._initialize = params
             self._client_process = params.get("processId")
             client = params.get("capabilities")
-            return capabilities.answer(client if isinstance(client, dict) else {})
-        if self._make_state is None:
+            return protocol.initialize_result(client if isinstance(client, dict) else {})
+        if self._initialize is None:
             raise RequestError(NOT_INITIALIZED, "`initialize` comes first")
         if name == "shutdown":
             self._is_shut_down = True
             return None
-        if name not in METHODS:
+        if name not in METHODS and name not in FILE_METHODS:
             raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
-        return METHODS[name].call(self.state, params)
+        return self._call(name, params)
+
+    def _call(self, name: str, params: object) -> object:
+        """Return a function's answer; raises ValidationError for wrong parameters."""
+        import msgspec
+
+        from idlc.editor import parts
+
+        kind = (FILE_METHODS.get(name) or METHODS[name])[2]
+        request = msgspec.convert(params, getattr(parts, kind))
+        if name in METHODS:
+            return feature(name)(self.state, request)
+        context = self.state.context(request.text_document.uri)
+        return feature(name)(context, request) if context else FILE_METHODS[name][3]
 
     def handle_notification(self, name: str, params: object) -> None:
         """Handle a notification; unknown ones, and those out of session, are ignored."""
-        if self._make_state is not None and not self._is_shut_down:
+        if self._initialize is not None and not self._is_shut_down:
             self.state.handle_notification(name, params)
 
     def encode(self, message: object) -> bytes:
@@ -220,28 +214,21 @@ class Server:
 
     def publish_problems(self) -> None:
         """Send the client the problems of each document for which they changed."""
-        if (state := self._live_state) is not None and state.is_changed:
-            from idlc.editor.publish import publish
+        if self._state is not None and self._state.is_changed and not self._is_shut_down:
+            from idlc.editor.problems import publish
 
-            publish(state)
+            publish(self._state)
 
-    def idle(self) -> None:
-        """Poll for changes while the client is idle."""
-        if (state := self._live_state) is not None:
-            from idlc.editor.publish import idle
+    def rest(self) -> None:
+        """Do work that nobody waits for: poll for changes, and import all features."""
+        if self._state is not None and not self._is_shut_down:
+            if self._state.documents:
+                for name in (*METHODS, *FILE_METHODS):
+                    feature(name)  # so that its first answer takes no longer
+            from idlc.editor.problems import rest
 
-            idle(state)
-
-    def prepare(self) -> None:
-        """Import all features, so that their first answers take no longer, and poll for changes."""
-        if (state := self._live_state) is None:
-            return
-        if any(True for _ in state.documents):
-            for method in METHODS.values():
-                method.prepare()
-        from idlc.editor.publish import rest
-
-        rest(state)
+            rest(self._state)
+        gc.collect()
 
     def _client_is_gone(self) -> bool:
         """Return whether the process of the client has ended, where the system can tell."""
@@ -250,23 +237,15 @@ class Server:
             return False
         try:
             os.kill(client, 0)
-        except ProcessLookupError:
-            return True
-        except OSError:
-            return False
+        except OSError as error:
+            return isinstance(error, ProcessLookupError)
         return False
-
-    def _tidy(self) -> int:
-        """Do work that nobody waits for; return 0, the messages since then."""
-        self._attempt("preparation", self.prepare)
-        gc.collect()
-        return 0
 
     def _read(self) -> None:
         """Put each message into the queue of the loop; `None` comes last."""
         while True:
             try:
-                body = framing.read(self._reader)
+                body = protocol.read(self._reader)
                 if body is None:
                     break
                 message = _message(body)
@@ -280,7 +259,7 @@ class Server:
                     with self._lock:
                         self._waiting[message["id"]] += 1
                 self._arrivals.put(message)
-            except framing.TooLongError:
+            except protocol.TooLongError:
                 self._arrivals.put(RequestError(INVALID_REQUEST, "the message is too long"))
             except RequestError as error:
                 self._arrivals.put(error)
@@ -368,7 +347,7 @@ class Server:
         self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
 
     def _write(self, message: object) -> None:
-        framing.write(self._writer, self.encode(message))
+        protocol.write(self._writer, self.encode(message))
 
 
 def _message(body: bytes) -> Message:

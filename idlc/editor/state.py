@@ -2,61 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from idlc.diagnostics.source import Source, Span
-from idlc.editor.documents import Document, Documents, file_of, inside, is_built_in
-from idlc.editor.protocol import capabilities, positions, uris
-from idlc.editor.protocol.framing import INVALID_REQUEST, RequestError
-from idlc.editor.protocol.parts import (
-    DidChange,
-    DidChangeFiles,
-    DidChangeFolders,
-    DidChangeSettings,
-    DidOpen,
-    DocumentParams,
-    Folder,
-    Initialize,
-    Location,
-    Position,
-    Range,
-    RenameFilesParams,
+from idlc.editor import parts, protocol
+from idlc.editor.documents import (
+    Document,
+    Places,
+    file_of,
+    inside,
+    is_built_in,
+    places,
+    to_path,
+    to_uri,
 )
-from idlc.editor.workspace import OTHER_INPUTS, EditorOptions, Snapshot, Workspace, stray_folder
+from idlc.editor.protocol import INVALID_REQUEST, RequestError
+from idlc.editor.workspace import (
+    OTHER_INPUTS,
+    Settings,
+    Snapshot,
+    Workspace,
+    in_folder,
+    stray_folder,
+)
+from idlc.language.tree import BYTE_ORDER_MARK
 from idlc.model import ir
+from idlc.model.link import Model
 from idlc.project.find import KINDS
 from idlc.project.root import Root
 
 #: The files to watch on disk: all that a check may read.
 WATCHED = ("**/*.{msg,srv,action}", f"**/{{{','.join(OTHER_INPUTS)}}}")
-#: A client's name for watches of folders which are not below the workspace's.
-RELATIVE = "relativePatternSupport"
 #: A client's name for showing documents which are no files.
 CONTENT = "textDocumentContent"
 
 
-class Settings(EditorOptions, frozen=True, rename="camel", kw_only=True):
-    """An editor's settings below `idlc`: options of `idlc check`, and of features.
+class InterfaceContext(NamedTuple):
+    """A file that is checked: its workspace, the interface that it defines, and its text.
 
-    `against` is the version that the lens on breaking changes compares with.
+    `snapshot` is the workspace at this moment.
     """
 
-    inlay_hints: bool = True
-    code_lens: bool = True
-    default_lens: bool = True
-    against: str = ""
-
-
-class InterfaceContext(NamedTuple):
-    """An interface file: the snapshot of its folder, the interface that it defines, its text."""
-
+    state: ServerState
+    workspace: Workspace
     snapshot: Snapshot
     interface: ir.Interface
     source: Source
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.snapshot.path_of(self.source)
+
+    @property
+    def model(self) -> Model | None:
+        """A model of the interface, `None` if there are errors."""
+        return self.snapshot.model_of(self.interface)
 
 
 class Renaming(NamedTuple):
@@ -86,54 +91,54 @@ class ServerState:
     ) -> None:
         self.notify = notify
         self.ask = ask
-        self.documents = Documents(Root.here())
+        self.root = Root.here()
+        self.documents: dict[str, Document] = {}
         self.settings = Settings()
         self.renaming: Renaming | None = None
-        #: Folders that lenses compare with a revision, with git's folders of references for each.
-        self.repositories: dict[Path, tuple[Path, ...]] = {}
         #: Whether problems may have changed since they were published.
         self.is_changed = False
-        #: Whether the client was requested to report changes on disk.
-        self.is_watching = False
         #: The problems that were published for each document, and the document's version then.
         self.published: dict[str, tuple[int | None, bytes]] = {}
-        #: A checksum of the features' answers for each document, and the document's version then.
-        self.fingerprints: dict[str, tuple[int | None, int]] = {}
-        self._options = EditorOptions()
+        #: What other documents decide of the features' answers for each document, and the
+        #: document's version then.
+        self.fingerprints: dict[str, tuple[int | None, object]] = {}
         self._folders: dict[Path, Workspace] = {}
         self._strays: dict[tuple[Path, tuple[str, ...]], Workspace] = {}
         self._notifications: dict[str, tuple[type, Callable[[Any], None]]] = {
-            "textDocument/didOpen": (DidOpen, self._open),
-            "textDocument/didChange": (DidChange, self._change),
-            "textDocument/didSave": (DocumentParams, self._save),
-            "textDocument/didClose": (DocumentParams, self._close),
-            "workspace/didChangeWatchedFiles": (DidChangeFiles, self._change_files),
-            "workspace/didRenameFiles": (RenameFilesParams, self._rename_files),
-            "workspace/didChangeWorkspaceFolders": (DidChangeFolders, self._change_folders),
-            "workspace/didChangeConfiguration": (DidChangeSettings, self._change_settings),
+            "textDocument/didOpen": (parts.DidOpen, self._open),
+            "textDocument/didChange": (parts.DidChange, self._change),
+            "textDocument/didSave": (parts.DocumentParams, lambda _: self.forget()),
+            "textDocument/didClose": (parts.DocumentParams, self._close),
+            "workspace/didChangeWatchedFiles": (parts.DidChangeFiles, self._change_files),
+            "workspace/didRenameFiles": (parts.RenameFilesParams, self._rename_files),
+            "workspace/didChangeWorkspaceFolders": (parts.DidChangeFolders, self._change_folders),
+            "workspace/didChangeConfiguration": (parts.DidChangeSettings, self._change_settings),
             "initialized": (dict, self._initialized),
         }
         try:
-            client = msgspec.convert(initialize, Initialize)
+            client = msgspec.convert(initialize, parts.Initialize)
         except msgspec.ValidationError:  # malformed capabilities from the client
-            client = Initialize()
+            client = parts.Initialize()
         self.client = client.capabilities
-        self.encoding = capabilities.encoding(client.capabilities)
+        self.encoding = protocol.encoding(client.capabilities)
+        self.is_watching = self.supports(
+            "workspace", "didChangeWatchedFiles", "dynamicRegistration"
+        )
         self._use_settings(client.initialization_options)
-        folders = [folder.uri for folder in client.workspace_folders or ()]
-        if client.workspace_folders is None:
-            folders = [client.root_uri] if client.root_uri else []
-        self._replace_folders([Folder(uri) for uri in folders], [])
+        folders = client.workspace_folders
+        if folders is None:
+            folders = (parts.Uri(client.root_uri),) if client.root_uri else ()
+        self._change_folders(parts.DidChangeFolders(parts.FolderChanges(folders, ())))
 
     def handle_notification(self, name: str, params: object) -> None:
         """Handle a notification; unknown ones are ignored."""
-        kind, handler = self._notifications.get(name, (None, None))
-        if kind is not None and handler is not None:
+        if name in self._notifications:
+            kind, handler = self._notifications[name]
             handler(msgspec.convert(params, kind))
 
     def supports(self, *path: str) -> bool:
         """Return whether the client has a capability, or names it in a list."""
-        return capabilities.supports(self.client, *path)
+        return protocol.supports(self.client, *path)
 
     def refresh(self, what: str) -> None:
         """Have the client request a feature again, such as `codeLens`, if it can."""
@@ -144,24 +149,24 @@ class ServerState:
 
     def workspaces(self) -> list[Workspace]:
         """Return the workspaces of the client's folders and of stray files, innermost first."""
-        strays: dict[Path, list[tuple[str, ...]]] = {}
-        for document in self.documents:
-            path = document.path
-            if path is None or path.suffix not in KINDS:
-                continue
-            if not any(workspace.holds(path) for workspace in self._folders.values()):
+        strays: dict[Path, set[str]] = {}
+        for path in filter(None, (document.path for document in self.documents.values())):
+            if path.suffix in KINDS and not any(
+                workspace.holds(path) for workspace in self._folders.values()
+            ):
                 folder, paths = stray_folder(path)
-                strays.setdefault(folder, []).append(paths)
-        folders = {(folder, _together(paths)): folder for folder, paths in strays.items()}
-        self._strays = {
-            key: self._strays.get(key) or self._workspace(folder, key[1])
-            for key, folder in folders.items()
-        }
+                strays.setdefault(folder, set()).update(paths)
+        keys = [(folder, tuple(sorted(paths))) for folder, paths in strays.items()]
+        self._strays = {key: self._strays.get(key) or self._workspace(*key) for key in keys}
         return self._known_workspaces()
 
     def workspace_of(self, path: Path) -> Workspace | None:
         """Return the innermost workspace that holds a file."""
         return next((workspace for workspace in self.workspaces() if workspace.holds(path)), None)
+
+    def snapshots(self) -> Iterator[Snapshot]:
+        """Yield the snapshot of each folder that can be read."""
+        return filter(None, (workspace.snapshot() for workspace in self.workspaces()))
 
     def forget(self) -> None:
         """Have all folders read again when they are needed."""
@@ -185,7 +190,7 @@ class ServerState:
         return sorted(every, key=lambda workspace: len(workspace.folder.parts), reverse=True)
 
     def _workspace(self, folder: Path, paths: tuple[str, ...] = ()) -> Workspace:
-        return Workspace(folder, self._options, self.documents.texts, paths)
+        return Workspace(folder, self.settings, self.texts, paths)
 
     def _add(self, folders: Iterable[Path]) -> None:
         """Add folders of the workspace, but no whole disk or home, which would take minutes."""
@@ -194,15 +199,11 @@ class ServerState:
                 self._folders.setdefault(folder, self._workspace(folder))
         self._strays.clear()
 
-    def _replace_folders(self, added: Any, removed: Any) -> None:
-        for path in (uris.to_path(folder.uri) for folder in removed):
-            if path is not None:
-                self._folders.pop(path, None)
-        self._add(path for folder in added if (path := uris.to_path(folder.uri)))
+    def _change_folders(self, params: parts.DidChangeFolders) -> None:
+        for path in filter(None, (to_path(folder.uri) for folder in params.event.removed)):
+            self._folders.pop(path, None)
+        self._add(filter(None, (to_path(folder.uri) for folder in params.event.added)))
         self.is_changed = True
-
-    def _change_folders(self, params: DidChangeFolders) -> None:
-        self._replace_folders(params.event.added, params.event.removed)
 
     # Documents and files.
 
@@ -211,37 +212,46 @@ class ServerState:
         path = self.path(uri)
         workspace = self.workspace_of(path) if path else None
         snapshot = workspace.snapshot() if workspace else None
-        if path is None or snapshot is None or path not in snapshot.interfaces:
+        if not (path and workspace and snapshot and path in snapshot.interfaces):
             return None
-        interface, source = snapshot.interfaces[path]
-        return InterfaceContext(snapshot, interface, source)
+        return InterfaceContext(self, workspace, snapshot, *snapshot.interfaces[path])
 
     def path(self, uri: str) -> Path | None:
         """Return the path of a document."""
         document = self.documents.get(uri)
-        return document.path if document else uris.to_path(uri)
+        return document.path if document else to_path(uri)
+
+    def document_at(self, path: Path) -> Document | None:
+        """Return the open document of a file; of two URIs for it, the one opened last."""
+        opened = reversed(self.documents.values())
+        return next((document for document in opened if document.path == path), None)
+
+    def texts(self) -> dict[Path, bytes]:
+        """Return the texts that count instead of the files on disk."""
+        documents = self.documents.values()
+        return {document.path: document.data for document in documents if document.path is not None}
 
     def uri(self, path: Path) -> str:
         """Return the URI of a file, as the client spells it if it is open."""
-        document = self.documents.at(path)
-        return document.uri if document else uris.from_path(path)
+        document = self.document_at(path)
+        return document.uri if document else to_uri(path)
 
-    def offset(self, source: Source, position: Position) -> int:
+    def offset(self, source: Source, position: parts.Position) -> int:
         """Return the character of a text at a position."""
         return self._places(source).offset(position)
 
-    def range(self, span: Span) -> Range:
+    def range(self, span: Span) -> parts.Range:
         """Return the range of a span."""
         return self._places(span.source).range(span.start, span.end)
 
-    def _places(self, source: Source) -> positions.Places:
+    def _places(self, source: Source) -> Places:
         """Return the places of a text; a client that keeps byte order marks counts them."""
-        skips_mark = positions.has_mark(source.text) and not any(
-            positions.has_mark(document.text) for document in self.documents
+        skips_mark = source.text.startswith(BYTE_ORDER_MARK) and not any(
+            document.text.startswith(BYTE_ORDER_MARK) for document in self.documents.values()
         )
-        return positions.places(source.text, self.encoding, skips_mark=skips_mark)
+        return places(source.text, self.encoding, skips_mark=skips_mark)
 
-    def location(self, span: Span, snapshot: Snapshot) -> Location:
+    def location(self, span: Span, folder: Path) -> parts.Location:
         """Return the location of a span; a built-in interface is a document without a file.
 
         For clients that cannot show such a document, it is a file of the user's cache.
@@ -249,121 +259,77 @@ class ServerState:
         source = span.source
         if is_built_in(source):
             path = None if self.supports("workspace", CONTENT) else file_of(source)
-            uri = uris.from_path(path) if path else f"idlc:/{inside(source)}"
-            return Location(uri, self.range(span))
-        return Location(self.uri(snapshot.path_of(source)), self.range(span))
+            uri = to_uri(path) if path else f"idlc:/{inside(source)}"
+            return parts.Location(uri, self.range(span))
+        return parts.Location(self.uri(in_folder(folder, source.path)), self.range(span))
 
-    def _open(self, params: DidOpen) -> None:
-        document = self.documents.open(params.text_document)
+    def _open(self, params: parts.DidOpen) -> None:
+        document = Document(params.text_document, self.root)
+        self.documents[document.uri] = document
         self.published.pop(document.uri, None)  # the client may have dropped it since
-        self._follow(document, document.data)
+        self._follow(document.path, document.data)
 
-    def _change(self, params: DidChange) -> None:
+    def _change(self, params: parts.DidChange) -> None:
         document = self.documents.get(params.text_document.uri)
         if document is None:
             raise RequestError(INVALID_REQUEST, f"{params.text_document.uri} is not open")
         document.version = params.text_document.version
         document.change(params.content_changes, self.encoding)
-        self._follow(document, document.data)
+        self._follow(document.path, document.data)
 
-    def _close(self, params: DocumentParams) -> None:
-        document = self.documents.close(params.text_document.uri)
+    def _close(self, params: parts.DocumentParams) -> None:
+        document = self.documents.pop(params.text_document.uri, None)
         if document is not None:
-            self._follow(document, None)
+            self._follow(document.path)
 
-    def _save(self, _: DocumentParams) -> None:
-        self.forget()
-
-    def _follow(self, document: Document, data: bytes | None) -> None:
-        """Use a new text for a document; `None` for the one on disk."""
-        if document.path is not None:
-            for workspace in self._known_workspaces():
-                workspace.follow(document.path, data)
+    def _follow(self, path: Path | None, data: bytes | None = None) -> None:
+        """Use a new text for a file; without one, that on disk, or of a document still open."""
         self.is_changed = True
-
-    def _change_files(self, params: DidChangeFiles) -> None:
-        paths = {path for change in params.changes if (path := uris.to_path(change.uri))}
-        of_git = {path for path in paths if self._is_of_git(path)}
-        if of_git:
-            self.refresh_moved_lenses()
-        self._follow_disk(paths - of_git)
-
-    def _rename_files(self, params: RenameFilesParams) -> None:
-        moved = (uris.to_path(uri) for file in params.files for uri in (file.old_uri, file.new_uri))
-        self._follow_disk(filter(None, moved))
-
-    def _follow_disk(self, paths: Iterable[Path]) -> None:
-        """Handle changes of files on disk; the text of an open document counts as before."""
-        for path in paths:
+        if path is not None:
             for workspace in self._known_workspaces():
-                workspace.follow(path, None)
-        self.is_changed = True
+                workspace.follow(path, data)
 
-    # Git revisions, with which lenses compare.
+    def _change_files(self, params: parts.DidChangeFiles) -> None:
+        for change in params.changes:
+            self._follow(to_path(change.uri))
 
-    def follow_git(self, folder: Path, repository: Callable[[], Iterable[Path]]) -> None:
-        """Have the client report when another commit is checked out for a folder, if it can."""
-        if folder in self.repositories:
-            return
-        places = self.repositories[folder] = tuple(repository())
-        if not (places and self.supports("workspace", "didChangeWatchedFiles", RELATIVE)):
-            return
-        watchers = [
-            {"globPattern": {"baseUri": uris.from_path(place), "pattern": pattern}}
-            for place in places
-            for pattern in ("{HEAD,packed-refs}", "refs/**")
-        ]
-        method = "workspace/didChangeWatchedFiles"
-        options = {"watchers": watchers}
-        registration = {"id": uris.from_path(folder), "method": method, "registerOptions": options}
-        self.ask("client/registerCapability", {"registrations": [registration]})
-
-    def _is_of_git(self, path: Path) -> bool:
-        """Return whether a file is one in which git records the commit that is checked out."""
-        places = (place for places in self.repositories.values() for place in places)
-        return any(path.is_relative_to(place) for place in places)
+    def _rename_files(self, params: parts.RenameFilesParams) -> None:
+        for file in params.files:
+            self._follow(to_path(file.old_uri))
+            self._follow(to_path(file.new_uri))
 
     def refresh_moved_lenses(self) -> None:
         """Have lenses requested again if the revision that they compare with has moved."""
-        moved = [
-            workspace.baseline(self.settings.against).has_moved()
-            for workspace in self._known_workspaces()
-            if workspace.folder in self.repositories and workspace.is_loaded
-        ]
-        if any(moved):
+        if [workspace for workspace in self._known_workspaces() if workspace.has_moved()]:
             self.refresh("codeLens")
 
     # Settings.
 
     def _initialized(self, _: object) -> None:
         """Register for changes of files and settings, and fetch the settings."""
-        requested: list[tuple[str, dict[str, object]]] = []
-        if self.supports("workspace", "didChangeWatchedFiles", "dynamicRegistration"):
-            options: dict[str, object] = {
-                "watchers": [{"globPattern": pattern} for pattern in WATCHED]
-            }
-            requested.append(("workspace/didChangeWatchedFiles", options))
-            self.is_watching = True
-        if self.supports("workspace", "didChangeConfiguration", "dynamicRegistration"):
-            requested.append(("workspace/didChangeConfiguration", {"section": "idlc"}))
-        if requested:
-            registrations = [
-                {"id": method, "method": method, "registerOptions": options}
-                for method, options in requested
-            ]
+        watchers = [{"globPattern": pattern} for pattern in WATCHED]
+        options: dict[str, object] = {
+            "didChangeWatchedFiles": {"watchers": watchers},
+            "didChangeConfiguration": {"section": "idlc"},
+        }
+        registrations = [
+            {"id": method, "method": method, "registerOptions": options[name]}
+            for name in options
+            if self.supports("workspace", name, "dynamicRegistration")
+            for method in [f"workspace/{name}"]
+        ]
+        if registrations:
             self.ask("client/registerCapability", {"registrations": registrations})
-        self._fetch_settings()
+        self._change_settings(parts.DidChangeSettings())
 
-    def _fetch_settings(self) -> None:
+    def _change_settings(self, params: parts.DidChangeSettings) -> None:
+        """Fetch the settings, or use those that a client sends which answers no such request."""
         if self.supports("workspace", "configuration"):
-            items = {"items": [{"section": "idlc"}]}
             self.ask(
-                "workspace/configuration", items, lambda values: self._use_settings(*values[:1])
+                "workspace/configuration",
+                {"items": [{"section": "idlc"}]},
+                lambda values: self._use_settings(*values[:1]),
             )
-
-    def _change_settings(self, params: DidChangeSettings) -> None:
-        if self.supports("workspace", "configuration"):
-            self._fetch_settings()
         else:
             self._use_settings(params.settings)
 
@@ -373,19 +339,12 @@ class ServerState:
             return
         self.is_changed = True
         own = settings.get("idlc", settings) if isinstance(settings, dict) else {}
+        before = self.settings
         try:
             self.settings = msgspec.convert(own, Settings)
         except msgspec.ValidationError as error:
             message = f"the settings of idlc are not used: {error}"
             self.notify("window/showMessage", {"type": 2, "message": message})
-            return
-        names = EditorOptions.__struct_fields__
-        options = EditorOptions(**{name: getattr(self.settings, name) for name in names})
-        if options != self._options:
-            self._options = options
+        if self.settings != before:
             folders, self._folders = self._folders, {}
             self._add(folders)
-
-
-def _together(paths: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    return tuple(sorted({path for some in paths for path in some}))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import gc
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,28 +18,28 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from idlc.check import select
-from idlc.check.compiler import InternalError
+from idlc.check.compiler import internal_error
 from idlc.check.run import checkers, select_problems
-from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
-from idlc.project.find import DiskSnapshot, Listing, list_files, root_of
-from idlc.project.inputs import output_folders
+from idlc.project.find import DiskSnapshot, InterfaceFile, Listing, list_files, root_of
+from idlc.project.inputs import Inputs, output_folders
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
     from idlc.check.select import Selection
     from idlc.compare.breaking import Baseline, Side
-    from idlc.diagnostics.report import Diagnostic, Edit
-    from idlc.diagnostics.source import Source, Span
+    from idlc.diagnostics.report import Diagnostic
+    from idlc.diagnostics.source import Source
     from idlc.model.link import Model
     from idlc.project.library import Library
     from idlc.project.package_xml import Facts
 
+_BUG = "this is a bug in idlc, please report it"
 #: Files that a check of a package may read beside its interfaces.
 OTHER_INPUTS = (
     MANIFEST,
@@ -51,8 +51,11 @@ OTHER_INPUTS = (
 )
 
 
-class EditorOptions(msgspec.Struct, frozen=True, rename="camel"):
-    """Options of `idlc check` that an editor's settings give."""
+class Settings(msgspec.Struct, frozen=True, rename="camel"):
+    """An editor's settings below `idlc`: options of `idlc check`, and of features.
+
+    `against` is the version that the lens on breaking changes compares with.
+    """
 
     select: str = ""
     ignore: str = ""
@@ -60,6 +63,10 @@ class EditorOptions(msgspec.Struct, frozen=True, rename="camel"):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     distro: str = ""
+    inlay_hints: bool = True
+    code_lens: bool = True
+    default_lens: bool = True
+    against: str = ""
 
 
 class Snapshot(msgspec.Struct, frozen=True, dict=True):
@@ -106,12 +113,16 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
         return None
 
     def source(self, name: ir.TypeName) -> Source | None:
-        """Return the text of an interface of any package."""
+        """Return the text of an interface of any package, those of the folder first."""
+        for model in self.models.values():
+            interface = model.interfaces.get(name)
+            if interface is not None and interface.source is not None:
+                return interface.source
         return self.library.source(name)
 
     def path_of(self, source: Source) -> Path:
         """Return the absolute path of a file's text."""
-        return Path(os.path.normpath(self.folder / source.path))
+        return in_folder(self.folder, source.path)
 
 
 class Workspace:
@@ -124,7 +135,7 @@ class Workspace:
     def __init__(
         self,
         folder: Path,
-        options: EditorOptions,
+        options: Settings,
         texts: Callable[[], Mapping[Path, bytes]],
         paths: tuple[str, ...] = (),
     ) -> None:
@@ -136,6 +147,7 @@ class Workspace:
         self._texts = texts
         self._paths = paths
         self._baselines: dict[str, Baseline] = {}
+        self._old_baselines: dict[str, Baseline] = {}
         self._snapshot: Snapshot | None = None
 
     def load(self) -> None:
@@ -143,8 +155,9 @@ class Workspace:
         if self.is_loaded:
             return
         self._fixed = report = Report()  # problems that do not depend on texts
-        self._old_baselines, self._baselines = self._baselines, {}
-        self._packages: tuple[inputs.Inputs, ...] = ()
+        self._old_baselines |= self._baselines
+        self._baselines = {}
+        self._packages: tuple[Inputs, ...] = ()
         files = Listing((), (), (), {})
         begun = time.time_ns()
         self._root = root = Root.at(self.folder, self._texts())
@@ -165,7 +178,7 @@ class Workspace:
             on_disk = (path for path in self._files_read(files) if not root.is_open(path))
             self._picture = DiskSnapshot(files.folders, on_disk, begun)
         self._places = {
-            self._absolute(entry.file.shown): (number, at)
+            in_folder(self.folder, entry.file.shown): (number, at)
             for number, package in enumerate(self._packages)
             for at, entry in enumerate(package.files)
         }
@@ -189,7 +202,7 @@ class Workspace:
             except OSError:
                 self.forget()
             except Exception as error:
-                self.failure = _failure(error, self.folder)
+                self.failure = internal_error(error, str(self.folder), _BUG)
         return self._snapshot
 
     def holds(self, path: Path) -> bool:
@@ -215,10 +228,6 @@ class Workspace:
             self._snapshot = None
         elif current is not None or self._concerns(path):
             self.forget()
-
-    def _absolute(self, path: str) -> Path:
-        """Return the path of a file as the editor spells the folder, which may be a link."""
-        return Path(os.path.normpath(self.folder / path))
 
     def _files_read(self, files: Listing) -> Iterator[Path]:
         """Yield the absolute paths of the files that a load reads in packages and for settings."""
@@ -274,46 +283,17 @@ class Workspace:
             path.parent
         ):
             return True
-        folders = (self.folder, *(self._absolute(folder) for folder in self._scope.include))
+        folders = (self.folder, *(in_folder(self.folder, folder) for folder in self._scope.include))
         return any(path.is_relative_to(folder) for folder in (*folders, *prefixes.ament_prefixes()))
 
-    def name_of(self, path: Path) -> ir.TypeName:
-        """Return the name of the interface in a file that is checked."""
+    def inputs(self, path: Path) -> tuple[Inputs, InterfaceFile]:
+        """Return the package of a file that is checked, and the file in it."""
         number, at = self._places[path]
-        file = self._packages[number].files[at].file
-        return ir.TypeName(self._packages[number].package, file.kind, file.name)
+        return self._packages[number], self._packages[number].files[at].file
 
-    def inputs(self, path: Path) -> tuple[str, Mapping[str, str], str]:
-        """Return the package of a file, its files' digests, and the file's name among them."""
-        number, at = self._places[path]
-        package_inputs = self._packages[number]
-        return package_inputs.package, package_inputs.digests, package_inputs.files[at].file.key
-
-    def packages(self) -> Iterable[str]:
-        """Return the packages that have messages, found from the folder."""
-        return (package for package in self._library.packages() if self.names(package))
-
-    def names(self, package: str) -> Iterable[str]:
-        """Return the names of the messages of a package."""
-        return self._library.names(package)
-
-    def dependency(self, path: Path, package: str) -> Edit | None:
-        """Return the edit of package.xml that declares a package; `None` if none is needed."""
-        from idlc.check.package.manifest import dependency
-
-        facts = self._package_facts(path)
-        return dependency(facts, package) if facts else None
-
-    def declaration(self, path: Path, package: str) -> Span | None:
-        """Return the span where package.xml of a file's package declares another package."""
-        from idlc.check.package.manifest import declaration
-
-        facts = self._package_facts(path)
-        return declaration(facts, package) if facts else None
-
-    def _package_facts(self, path: Path) -> Facts | None:
-        package_inputs = self._packages[self._places[path][0]]
-        return next(iter(self._checkers.values())).package_facts(package_inputs)
+    def facts(self, path: Path) -> Facts | None:
+        """Return what package.xml of a file's package says."""
+        return next(iter(self._checkers.values())).package_facts(self.inputs(path)[0])
 
     def baseline(self, against: str = "") -> Baseline:
         """Return the version to compare with: `against`, or the one of pyproject.toml."""
@@ -329,8 +309,14 @@ class Workspace:
         """Return the packages as they were in the version to compare with."""
         return self.baseline(against).side(self._packages)
 
+    def has_moved(self) -> bool:
+        """Return whether a version that was compared with is another commit now."""
+        names = {*self._old_baselines, *self._baselines} if self.is_loaded else ()
+        return bool([name for name in names if self.baseline(name).has_moved()])
+
     @property
-    def _library(self) -> Library:
+    def library(self) -> Library:
+        """The interfaces that can be found from the folder."""
         return next(iter(self._checkers.values())).library
 
     def _checked(self) -> Snapshot:
@@ -354,16 +340,9 @@ class Workspace:
         )
 
 
-def _failure(error: Exception, folder: Path) -> Diagnostic:
-    cause, where, subject = error, "", str(folder)
-    if isinstance(error, InternalError):
-        where, subject = f" in stage `{error.stage}`", error.subject
-        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
-    return codes.INTERNAL_ERROR.of(
-        subject,
-        f"idlc failed{where}: {type(cause).__name__}: {cause}",
-        hint="this is a bug in idlc, please report it",
-    )
+def in_folder(folder: Path, path: str) -> Path:
+    """Return the path of a file as the editor spells the folder, which may be a link."""
+    return Path(os.path.normpath(folder / path))
 
 
 def stray_folder(path: Path) -> tuple[Path, tuple[str, ...]]:

@@ -186,15 +186,6 @@ def commit(name: str, path: Path) -> str | None:
     return None
 
 
-def reference_folders(path: Path) -> tuple[Path, ...]:
-    """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
-    with suppress(GitError):
-        top = _repository(path)
-        lines = _git(top, ["rev-parse", "--git-dir", "--git-common-dir"]).splitlines()
-        return tuple(dict.fromkeys(top / os.fsdecode(line) for line in lines))
-    return ()
-
-
 def setting(name: str, folder: Path) -> str:
     """Return a setting of git for a folder, on one line; empty if there is none."""
     with suppress(GitError):

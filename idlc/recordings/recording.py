@@ -28,6 +28,8 @@ from idlc.recordings.containers.source import CDR, START, RecordingError, unread
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from idlc.recordings.load import TopicType
+
 SECOND = 10**9
 #: A plain number below this counts seconds from the start of the recording, one above is a time of
 #: ROS, in seconds; from the second on, in nanoseconds.
@@ -174,19 +176,23 @@ class Selection:
         raise NotImplementedError
 
     @cached_property
+    def _type(self) -> TopicType:
+        from idlc.recordings.load import type_of
+
+        return type_of(self.topic, self.include)
+
+    @property
     def kind(self) -> Any:
         """The class of the messages, compiled from what was recorded."""
-        from idlc.recordings.load import class_of
+        return self._type.kind
 
-        return class_of(self.topic, self.include)
-
-    def _kind(self, kind: Any) -> Any:
-        """Return the class to read with: `kind` if it is of the recorded type, or the recorded."""
+    def _source(self, kind: Any) -> Any:
+        """Return what columns are read by: `kind` if it is of the recorded type, or that type."""
         if self.topic.encoding != CDR:
             what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
             raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
         if kind is None:
-            return self.kind
+            return self._type.structure
         from idlc.recordings.load import check_class
 
         return check_class(kind, self.topic, self.include)
@@ -202,7 +208,8 @@ class Selection:
 
     def messages(self, kind: Any = None) -> Iterator[Stamped[Any]]:
         """Yield each message with its time, in the order in which they were recorded."""
-        kind, done = self._kind(kind), 0
+        self._source(kind)
+        kind, done = kind or self.kind, 0
         for batch in self.batches():
             for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
                 with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
@@ -218,10 +225,12 @@ class Selection:
         `fields` are those that are wanted, such as "header.stamp". With `datetimes`, times are
         datetime64, log_time and publish_time included, which are nanoseconds otherwise.
         """
-        kind = self._kind(kind)
+        from idlc.recordings.columns import to_columns
+
+        source = self._source(kind)
         batch = join_messages(list(self.batches()))
         with _at(self.topic, batch.views):
-            table = kind.to_columns(batch, fields=fields, ragged=True, datetimes=datetimes)
+            table = to_columns(source, batch, fields, True, datetimes)
         times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
         columns = {
             name: values.view("M8[ns]") if datetimes else values
@@ -236,22 +245,24 @@ class Selection:
         Options are those of `to_arrow` of messages: `fields`, `flat`, `datetimes`, `dictionary`.
         """
         pa = arrow()
-        kind = self._kind(kind)
-        tables = list(self._tables(kind, options))
-        return pa.concat_tables(tables) if tables else _empty(kind, options)
+        source = self._source(kind)
+        tables = list(self._tables(source, options))
+        return pa.concat_tables(tables) if tables else _empty(source, options)
 
     def to_reader(self, kind: Any = None, **options: Any) -> pa.RecordBatchReader:
         """Return the same piece by piece, without the whole table in memory."""
         pa = arrow()
-        kind = self._kind(kind)
-        batches = (batch for table in self._tables(kind, options) for batch in table.to_batches())
-        return pa.RecordBatchReader.from_batches(_empty(kind, options).schema, batches)
+        source = self._source(kind)
+        batches = (batch for table in self._tables(source, options) for batch in table.to_batches())
+        return pa.RecordBatchReader.from_batches(_empty(source, options).schema, batches)
 
-    def _tables(self, kind: Any, options: Any) -> Iterator[pa.Table]:
+    def _tables(self, source: Any, options: Any) -> Iterator[pa.Table]:
+        from idlc.recordings.columns import to_arrow
+
         done = 0
         for batch in self.batches():
             with _at(self.topic, batch.views, done):
-                table = kind.to_arrow(batch, **options)
+                table = to_arrow(source, batch, **options)
             yield _with_times(table, batch)
             done += len(batch)
 
@@ -262,9 +273,11 @@ def _names(taken: Iterable[str]) -> list[str]:
     return [f"_{name}" if name in fields else name for name in TIMES]
 
 
-def _empty(kind: Any, options: Any) -> pa.Table:
+def _empty(source: Any, options: Any) -> pa.Table:
     """Return the table of no messages."""
-    return _with_times(kind.to_arrow([], **options), join_messages([]))
+    from idlc.recordings.columns import to_arrow
+
+    return _with_times(to_arrow(source, [], **options), join_messages([]))
 
 
 def _with_times(table: pa.Table, batch: Messages) -> pa.Table:

@@ -93,16 +93,16 @@ Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
-    """The types of a package, and all that they refer to, from its `_type_data.py`.
+    """The types of the package `home`, and all that they refer to: the JSON of its `_type_data.py`.
 
     Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
     imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
     Packages may describe types of one name in different ways, so nothing is kept by names alone.
     """
 
-    def __init__(self, module: Any) -> None:
-        content = json.loads(module.JSON)
-        self.home: str = module.__package__.removesuffix("._idlc")
+    def __init__(self, text: str, home: str = "") -> None:
+        content = json.loads(text)
+        self.home = home
         self.package: str = content["package"]
         #: The prefix of other packages' modules, relative to this one if it begins with a dot.
         self.around: str = content.get("around", "")
@@ -190,7 +190,7 @@ def types_of(kind: type) -> Types:
         data = import_module(f"{home}._type_data")
     except ModuleNotFoundError:
         data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    return _types_in(data)
+    return _types_in(data.JSON, home)
 
 
 def structure_of(kind: type) -> Structure:

@@ -3,7 +3,7 @@
 import pytest
 
 from idlc.check.registry import IncrementalFindings
-from idlc.editor.workspace import EditorOptions, Workspace
+from idlc.editor.workspace import Settings, Workspace
 
 FILES = {
     "A.msg": "B b\n",
@@ -35,7 +35,7 @@ def folder(tmp_path):
 def test_only_what_depends_on_a_change_is_asked_about_again(
     folder, monkeypatch, changed, text, kept
 ):
-    workspace = Workspace(folder, EditorOptions(), dict)
+    workspace = Workspace(folder, Settings(), dict)
     workspace.snapshot()
     seen = []
 
@@ -49,7 +49,7 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
     workspace.follow(folder / "msg" / changed, text.encode())
     after = workspace.snapshot()
     assert set(seen) == {kept}
-    fresh = Workspace(folder, EditorOptions(), dict)
+    fresh = Workspace(folder, Settings(), dict)
     (folder / "msg" / changed).write_text(text)
     told, expected = (
         [(one.code, one.message, one.where) for one in state.problems]

@@ -123,7 +123,7 @@ def test_each_shell_is_told_in_its_way(shell, told):
 
 @pytest.mark.parametrize("words", [("show", "std_msgs/"), ("explain", "w"), ("gen", "--")])
 def test_a_key_press_imports_nothing_heavy(words):
-    heavy = {"jinja2", "lark", "libcst", "numpy", "rich"}
+    heavy = {"jinja2", "lark", "numpy", "rich"}
     code = f"import atexit\n{CODE.replace('main()', 'atexit.register(told); main()')}"
     code = code.replace(
         "import sys\n", "import sys\ndef told(): print('imported', *sys.modules)\n", 1

@@ -5,8 +5,8 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
 from idlc.cli.main import main
-from idlc.editor.protocol.parts import Position
-from idlc.editor.protocol.positions import Places
+from idlc.editor.documents import Places
+from idlc.editor.parts import Position
 from tests.support.editor import at, between
 
 FILES = {

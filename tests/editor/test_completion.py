@@ -5,7 +5,7 @@ from lsprotocol import types as lsp
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.editor.features import completion
+from idlc.editor import completion
 from idlc.language.parse import parse
 from idlc.model.ir import PRIMITIVES, TypeName
 from idlc.model.lower import lower

@@ -9,9 +9,7 @@ import pytest
 from lsprotocol import types as lsp
 
 from idlc.cli.main import main
-from idlc.editor.documents import Documents
-from idlc.editor.protocol.parts import DocumentItem
-from idlc.project.root import Root
+from idlc.editor.state import ServerState
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(
@@ -341,8 +339,10 @@ def test_hints_name_settings_because_an_editor_has_no_options(editor, package):
 
 def test_the_text_that_counts_is_that_of_the_document_which_is_edited():
     """Of a file that is open by two spellings of its URI."""
-    documents = Documents(Root.here())
+    state = ServerState({}, lambda *_: None, lambda *_: None)
     for name in ("A", "%41"):
-        documents.open(DocumentItem(f"file:///x/{name}.msg", "rosmsg", 1, f"# {name}\n"))
+        item = {"uri": f"file:///x/{name}.msg", "languageId": "rosmsg", "version": 1}
+        params = {"textDocument": {**item, "text": f"# {name}\n"}}
+        state.handle_notification("textDocument/didOpen", params)
     path = Path("/x/A.msg")
-    assert documents.texts()[path] == documents.at(path).data
+    assert state.texts()[path] == state.document_at(path).data

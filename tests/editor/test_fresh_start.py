@@ -8,8 +8,8 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from idlc.editor.protocol.positions import Places
-from idlc.editor.publish import diagnostics
+from idlc.editor.documents import Places
+from idlc.editor.problems import diagnostics
 from idlc.editor.server import Server
 
 #: Pieces of text that are put together and cut up, so that names clash, appear and vanish.
@@ -200,7 +200,7 @@ def test_any_edits_end_where_a_fresh_start_begins(steps, encoding, folders):
         fresh = Client(top, client.folders, encoding)
         for name, text in client.texts.items():
             fresh.open(name, text)
-        texts = {one.uri: one.text for one in client.server.state.documents}
+        texts = {one.uri: one.text for one in client.server.state.documents.values()}
         assert texts == {client.uri(name): text for name, text in client.texts.items()}
         assert client.problems() == fresh.problems()
     finally:

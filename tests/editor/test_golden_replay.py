@@ -14,10 +14,10 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import without_options
-from idlc.editor.protocol import framing, uris
-from idlc.editor.protocol.capabilities import ENCODINGS
-from idlc.editor.protocol.parts import Position
-from idlc.editor.protocol.positions import Places
+from idlc.editor import protocol
+from idlc.editor.documents import Places, to_path
+from idlc.editor.parts import Position
+from idlc.editor.protocol import ENCODINGS
 from idlc.editor.server import serve
 from idlc.project.files import is_folder
 from tests.support import golden_text
@@ -181,12 +181,12 @@ def conversation(messages):
     """Return what a server says to messages; it runs here, so that it sees what was patched."""
     given, answers = io.BytesIO(), io.BytesIO()
     for one in messages:
-        framing.write(given, json.dumps(one).encode())
+        protocol.write(given, json.dumps(one).encode())
     given.seek(0)
     assert serve(given, answers) == 0
     answers.seek(0)
     found = []
-    while (body := framing.read(answers)) is not None:
+    while (body := protocol.read(answers)) is not None:
         found.append(json.loads(body))
     assert [one for one in found if "error" in one or "logMessage" in one.get("method", "")] == []
     return found
@@ -198,14 +198,14 @@ def said(one, uri, encoding):
         (bytes_of(label["location"]["uri"], label["location"]["range"], encoding), label["message"])
         for label in one.get("relatedInformation", ())
     ]
-    assert Path(uris.to_path(one["codeDescription"]["href"])).is_file()
-    path = uris.to_path(uri).resolve().as_posix()
+    assert Path(to_path(one["codeDescription"]["href"])).is_file()
+    path = to_path(uri).resolve().as_posix()
     place = bytes_of(uri, one["range"], encoding)
     return path, one["code"], one["severity"], place, one["message"], related
 
 
 def bytes_of(uri, where, encoding):
-    path = uris.to_path(uri)
+    path = to_path(uri)
     if not path.is_file() or path.stat().st_size > 1 << 20:
         return (0, 0)
     text = text_of(path)

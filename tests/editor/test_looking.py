@@ -8,7 +8,7 @@ import pytest
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
-from idlc.editor.features.hover import prose
+from idlc.editor.descriptions import prose
 from tests.support.editor import at, between
 
 CONTENT = lsp.WORKSPACE_TEXT_DOCUMENT_CONTENT

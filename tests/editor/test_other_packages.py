@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from idlc.editor.publish import diagnostics
+from idlc.editor.problems import diagnostics
 from idlc.editor.server import Server
 
 FILES = {

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 from lsprotocol import types as lsp
 
-from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
-from idlc.editor.protocol.framing import RequestError
-from idlc.editor.workspace import EditorOptions, Workspace
+from idlc.editor.protocol import ADD_DEPENDENCY, RequestError
+from idlc.editor.workspace import Settings, Workspace
 from tests.editors.scenario import RENAMED, RENAMING, write
 from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
 
@@ -66,10 +65,10 @@ def test_a_file_that_is_renamed_long_after_the_edits(client):
     *edits, move = edit.document_changes
     client.apply(lsp.WorkspaceEdit(document_changes=edits), "Pose")
     client.server.rest()
-    client.server.idle()
+    client.server.rest()
     assert "IDL201" in {code for _, code, _ in client.problems()}
     client.move_silently(path_of(move.old_uri), path_of(move.new_uri))
-    client.server.idle()
+    client.server.rest()
     assert client.files() == RENAMED
     assert "IDL201" not in {code for _, code, _ in client.problems()}
 
@@ -98,7 +97,7 @@ def test_changes_that_nobody_tells_of(tmp_path, change):
     client = Simulated(folder, BEHAVIOURS["neovim"])
     before = client.problems()
     CHANGES[change](folder)
-    client.server.idle()
+    client.server.rest()
     assert client.problems() != before
 
 
@@ -164,10 +163,10 @@ def test_a_folder_that_is_gone_and_comes_back(tmp_path):
     client = Simulated(folder, BEHAVIOURS["neovim"])
     before = client.problems()
     folder.rename(tmp_path / "elsewhere")
-    client.server.idle()
+    client.server.rest()
     assert client.problems() == set()
     (tmp_path / "elsewhere").rename(folder)
-    client.server.idle()
+    client.server.rest()
     assert client.problems() == before != set()
 
 
@@ -506,7 +505,7 @@ class Sequence:
         there = {one.removeprefix("base/") for one in texts if one.startswith("base/msg/")}
         assert named == there, step
         overlaid = {path: text.encode() for path, text in self.client.texts.items()}
-        workspace = Workspace(self.folder, EditorOptions(), lambda: overlaid)
+        workspace = Workspace(self.folder, Settings(), lambda: overlaid)
         snapshot = workspace.snapshot()
         expected = set()
         for one in snapshot.problems:

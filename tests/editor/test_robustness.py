@@ -11,7 +11,7 @@ from io import BytesIO
 
 import pytest
 
-from idlc.editor.server import METHODS, Server
+from idlc.editor.server import FILE_METHODS, METHODS, Server
 from tests.editor.test_golden_replay import notification, request
 
 PATIENCE = 30
@@ -105,7 +105,11 @@ def test_what_is_no_message_is_answered_or_passed_over():
 def test_wrong_parameters_are_refused():
     found = run(
         beginning(),
-        *(request(name, params) for name in METHODS for params in (None, [], {"textDocument": 1})),
+        *(
+            request(name, params)
+            for name in METHODS | FILE_METHODS
+            for params in (None, [], {"textDocument": 1})
+        ),
         notification("textDocument/didChange", {"textDocument": {"uri": "x"}}),
         notification("textDocument/didOpen", {}),
         *END,
@@ -182,7 +186,7 @@ def test_any_request_about_any_text_is_answered(workspace, seed):
         if rng.random() < 0.7:
             where = span(*(rng.choice([0, 0, 1, 2, 3, 7, 10**9]) for _ in range(4)))
         parts.append(changed(uri, text, version, where))
-        for name in METHODS:
+        for name in METHODS | FILE_METHODS:
             if name in ("workspace/textDocumentContent", "codeLens/resolve"):
                 continue
             place = {"line": rng.randrange(4), "character": rng.randrange(12)}
@@ -268,7 +272,7 @@ def test_an_interrupt_ends_it_quietly():
 
 @pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.editor.workspace.list_files"])
 def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
-    from idlc.editor.publish import diagnostics
+    from idlc.editor.problems import diagnostics
 
     def fail(*_):
         raise ZeroDivisionError("as the test asked for")
@@ -339,5 +343,6 @@ def test_what_was_answered_or_cancelled_leaves_nothing():
     server = Server(BytesIO(b"".join(map(frame, parts))), BytesIO())
     assert server.run() == 0
     kept = {name: value for name, value in vars(server).items() if isinstance(value, (set, dict))}
+    assert kept.pop("_initialize")
     assert kept
     assert not any(kept.values())

@@ -2,16 +2,17 @@
 
 import shutil
 import subprocess
+import time
 
 import pytest
 from lsprotocol import types as lsp
 
-from idlc.editor.features import lenses as features
-from idlc.editor.protocol.capabilities import TYPES
-from idlc.editor.protocol.parts import DocumentId, DocumentParams
-from idlc.editor.publish import idle
+from idlc.editor import descriptions
+from idlc.editor.parts import DocumentParams, VersionedUri
+from idlc.editor.problems import rest
+from idlc.editor.protocol import TYPES
 from idlc.editor.state import ServerState
-from tests.support.editor import at, between
+from tests.support.editor import PATIENCE, at, between
 from tests.support.tools import tool
 
 STOP = """\
@@ -193,7 +194,7 @@ WATCHES = lsp.ClientCapabilities(
     workspace=lsp.WorkspaceClientCapabilities(
         code_lens=lsp.CodeLensWorkspaceClientCapabilities(refresh_support=True),
         did_change_watched_files=lsp.DidChangeWatchedFilesClientCapabilities(
-            dynamic_registration=True, relative_pattern_support=True
+            dynamic_registration=True
         ),
     )
 )
@@ -224,15 +225,13 @@ def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
     uri, old = (one.open(folder / f"msg/{name}.msg", "int16 x\n") for name in ("New", "Old"))
     assert lenses(one, old)[2] == "breaks nothing against git:HEAD"
     assert lenses(one, uri)[2] == "breaks: wire, hash, source for 0 users against git:HEAD"
-    places = [each["globPattern"]["baseUri"] for each in watchers(asked)]
     (folder / "msg/New.msg").write_text("int16 x\n")
     git(folder, "commit", "-aqm", "second")
-    changed = lsp.FileEvent(uri=f"{places[-1]}/refs/heads/any", type=lsp.FileChangeType.Changed)
-    one.tell(
-        lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, lsp.DidChangeWatchedFilesParams(changes=[changed])
-    )
+    until = time.monotonic() + PATIENCE
+    while lsp.WORKSPACE_CODE_LENS_REFRESH not in [method for method, _ in asked]:
+        assert time.monotonic() < until
+        time.sleep(0.1)
     assert lenses(one, uri)[2] == "breaks nothing against git:HEAD"
-    assert lsp.WORKSPACE_CODE_LENS_REFRESH in [method for method, _ in asked]
 
 
 def test_what_cannot_be_compared_is_said(editor, package):
@@ -252,13 +251,7 @@ def test_what_cannot_be_compared_is_said(editor, package):
     assert lenses(one, uri)[2].startswith("not compared: cannot read `git:HEAD`: ")
 
 
-def watchers(asked):
-    """Return what the client was asked to watch last."""
-    (*_, params) = (params for method, params in asked if method == lsp.CLIENT_REGISTER_CAPABILITY)
-    return params.registrations[0].register_options["watchers"]
-
-
-def test_without_watches_it_looks_while_nothing_is_said(package):
+def test_it_looks_at_git_while_nothing_is_said(package):
     folder = package({"pyproject.toml": TABLE, "msg/New.msg": "int8 x\n"})
     shutil.rmtree(folder / ".git")
     git(folder, "init", "-q")
@@ -268,13 +261,13 @@ def test_without_watches_it_looks_while_nothing_is_said(package):
     client = {"workspace": {"codeLens": {"refreshSupport": True}}}
     said = {"capabilities": client, "workspaceFolders": [{"uri": folder.as_uri(), "name": ""}]}
     state = ServerState(said, lambda *_: None, lambda method, *_: asked.append(method))
-    document = DocumentParams(DocumentId((folder / "msg/New.msg").as_uri()))
-    idle(state)
-    for lens in features.lenses(state, document):
-        features.resolve(state, lens)
-    idle(state)
+    document = DocumentParams(VersionedUri((folder / "msg/New.msg").as_uri()))
+    rest(state)
+    for lens in descriptions.lenses(state.context(document.text_document.uri), document):
+        descriptions.resolve(state, lens)
+    rest(state)
     assert asked == []
     git(folder, "commit", "-qm", "second", "--allow-empty")
-    idle(state)
-    idle(state)
+    rest(state)
+    rest(state)
     assert asked == ["workspace/codeLens/refresh"]

@@ -4,7 +4,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import pytest
 
-from idlc.editor.protocol.uris import from_path, path_text, to_path
+from idlc.editor.documents import path_text, to_path, to_uri
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ def test_windows_paths(uri, path):
     found = PureWindowsPath(path_text(uri, on_windows=True))
     assert found == PureWindowsPath(path)
     assert found.is_absolute()
-    again = from_path(found)
+    again = to_uri(found)
     assert PureWindowsPath(path_text(again, on_windows=True)) == found
     assert again == found.as_uri()
 
@@ -34,7 +34,7 @@ def test_windows_paths(uri, path):
     "path", ["/a/B.msg", "/a b/ü#?%.msg", "/c:/x", "/", "/a/\udcff/B.msg", "/a\\b"]
 )
 def test_posix_paths(path):
-    uri = from_path(PurePosixPath(path))
+    uri = to_uri(PurePosixPath(path))
     assert path_text(uri, on_windows=False) == path
     assert path_text(uri.replace("file://", "file://localhost"), on_windows=False) == path
 

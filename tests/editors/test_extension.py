@@ -6,7 +6,7 @@ import re
 import msgspec
 import pytest
 
-from idlc.editor.state import Settings
+from idlc.editor.workspace import Settings
 from idlc.model.ir import PRIMITIVES
 from idlc.model.lower_types import STRINGS
 from idlc.project.find import KINDS

@@ -15,7 +15,7 @@ from tests.support.repositories import changed
 
 #: What else may be imported: what idlc needs, can use, or was built with.
 OTHERS = """
-click msgspec jinja2 markupsafe libcst yaml tomli numpy pyarrow zstandard lz4 fsspec rclpy hatchling
+click msgspec jinja2 markupsafe yaml tomli numpy pyarrow zstandard lz4 fsspec rclpy hatchling
 setuptools pytest pluggy ament_index_python usercustomize sitecustomize p attacker typing_extensions
 """.split()
 #: What Python itself imports, with the working folder first, before a module of `-m` gets to run.

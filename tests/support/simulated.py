@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 from lsprotocol import types as lsp
 from lsprotocol.converters import get_converter
 
-from idlc.editor.protocol.parts import Position
-from idlc.editor.protocol.positions import Places
+from idlc.editor.documents import Places
+from idlc.editor.parts import Position
 from idlc.editor.server import Server as LanguageServer
 
 INTERFACES = (".msg", ".srv", ".action")
@@ -105,11 +105,7 @@ class Server:
 
     def rest(self) -> None:
         """Send nothing for a while."""
-        self._server.prepare()
-
-    def idle(self) -> None:
-        """Send nothing for longer."""
-        self._server.idle()
+        self._server.rest()
 
 
 class Simulated:

@@ -10,6 +10,7 @@ import re
 import tokenize
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
+from typing import TypeAlias
 
 from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of, span_of, start_of
 from idlc.diagnostics import codes
@@ -46,25 +47,68 @@ def quote_of(source: Source, node: ast.AST) -> str:
     return match[0] if match else "'"
 
 
-def append_elements(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[Edit, ...]:
-    """Return the edits that give a list more elements, written with single quotes."""
-    begin, end = range_of(source, node)
+Brackets: TypeAlias = ast.List | ast.Tuple | ast.Dict | ast.Call
+
+
+def append_elements(source: Source, node: Brackets, elements: Sequence[str]) -> tuple[Edit, ...]:
+    """Return the edits that give brackets more elements, written with single quotes."""
+    begin, end = _range(source, node)
     quote = quote_of(source, node)
     new = [element.replace("'", quote) for element in elements]
-    last = range_of(source, node.elts[-1])[1] if node.elts else begin + 1
+    ranges = [range_of(source, element) for element in elements_of(node)]
+    last = ranges[-1][1] if ranges else begin + 1
     after, comma = _behind(source.text[last : end - 1])
     last += after
-    bracket = indent_of(source, end - 1)
+    margin = margin_of(source, node)
     tail = re.search(r"(?:\r\n?|\n)[ \t]*\Z", source.text[last : end - 1])
     if tail is None:
-        before, behind = (" ", ",") if comma else (", ", "") if node.elts else ("", ", ")
-        return (insertion(source, last, before + ", ".join(new) + behind),)
-    ends = [start_of(source, element) for element in (node.elts[:1] + node.elts[-1:])]
-    margins = [indent_of(source, at) for at in ends if _begins_line(source, at)]
-    margin = margins[-1] if margins else bracket + STEP
+        hangs = any(_begins_line(source, start) for start, _ in ranges)
+        between = f",\n{margin}" if hangs else ", "
+        before, behind = (between[1:], ",") if comma else (between, "") if ranges else ("", ", ")
+        return (insertion(source, last, before + between.join(new) + behind),)
     lines = "".join(f"\n{_broken(margin, element)}," for element in new)
-    edits = () if comma or not node.elts else (insertion(source, last, ","),)
+    edits = () if comma or not ranges else (insertion(source, last, ","),)
     return (*edits, insertion(source, last + tail.start(), lines))
+
+
+def append_element(source: Source, node: Brackets, element: str) -> tuple[Edit, ...]:
+    """Return the edits that give brackets one element more, and no other edit adds one."""
+    if elements_of(node) or is_spread(source, node):
+        return append_elements(source, node, [element])
+    comma = "," * isinstance(node, ast.Tuple)
+    return (insertion(source, range_of(source, node)[1] - 1, element + comma),)
+
+
+def elements_of(node: Brackets) -> list[ast.expr | ast.keyword]:
+    """Return what is in brackets, in order: of a dictionary its values."""
+    if isinstance(node, ast.Dict):
+        return [*node.values]
+    if isinstance(node, ast.Call):
+        arguments: list[ast.expr | ast.keyword] = [*node.args, *node.keywords]
+        return sorted(arguments, key=lambda passed: (passed.lineno, passed.col_offset))
+    return [*node.elts]
+
+
+def margin_of(source: Source, node: Brackets) -> str:
+    """Return the indentation of elements with a line of their own."""
+    starts = [start_of(source, key) for key in getattr(node, "keys", elements_of(node)) if key]
+    margins = [indent_of(source, at) for at in starts if _begins_line(source, at)]
+    if margins:
+        return margins[-1]
+    return indent_of(source, range_of(source, node)[1] - 1) + STEP * is_spread(source, node)
+
+
+def is_spread(source: Source, node: Brackets) -> bool:
+    """Return whether the closing bracket has a line of its own."""
+    return _begins_line(source, range_of(source, node)[1] - 1)
+
+
+def _range(source: Source, node: Brackets) -> tuple[int, int]:
+    """Return the range of brackets and what is in them."""
+    start, end = range_of(source, node)
+    if isinstance(node, ast.Call):
+        start = source.text.index("(", range_of(source, node.func)[1])
+    return start, end
 
 
 def _broken(margin: str, element: str) -> str:
@@ -118,8 +162,7 @@ def imported(setup: Setup, module: str, name: str) -> tuple[str, tuple[Edit, ...
     source = setup.source
     for node in imports:
         if isinstance(node, ast.ImportFrom) and node.module == module and node.col_offset == 0:
-            at = start_of(source, node.names[0])
-            return name, (insertion(source, at, f"{name}, "),)
+            return name, (added_name(source, node, name),)
     body = setup.tree.body
     first = next((node for node in body if node in imports), body[0])
     if isinstance(first, ast.ImportFrom) and first.module == "__future__":
@@ -127,6 +170,14 @@ def imported(setup: Setup, module: str, name: str) -> tuple[str, tuple[Edit, ...
     gap = "\n" if getattr(first, "module", "") == "setuptools" else ""
     line = f"from {module} import {name}\n{gap}"
     return name, (insertion(source, start_of(source, first), line),)
+
+
+def added_name(source: Source, node: ast.ImportFrom, name: str) -> Edit:
+    """Return the edit that imports another name, before the first that follows it in order."""
+    after = next((alias for alias in node.names if alias.name.lower() > name.lower()), None)
+    if after is None:
+        return insertion(source, range_of(source, node.names[-1])[1], f", {name}")
+    return insertion(source, start_of(source, after), f"{name}, ")
 
 
 #: How many lists are tried; each costs as much as reading the file.
@@ -173,9 +224,7 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
     if node.lineno not in wide or node.lineno != node.end_lineno:
         return None
     source = Source("", text)
-    start, end = range_of(source, node)
-    if isinstance(node, ast.Call):
-        start = text.find("(", range_of(source, node.func)[1])
+    start, end = _range(source, node)
 
     def code(item: ast.AST) -> str:
         return text[slice(*range_of(source, item))]
@@ -183,11 +232,8 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
     if isinstance(node, ast.Dict):
         pairs = zip(node.keys, node.values, strict=True)
         items = [(f"{code(key)}: " if key else "**") + code(value) for key, value in pairs]
-    elif isinstance(node, ast.Call):
-        arguments: list[ast.expr | ast.keyword] = [*node.args, *node.keywords]
-        items = [code(passed) for passed in sorted(arguments, key=lambda passed: passed.col_offset)]
     else:
-        items = [code(element) for element in node.elts]
+        items = [code(element) for element in elements_of(node)]
     margin, line = indent_of(source, start), line_end(source)
     body = "".join(f"{margin}{STEP}{item},{line}" for item in items)
     spread = f"{text[: start + 1]}{line}{body}{margin}{text[end - 1 :]}"

@@ -131,8 +131,8 @@ class Setup:
         self.source = source
         self.tree = parse(source.text) or ast.Module([], [])
         self.nodes = list(ast.walk(self.tree))
-        calls = [node for node in self.nodes if isinstance(node, ast.Call) and _is_setup(node)]
-        self.call = calls[0] if len(calls) == 1 else None
+        self.calls = [*self.calls_of("setup")]
+        self.call = self.calls[0] if len(self.calls) == 1 else None
         self.arguments: dict[str, ast.expr] = {}
         self.whole = self.call is not None and not self.call.args
         for keyword in self.call.keywords if self.call else ():
@@ -142,6 +142,14 @@ class Setup:
                 self._spread(keyword.value)
         self._texts: dict[str, str | None] = {}
         self._lists: dict[str, list[Item]] = {}
+
+    def calls_of(self, function: str) -> Iterator[ast.Call]:
+        """Yield the calls of a function, by any name that it is imported as."""
+        aliases = (node for node in self.nodes if isinstance(node, ast.alias))
+        names = {function, *(node.asname for node in aliases if node.name == function)}
+        for node in self.nodes:
+            if isinstance(node, ast.Call) and name_of_call(node) in names:
+                yield node
 
     def _is_compiled(self, node: ast.expr) -> bool:
         """Return whether arguments come from `compile_interfaces`, directly or by a variable."""
@@ -393,10 +401,6 @@ def name_of_call(node: ast.AST | None) -> str:
     """Return the last part of the name of a called function; empty for any other node."""
     function = node.func if isinstance(node, ast.Call) else None
     return function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
-
-
-def _is_setup(node: ast.Call) -> bool:
-    return name_of_call(node) == "setup"
 
 
 def _is_of_paths(function: ast.expr) -> bool:

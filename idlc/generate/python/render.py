@@ -9,12 +9,11 @@ import json
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 import jinja2
 import msgspec
 
-from idlc.generate.idl import file_text
 from idlc.generate.python import classes, fields, imports, positions
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
@@ -23,8 +22,8 @@ from idlc.generate.python.imports import ALONE, Homes, References, Surroundings
 from idlc.generate.python.lines import assign, call
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.positions import Tables
+from idlc.generate.types import TypesDict, content
 from idlc.model import derive, ir, link, python_names
-from idlc.model.describe import IndividualDict
 from idlc.model.names import snake_case
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
@@ -102,43 +101,6 @@ def _types(steps: tuple[plan.Step, ...]) -> list[ir.TypeName]:
         elif isinstance(step, plan.Items):
             types += [step.type, *_types(step.body)]
     return types
-
-
-class TypesDict(TypedDict):
-    """Descriptions and hashes by full name, and the package's own files by interface name.
-
-    Other packages' files are left out: their text differs between an installation and the
-    catalogue, and the same input must give the same output.
-    """
-
-    package: str
-    descriptions: dict[str, IndividualDict]
-    hashes: dict[str, str]
-    sources: dict[str, str]
-
-
-def content(model: link.Model) -> TypesDict:
-    """Return the descriptions of a package's types and of everything that they refer to."""
-    describer = model.describer
-    descriptions: dict[str, IndividualDict] = {}
-    for interface in model.own:
-        structures = (*derive.messages(interface), *derive.pseudo_structures(interface))
-        for structure in structures:
-            full = describer.description(str(structure.name))
-            for description in (full["type_description"], *full["referenced_type_descriptions"]):
-                descriptions[description["type_name"]] = description
-    sources = {
-        # rosidl reads texts so, and no checkout of git's makes a difference then
-        str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
-        for interface in model.own
-        if interface.source is not None
-    }
-    return {
-        "package": model.package,
-        "descriptions": dict(sorted(descriptions.items())),
-        "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
-        "sources": dict(sorted(sources.items())),
-    }
 
 
 def type_data_source(model: link.Model, surroundings: Surroundings = ALONE) -> str:

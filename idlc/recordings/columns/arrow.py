@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Strings, Struct
-from idlc.recordings.columns.read import table_of
+from idlc.recordings.columns.read import table_of, type_of
 from idlc.recordings.columns.table import columns_of
-from idlc.runtime.typeinfo import FieldInfo, Structure, structure_of
+from idlc.runtime.typeinfo import FieldInfo, Structure
 
 #: Between a definition and those that it refers to.
 SEPARATOR = "=" * 80
@@ -19,7 +19,7 @@ TIMES = {"M8[ns]": "timestamp", "m8[ns]": "duration"}
 
 
 def to_arrow(
-    kind: type,
+    kind: type | Structure,
     messages: Any,
     fields: Iterable[str] | None = None,
     flat: bool = False,
@@ -40,7 +40,7 @@ def to_arrow(
     while flat and any(pyarrow.types.is_struct(field.type) for field in rows.type):
         rows = _flattened(pyarrow, rows)
     batch = pyarrow.RecordBatch.from_struct_array(rows)
-    metadata = described(structure_of(kind))
+    metadata = described(type_of(kind))
     return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
 
 

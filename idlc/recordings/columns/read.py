@@ -21,7 +21,7 @@ from idlc.recordings.columns.source import Flat, Pieces, Source
 from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
 from idlc.runtime.cdr import order_of
 from idlc.runtime.names import DecodeError, owner_of
-from idlc.runtime.typeinfo import CarefulReader, structure_of
+from idlc.runtime.typeinfo import CarefulReader, Structure, structure_of
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -71,8 +71,13 @@ def _of_batch(batch: Any) -> Messages:
     return Messages(Flat(array), starts, stops)
 
 
+def type_of(kind: type | Structure) -> Structure:
+    """Return the type of a class of messages."""
+    return kind if isinstance(kind, Structure) else structure_of(kind)
+
+
 def to_columns(
-    kind: type,
+    kind: type | Structure,
     messages: Any,
     fields: Iterable[str] | None = None,
     ragged: bool | None = None,
@@ -90,12 +95,11 @@ def to_columns(
 
 
 def table_of(
-    kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
+    kind: type | Structure, messages: Any, fields: Iterable[str] | None, datetimes: bool
 ) -> tuple[Table, Elements]:
     """Return what is in messages, and the rows of the table; raise DecodeError."""
-    structure = structure_of(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
-    plan = plan_of(structure, None if wanted is None else tuple(wanted), datetimes)
+    plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted), datetimes)
     all_of_them = messages_of(messages)
     try:
         return _read(plan, all_of_them)
@@ -152,14 +156,16 @@ def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
         raw = messages.raw(first)
         # classes of other packages need not be installed
         reader = CarefulReader(raw, order_of(raw), lambda _: SimpleNamespace())
-        reader.message(structure_of(kind), "")
+        reader.message(type_of(kind), "")
     except DecodeError as error:
         path = f"[{first}].{error.path}" if error.path else f"[{first}]"
-        raise _runtime_of(kind).DecodeError(error.problem, path, error.offset) from error
+        raise _error_of(kind)(error.problem, path, error.offset) from error
     raise AssertionError(f"[{first}] can be read by itself")
 
 
-def _runtime_of(kind: Any) -> Any:
-    """Return the runtime package that a message class comes from: carried, or installed."""
+def _error_of(kind: Any) -> Any:
+    """Return the DecodeError of the runtime that a message class comes with."""
+    if isinstance(kind, Structure):
+        return DecodeError
     base = owner_of(kind).__base__
-    return sys.modules[base.__module__.rpartition(".")[0]]
+    return sys.modules[base.__module__.rpartition(".")[0]].DecodeError

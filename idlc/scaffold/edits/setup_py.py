@@ -6,20 +6,23 @@ line to add by hand. An existing entry changes nothing.
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
-import libcst as cst
-
 from idlc.check.package.installation import check_setup
-from idlc.diagnostics.report import apply
-from idlc.diagnostics.source import Source
+from idlc.check.package.setup_edits import (
+    STEP,
+    append_element,
+    is_spread,
+    margin_of,
+)
+from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of
+from idlc.diagnostics.report import Edit, apply
+from idlc.diagnostics.source import Source, Span
 from idlc.project.edits import Edited, Outcome, Refused, Script, already_taken, split
-from idlc.scaffold.edits.python_text import appended, assignments, constants, parsed, quoted, string
-
-Edit: TypeAlias = Callable[[str], Outcome]
 
 SECTION = "options.entry_points"
 KEY = "console_scripts"
@@ -30,13 +33,10 @@ _HEADER = re.compile(r"\s*\[([^\]]*)\]")
 def _section(lines: list[str], name: str) -> tuple[int, int] | None:
     """Return the lines of a section, without its header and the empty lines at its end."""
     headers = [n for n, line in enumerate(lines) if _HEADER.match(line)]
-    for at, number in enumerate(headers):
+    for number, end in zip(headers, [*headers[1:], len(lines)], strict=False):
         header = _HEADER.match(lines[number])
         if header and header[1].strip() == name:
-            end = headers[at + 1] if at + 1 < len(headers) else len(lines)
-            while end > number + 1 and not lines[end - 1].strip():
-                end -= 1
-            return number + 1, end
+            return number + 1, max(_last(lines[:end]), number + 1)
     return None
 
 
@@ -44,26 +44,18 @@ def add_entry(text: str, section: str, script: Script) -> Outcome:
     """Return a text with `name = target` in a section of entries, which is made if need be."""
     lines = text.splitlines(keepends=True)
     body = _section(lines, section)
-    if body is None:
-        if not lines:
-            return Edited(f"\n[{section}]\n{script.line}\n")
-        margin = _margin(lines)
-        return _inserted(lines, _last(lines), [f"{margin}[{section}]", f"{margin}{script.line}"])
-    start, end = body
-    refused = _present(lines[start:end], script)
-    if refused is not None:
-        return Edited(text) if isinstance(refused, Edited) else refused
-    margin = _margin(lines[start:end] or lines)
-    return _inserted(lines, end, [margin + script.line])
+    if body is not None:
+        return _with_entry(lines, *body, script, _margin(lines[slice(*body)] or lines))
+    if not lines:
+        return Edited(f"\n[{section}]\n{script.line}\n")
+    margin = _margin(lines)
+    return _inserted(lines, _last(lines), [f"{margin}[{section}]", f"{margin}{script.line}"])
 
 
 def add_line(text: str, script: Script) -> Outcome:
     """Return a text of entries, one per line, with one more at its end."""
     lines = text.splitlines(keepends=True)
-    present = _present(lines, script)
-    if present is not None:
-        return Edited(text) if isinstance(present, Edited) else present
-    return _inserted(lines, _last(lines), [_margin(lines) + script.line])
+    return _with_entry(lines, 0, _last(lines), script, _margin(lines))
 
 
 def add_to_cfg(text: str, script: Script) -> Outcome:
@@ -79,46 +71,32 @@ def add_to_cfg(text: str, script: Script) -> Outcome:
     key = next((n for n in range(start, end) if re.match(rf"{KEY}\s*[=:]", lines[n])), None)
     if key is None:
         return _inserted(lines, end, [f"{KEY} =", f"    {script.line}"])
-    last = key + 1
-    body_end = key + 1
-    while last < end and (lines[last][:1].isspace() or not lines[last].strip()):
-        last += 1
-        if lines[last - 1].strip():
-            body_end = last
-    own = re.sub(rf"^{KEY}\s*[=:]", "", lines[key])
-    body = [own, *lines[key + 1 : body_end]]
-    present = _present(body, script)
-    if present is not None:
-        return Edited(text) if isinstance(present, Edited) else present
-    margin = _margin(lines[key + 1 : body_end]) or "    "
-    return _inserted(lines, body_end, [margin + script.line])
+    others = (n for n in range(key + 1, end) if lines[n].strip() and not lines[n][0].isspace())
+    end = max(_last(lines[: next(others, end)]), key + 1)
+    return _with_entry(lines, key, end, script, _margin(lines[key + 1 : end]) or "    ")
 
 
-def _present(lines: list[str], script: Script) -> Outcome | None:
-    """Return the outcome for an existing command: nothing to do, or a refusal; `None` without."""
-    for line in lines:
-        name, target = split(line.partition("#")[0])
+def _with_entry(lines: list[str], start: int, end: int, script: Script, margin: str) -> Outcome:
+    """Return a text with another line in a range of entries; a command has one entry."""
+    for line in lines[start:end]:
+        entry = re.sub(rf"^{KEY}\s*[=:]", "", line)
+        name, target = split(entry.partition("#")[0])
         if name == script.name and target:
-            if script.same(line):
-                return Edited("")
+            if script.same(entry):
+                return Edited("".join(lines))
             return already_taken(script, target, IN_SETUP_CFG)
-    return None
+    return _inserted(lines, end, [margin + script.line])
 
 
 def _margin(lines: list[str]) -> str:
     """Return the whitespace before the last line with text."""
-    for line in reversed(lines):
-        if line.strip():
-            return line[: len(line) - len(line.lstrip())]
-    return ""
+    line = "".join(lines[: _last(lines)][-1:])
+    return line[: len(line) - len(line.lstrip())]
 
 
 def _last(lines: list[str]) -> int:
     """Return the index after the last line with text."""
-    end = len(lines)
-    while end and not lines[end - 1].strip():
-        end -= 1
-    return end
+    return max((number for number, line in enumerate(lines, 1) if line.strip()), default=0)
 
 
 def _inserted(lines: list[str], at: int, new: list[str]) -> Outcome:
@@ -130,226 +108,132 @@ def _inserted(lines: list[str], at: int, new: list[str]) -> Outcome:
     return Edited("".join((*before, *(line + ending for line in new), *after)))
 
 
-ENTRY_POINT_KEY = "console_scripts"
-IN_SETUP = "to `console_scripts` in the `entry_points` of setup()"
+IN_SETUP = f"to `{KEY}` in the `entry_points` of setup()"
+UNKNOWN = "the entry points are written in a way that idlc does not know"
 
-#: A node and its replacement, or the reason why there is none.
-Change: TypeAlias = tuple[cst.CSTNode, cst.CSTNode] | str
+#: The edits of a file, or the reason why there are none.
+Change: TypeAlias = tuple[Edit, ...] | str
 
 
 def add_to_setup(text: str, script: Script) -> Outcome:
     """Return the file with a console script."""
-    module = parsed(text)
-    if module is None:
+    setup = Setup(Source("setup.py", text))
+    if parse(text) is None:
         return _refusal(script, "this is not valid Python")
-    strings = constants(module)
-    texts = setup_strings(module, strings)
-    if any(script.same(value) for value in texts):
+    lines = _lines(setup)
+    if any(map(script.same, lines)):
         return Edited(text)
-    calls = setup_calls(module)
-    if len(calls) != 1:
-        return _refusal(script, f"there are {len(calls) or 'no'} calls of setup()")
-    change = _edit(module, calls[0], script, strings)
+    if setup.call is None:
+        return _refusal(script, f"there are {len(setup.calls) or 'no'} calls of setup()")
+    change = _with_script(setup, setup.call, script)
     if isinstance(change, str):
         return _refusal(script, change)
-    result = module.deep_replace(*change)
-    assert isinstance(result, cst.Module)
-    return _checked(result.code, script, texts)
+    new = apply(text, change)[0]
+    after = _lines(Setup(Source("setup.py", new)))
+    if not any(map(script.same, after)) or not lines <= after:
+        return _refusal(script, UNKNOWN)
+    return Edited(new)
 
 
-def _checked(text: str, script: Script, before: list[str]) -> Outcome:
-    """Return the edited text if it is sound: valid, with the entry, nothing lost."""
-    module = parsed(text)
-    after = setup_strings(module, constants(module)) if module else []
-    if not any(script.same(line) for value in after for line in value.splitlines()):
-        return _refusal(script, "the entry points are written in a way that idlc does not know")
-    lost = set(_lines(before)) - set(_lines(after))
-    if lost:
-        return _refusal(script, "the entry points are written in a way that idlc does not know")
-    return Edited(text)
-
-
-def _lines(texts: list[str]) -> list[str]:
-    return [line.strip() for text in texts for line in text.splitlines()]
+def _lines(setup: Setup) -> set[str]:
+    """Return the lines of every text that a file shows."""
+    texts = (
+        node.value if isinstance(node, ast.Constant) else setup.text(node)
+        for node in setup.nodes
+        if isinstance(node, ast.expr)
+    )
+    return {line.strip() for text in texts if isinstance(text, str) for line in text.splitlines()}
 
 
 def _refusal(script: Script, why: str) -> Refused:
     return Refused(why, f"'{script.line}',", IN_SETUP)
 
 
-def setup_strings(module: cst.Module | None, strings: Mapping[str, str]) -> list[str]:
-    """Return every string of a module that the source shows."""
-    texts: list[str] = []
-
-    class Strings(cst.CSTVisitor):
-        def on_visit(self, node: cst.CSTNode) -> bool:
-            value = string(node, strings) if isinstance(node, cst.BaseExpression) else None
-            if value is not None:
-                texts.append(value)
-            return value is None
-
-    if module is not None:
-        module.visit(Strings())
-    return texts
-
-
-def setup_calls(module: cst.Module) -> list[cst.Call]:
-    """Return the calls of setuptools' function, however it was imported."""
-    names = {"setup"}
-    calls: list[cst.Call] = []
-
-    class SetupCalls(cst.CSTVisitor):
-        def visit_ImportAlias(self, node: cst.ImportAlias) -> None:  # noqa: N802
-            if node.evaluated_name == "setup" and node.evaluated_alias:
-                names.add(node.evaluated_alias)
-
-        def visit_Call(self, node: cst.Call) -> None:  # noqa: N802
-            function = node.func
-            called = function.attr if isinstance(function, cst.Attribute) else function
-            if isinstance(called, cst.Name) and called.value in names:
-                calls.append(node)
-
-    module.visit(SetupCalls())
-    return calls
-
-
-def _edit(module: cst.Module, call: cst.Call, script: Script, strings: Mapping[str, str]) -> Change:
-    """Return a node and its replacement, or why there is none."""
-    argument = next((a for a in call.args if a.keyword and a.keyword.value == "entry_points"), None)
-    if argument is not None:
-        return _entry_points(argument.value, script, strings, module)
-    if any(arg.star == "**" for arg in call.args):
+def _with_script(setup: Setup, call: ast.Call, script: Script) -> Change:
+    """Return the edits that give setup() a console script."""
+    passed = {keyword.arg: keyword.value for keyword in call.keywords}
+    if "entry_points" in passed:
+        return _in_entry_points(setup, passed["entry_points"], script)
+    if None in passed:
         return "setup() gets its arguments from elsewhere (`**`)"
-    return call, _with_argument(call, script, module)
+    points = f"{{'{KEY}': ['{script.line}']}}"
+    if is_spread(setup.source, call):
+        margin = margin_of(setup.source, call)
+        inner = f"{margin}{STEP}'{KEY}': [\n{margin}{STEP * 2}'{script.line}',\n{margin}{STEP}],"
+        points = f"{{\n{inner}\n{margin}}}"
+    return append_element(setup.source, call, f"entry_points={points}")
 
 
-def _named(name: cst.Name, module: cst.Module) -> cst.BaseExpression | str:
-    """Return the value of a variable that is assigned in one place."""
-    values = [value for variable, value in assignments(module) if variable == name.value]
-    if len(values) == 1:
-        return values[0]
-    return f"`{name.value}` is not set in exactly one place"
+def _in_entry_points(setup: Setup, node: ast.expr, script: Script) -> Change:
+    """Return the edits of the value of `entry_points`."""
+    value = setup.value(node)
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        return _in_literal(setup, value, lambda body: add_entry(body, KEY, script))
+    if isinstance(value, ast.Dict):
+        scripts = dict(zip(map(setup.text, value.keys), value.values, strict=True))
+        if KEY not in scripts and None in value.keys:
+            return "the entry points come from elsewhere (`**`)"
+    elif isinstance(value, ast.Call) and name_of_call(value) == "dict":
+        scripts = {keyword.arg: keyword.value for keyword in value.keywords}
+    else:
+        scripts = {}
+    if KEY in scripts:
+        return _in_scripts(setup, scripts[KEY], script)
+    if isinstance(value, ast.Dict):
+        return append_element(setup.source, value, f"'{KEY}': ['{script.line}']")
+    return _unknown(node, value) or "the entry points are not written out as a dictionary or a text"
 
 
-def _with_argument(call: cst.Call, script: Script, module: cst.Module) -> cst.Call:
-    """Return the call with `entry_points=` as a last argument, laid out like the others."""
-    literals = [arg.value for arg in call.args]
-    text = quoted(script.line, literals).value
-    key = quoted(ENTRY_POINT_KEY, literals).value
-    space = call.whitespace_before_args
-    last = call.args[-1] if call.args else None
-    end = last.whitespace_after_arg if last else cst.SimpleWhitespace("")
-    if last and isinstance(last.comma, cst.Comma):
-        end = last.comma.whitespace_after
-    spread = isinstance(space, cst.ParenthesizedWhitespace) and isinstance(
-        end, cst.ParenthesizedWhitespace
-    )
-    outer = space.last_line.value if isinstance(space, cst.ParenthesizedWhitespace) else ""
-    step = "\n" + module.default_indent if spread else ""
-    source = (
-        f"{{\n{outer}    {key}: [\n{outer}        {text},\n{outer}    ],\n{outer}}}"
-        if step
-        else f"{{{key}: [{text}]}}"
-    )
-    new = cst.Arg(
-        cst.parse_expression(source, module.config_for_parsing),
-        keyword=cst.Name("entry_points"),
-        equal=cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace("")),
-    )
-    if last is None:
-        return call.with_changes(args=[new])
-    between: cst.BaseParenthesizableWhitespace = cst.SimpleWhitespace(" ")
-    if isinstance(space, cst.ParenthesizedWhitespace) and isinstance(
-        end, cst.ParenthesizedWhitespace
-    ):
-        between = end.with_changes(last_line=space.last_line)
-        first = cst.TrailingWhitespace(newline=end.first_line.newline)
-        end = end.with_changes(first_line=first, empty_lines=[])
-        new = new.with_changes(comma=cst.Comma(whitespace_after=end))
-    plain = cst.SimpleWhitespace("")
-    before = last.with_changes(
-        comma=cst.Comma(whitespace_after=between), whitespace_after_arg=plain
-    )
-    return call.with_changes(args=[*call.args[:-1], before, new])
+def _unknown(node: ast.expr, value: ast.expr | None) -> str:
+    """Return the problem with a name whose value is not known."""
+    if value is None and isinstance(node, ast.Name):
+        return f"`{node.id}` is not set in exactly one place"
+    return ""
 
 
-def _entry_points(
-    value: cst.BaseExpression, script: Script, strings: Mapping[str, str], module: cst.Module
-) -> Change:
-    """Find the change to the value of `entry_points`."""
-    match value:
-        case cst.Name():
-            named = _named(value, module)
-            if isinstance(named, (str, cst.Name)):
-                return str(named) if isinstance(named, str) else "the entry points are a variable"
-            return _entry_points(named, script, strings, module)
-        case cst.Dict():
-            return _in_dict(value, script, strings, module)
-        case cst.Call(func=cst.Name("dict")):
-            for arg in value.args:
-                if arg.keyword and arg.keyword.value == ENTRY_POINT_KEY:
-                    return _scripts(arg.value, script, strings, module)
-        case cst.SimpleString():
-            return _in_literal(value, lambda body: add_entry(body, ENTRY_POINT_KEY, script))
-    return "the entry points are not written out as a dictionary or a text"
-
-
-def _in_dict(
-    value: cst.Dict, script: Script, strings: Mapping[str, str], module: cst.Module
-) -> Change:
-    for element in value.elements:
-        if isinstance(element, cst.DictElement) and string(element.key, strings) == ENTRY_POINT_KEY:
-            return _scripts(element.value, script, strings, module)
-    if any(isinstance(element, cst.StarredDictElement) for element in value.elements):
-        return "the entry points come from elsewhere (`**`)"
-    keys = [e.key for e in value.elements if isinstance(e, cst.DictElement)]
-    scripts = cst.List([cst.Element(quoted(script.line, keys))])
-    return value, appended(value, cst.DictElement(quoted(ENTRY_POINT_KEY, keys), scripts))
-
-
-def _scripts(
-    value: cst.BaseExpression, script: Script, strings: Mapping[str, str], module: cst.Module
-) -> Change:
-    """Find the change to the value of `console_scripts`."""
-    match value:
-        case cst.Name():
-            named = _named(value, module)
-            if isinstance(named, (str, cst.Name)):
-                return str(named) if isinstance(named, str) else "the scripts are a variable"
-            return _scripts(named, script, strings, module)
-        case cst.List() | cst.Tuple():
-            return _in_list(value, script, strings)
-        case cst.SimpleString() if len(value.quote) == 3:
-            return _in_literal(value, lambda body: add_line(body, script))
-        case cst.SimpleString():
-            both = cst.List([cst.Element(value)])
-            new = _in_list(both, script, strings)
-            return new if isinstance(new, str) else (value, new[1])
-        case cst.BinaryOperation(operator=cst.Add()):
-            for side in (value.left, value.right):
-                if isinstance(side, (cst.List, cst.BinaryOperation)):
-                    return _scripts(side, script, strings, module)
-    return "the console scripts are not written out as a list"
-
-
-def _in_list(value: cst.List | cst.Tuple, script: Script, strings: Mapping[str, str]) -> Change:
-    values = [element.value for element in value.elements]
-    for item in values:
-        name, target = split(string(item, strings) or "")
+def _in_scripts(setup: Setup, node: ast.expr, script: Script) -> Change:
+    """Return the edits of the value of `console_scripts`."""
+    value = setup.value(node)
+    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):
+        for side in (value.left, value.right):
+            if isinstance(side, (ast.List, ast.BinOp)):
+                return _in_scripts(setup, side, script)
+    if isinstance(value, (ast.List, ast.Tuple)) and _is_enclosed(setup.source, value):
+        for element in value.elts:
+            name, target = split(setup.text(element) or "")
+            if name == script.name:
+                return already_taken(script, target, IN_SETUP).why
+        return append_element(setup.source, value, f"'{script.line}'")
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        start, end = range_of(setup.source, value)
+        literal = setup.source.text[start:end]
+        if literal.endswith(("'''", '"""')):
+            return _in_literal(setup, value, lambda body: add_line(body, script))
+        name, target = split(value.value)
         if name == script.name:
             return already_taken(script, target, IN_SETUP).why
-    return value, appended(value, cst.Element(quoted(script.line, values)))
+        line = f"'{script.line}'".replace("'", literal[-1])
+        return (Edit(Span(setup.source, start, end), f"[{literal}, {line}]"),)
+    return _unknown(node, value) or "the console scripts are not written out as a list"
 
 
-def _in_literal(value: cst.SimpleString, edit: Edit) -> Change:
-    """Find the change to a text of several lines."""
-    if len(value.quote) != 3 or "\\" in value.value or "b" in value.prefix.lower():
+def _is_enclosed(source: Source, node: ast.List | ast.Tuple) -> bool:
+    """Return whether a list or tuple has brackets of its own."""
+    start, end = range_of(source, node)
+    inside = source.text[start + 1 : end - 1]
+    return source.text[start] in "[(" and parse(f"({inside}\n)") is not None
+
+
+def _in_literal(setup: Setup, value: ast.Constant, edit: Callable[[str], Outcome]) -> Change:
+    """Return the edit of a text of several lines."""
+    start, end = range_of(setup.source, value)
+    literal = re.fullmatch(r"(?s)\w*('{3}|\"{3})(.*)\1", setup.source.text[start:end])
+    if literal is None or re.sub(r"\r\n?", "\n", literal[2]) != value.value:
         return "the entry points are a text with escapes or on one line"
-    start = len(value.prefix) + 3
-    new = edit(value.value[start:-3])
+    new = edit(literal[2])
     if isinstance(new, Refused):
         return new.why
-    return value, value.with_changes(value=value.value[:start] + new.text + value.value[-3:])
+    return (Edit(Span(setup.source, start + literal.start(2), end - 3), new.text),)
 
 
 if sys.version_info >= (3, 11):
@@ -447,25 +331,16 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
 
     One that names `launch` anywhere does so already; one without `data_files` installs none.
     """
-    line = f"('share/{package}/launch', ['{path}']),"
-    module = parsed(text)
-    if module is None:
-        return Refused("this is not valid Python", line, WHERE)
-    if any("launch" in value for value in setup_strings(module, constants(module))):
+    element = f"('share/{package}/launch', ['{path}'])"
+    if parse(text) is None:
+        return Refused("this is not valid Python", f"{element},", WHERE)
+    setup = Setup(Source("setup.py", text))
+    if "data_files" not in setup.arguments or any("launch" in line for line in _lines(setup)):
         return Edited(text)
-    calls = setup_calls(module)
-    values = _keyword_values(calls, "data_files")
-    if not values:
-        return Edited(text)
-    listed = [value for value in values if isinstance(value, cst.List)]
-    if len(calls) != 1 or len(listed) != 1:
-        return Refused("the data files are not written out as a list", line, WHERE)
-    like = [part for element in listed[0].elements for part in _literals(element.value)]
-    folder, file = (quoted(word, like).value for word in (f"share/{package}/launch", path))
-    new = cst.Element(cst.parse_expression(f"({folder}, [{file}])"))
-    changed = module.deep_replace(listed[0], appended(listed[0], new))
-    assert isinstance(changed, cst.Module)
-    return Edited(changed.code)
+    listed = setup.list_of("data_files")
+    if listed is None:
+        return Refused("the data files are not written out as a list", f"{element},", WHERE)
+    return Edited(apply(text, append_element(setup.source, listed, element))[0])
 
 
 def add_interfaces(
@@ -477,15 +352,3 @@ def add_interfaces(
     """
     problems = check_setup(Source("setup.py", text), package, {key: key for key in keys}, folders)
     return apply(text, (edit for problem in problems for edit in problem.edits))[0]
-
-
-def _keyword_values(calls: Iterable[cst.Call], keyword: str) -> list[cst.BaseExpression]:
-    """Return the values of a keyword argument in calls."""
-    arguments = (arg for call in calls for arg in call.args)
-    return [arg.value for arg in arguments if arg.keyword and arg.keyword.value == keyword]
-
-
-def _literals(value: cst.BaseExpression) -> list[cst.BaseExpression]:
-    if isinstance(value, cst.Tuple):
-        return [element.value for element in value.elements]
-    return []

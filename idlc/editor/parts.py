@@ -1,4 +1,4 @@
-"""Structures of the Language Server Protocol (3.17) that the server reads and writes.
+"""Structures of the Language Server Protocol (3.17): what clients send, and parts of answers.
 
 Names are the protocol's, with underscores in Python.
 """
@@ -45,10 +45,15 @@ class TextEdit(Part, frozen=True):
     new_text: str
 
 
-class DocumentId(Part, frozen=True):
-    """A document, with its version where the sender knows it."""
+class Uri(Part, frozen=True):
+    """A document, file or folder."""
 
     uri: str
+
+
+class VersionedUri(Uri, frozen=True):
+    """A document, with its version where the sender knows it."""
+
     version: int | None = None
 
 
@@ -74,66 +79,33 @@ class DidOpen(Part, frozen=True):
     text_document: DocumentItem
 
 
-class DidChange(Part, frozen=True):
-    """textDocument/didChange."""
-
-    text_document: DocumentId
-    content_changes: tuple[Change, ...]
-
-
 class DocumentParams(Part, frozen=True):
     """The parameters of a request about a whole document."""
 
-    text_document: DocumentId
+    text_document: VersionedUri
 
 
-class PreviousResult(Part, frozen=True):
-    """An earlier answer on a document."""
+class DidChange(DocumentParams, frozen=True):
+    """textDocument/didChange."""
 
-    uri: str
-    value: str
-
-
-class WorkspaceDiagnosticParams(Part, frozen=True):
-    """workspace/diagnostic."""
-
-    previous_result_ids: tuple[PreviousResult, ...] = ()
+    content_changes: tuple[Change, ...]
 
 
-class PositionParams(Part, frozen=True):
+class PositionParams(DocumentParams, frozen=True):
     """The parameters of a request about a position in a document."""
 
-    text_document: DocumentId
     position: Position
 
 
-class PositionsParams(Part, frozen=True):
+class PositionsParams(DocumentParams, frozen=True):
     """The parameters of a request about several positions in a document."""
 
-    text_document: DocumentId
     positions: tuple[Position, ...]
 
 
-class Action(Part, frozen=True):
-    """The command of a lens, or only its text if there is no command."""
-
-    title: str
-    command: str
-    arguments: tuple[Any, ...] = ()
-
-
-class Lens(Part, frozen=True):
-    """A text above a line; it gets its `command` when it is shown."""
-
-    range: Range
-    command: Action | None = None
-    data: Any = None
-
-
-class RangeParams(Part, frozen=True):
+class RangeParams(DocumentParams, frozen=True):
     """The parameters of a request about a range of a document."""
 
-    text_document: DocumentId
     range: Range
 
 
@@ -149,24 +121,9 @@ class ReferenceParams(PositionParams, frozen=True):
     context: ReferenceContext = ReferenceContext()
 
 
-class WorkspaceSymbolParams(Part, frozen=True):
-    """workspace/symbol."""
-
-    query: str = ""
-
-
-class ClientDiagnostic(Part, frozen=True):
-    """A diagnostic that the client shows."""
-
-    range: Range
-    message: str = ""
-    code: Any = None
-
-
 class ActionContext(Part, frozen=True):
     """The kinds of actions that are requested; all without `only`."""
 
-    diagnostics: tuple[ClientDiagnostic, ...] = ()
     only: tuple[str, ...] | None = None
 
 
@@ -180,6 +137,24 @@ class RenameParams(PositionParams, frozen=True):
     """textDocument/rename."""
 
     new_name: str
+
+
+class PreviousResult(Uri, frozen=True):
+    """An earlier answer on a document."""
+
+    value: str
+
+
+class WorkspaceDiagnosticParams(Part, frozen=True):
+    """workspace/diagnostic."""
+
+    previous_result_ids: tuple[PreviousResult, ...] = ()
+
+
+class WorkspaceSymbolParams(Part, frozen=True):
+    """workspace/symbol."""
+
+    query: str = ""
 
 
 class FileRename(Part, frozen=True):
@@ -202,36 +177,32 @@ class Command(Part, frozen=True):
     arguments: tuple[Any, ...] = ()
 
 
-class TextDocumentContentParams(Part, frozen=True):
-    """workspace/textDocumentContent."""
+class Lens(Part, frozen=True):
+    """A text above a line; it gets its `command`, which has the text, when it is shown."""
 
-    uri: str
+    range: Range
+    command: dict[str, str] | None = None
+    data: Any = None
 
 
-class Folder(Part, frozen=True):
-    """A workspace folder."""
-
-    uri: str
-    name: str = ""
+#: completionItem/resolve: the item as the server sent it, with additions of the client.
+CompletionItem = dict[str, Any]
 
 
 class Initialize(Part, frozen=True):
     """A client's capabilities, settings and folders."""
 
-    process_id: int | None = None
     root_uri: str | None = None
-    root_path: str | None = None
     capabilities: dict[str, Any] = {}
     initialization_options: Any = None
-    workspace_folders: tuple[Folder, ...] | None = None
-    client_info: dict[str, Any] | None = None
+    workspace_folders: tuple[Uri, ...] | None = None
 
 
 class FolderChanges(Part, frozen=True):
     """The folders that were added to the workspace, and the removed ones."""
 
-    added: tuple[Folder, ...]
-    removed: tuple[Folder, ...]
+    added: tuple[Uri, ...]
+    removed: tuple[Uri, ...]
 
 
 class DidChangeFolders(Part, frozen=True):
@@ -240,31 +211,13 @@ class DidChangeFolders(Part, frozen=True):
     event: FolderChanges
 
 
-class FileChange(Part, frozen=True):
-    """A file that was made (1), changed (2) or removed (3)."""
-
-    uri: str
-    type: int
-
-
 class DidChangeFiles(Part, frozen=True):
     """workspace/didChangeWatchedFiles."""
 
-    changes: tuple[FileChange, ...]
+    changes: tuple[Uri, ...]
 
 
 class DidChangeSettings(Part, frozen=True):
     """workspace/didChangeConfiguration."""
 
     settings: Any = None
-
-
-#: completionItem/resolve: the item as the server sent it, with additions of the client.
-CompletionItem = dict[str, Any]
-
-
-class Markup(Part, omit_defaults=False, frozen=True):
-    """Text for people, in Markdown."""
-
-    value: str
-    kind: str = "markdown"

@@ -10,31 +10,16 @@ from pathlib import Path
 import msgspec
 
 from idlc.check.package.manifest import calls
-from idlc.compare.changes import LEVELS, Change
+from idlc.compare.changes import Change, levels_of
 from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
-from idlc.editor.elements import (
-    Element,
-    document_edit,
-    of_documents,
-    snapshots,
-    spot_at,
-    users,
-    uses,
-)
-from idlc.editor.features.navigation import mentions
-from idlc.editor.protocol import uris
-from idlc.editor.protocol.framing import REQUEST_FAILED, RequestError
-from idlc.editor.protocol.parts import (
-    Part,
-    PositionParams,
-    Range,
-    RenameFilesParams,
-    RenameParams,
-    TextEdit,
-)
+from idlc.editor.documents import to_path, to_uri
+from idlc.editor.elements import Element, by_uri, spot_at, users, uses, workspace_edit
+from idlc.editor.navigation import mentions
+from idlc.editor.parts import PositionParams, RenameFilesParams, RenameParams, TextEdit
+from idlc.editor.protocol import REQUEST_FAILED, RequestError
 from idlc.editor.state import InterfaceContext, Renaming, ServerState
 from idlc.model import ir, names
 from idlc.project.files import is_file
@@ -46,48 +31,25 @@ BUILD = "CMakeLists.txt"
 LONGEST_NAME = 255
 #: Users that a warning names.
 NAMED = 5
-_ANNOTATION = "idlc.rename"
 _CANNOT_MOVE = (
     "a message is renamed with its file, and this editor does not rename files for a server; "
     "Emacs does with idlc.el, as docs/editors.md says"
 )
 
 
-class PrepareRenameResult(Part, frozen=True):
-    """The range and the name that would be renamed."""
-
-    range: Range
-    placeholder: str
-
-
-class AnnotatedTextEdit(TextEdit, frozen=True):
-    """An edit that the user confirms."""
-
-    annotation_id: str
-
-
-class Move(Part, frozen=True, tag="rename", tag_field="kind"):
-    """A file that gets another name, as an operation of a workspace edit."""
-
-    old_uri: str
-    new_uri: str
-    annotation_id: str | None = None
-
-
-def prepare(state: ServerState, params: PositionParams) -> PrepareRenameResult | None:
+def prepare(state: ServerState, params: PositionParams) -> dict[str, object] | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
     state.notice_changes()  # which a client may not have reported yet
     context = state.context(params.text_document.uri)
-    spot = spot_at(state, context, params.position) if context else None
+    spot = spot_at(context, params.position) if context else None
     if context is None or spot is None:
         return None
+    span = None
     if spot.part == "name" and spot.element.meaning is not None:
-        return PrepareRenameResult(state.range(spot.span), spot.span.text)
-    target = spot.element.target
-    if spot.part == "type" and target is not None and _home(target, context, state):
+        span = spot.span
+    elif spot.part == "type" and _home(spot.element.target, context):
         span = _last(spot.element.type)
-        return PrepareRenameResult(state.range(span), span.text)
-    return None
+    return {"range": state.range(span), "placeholder": span.text} if span else None
 
 
 def _last(span: Span) -> Span:
@@ -100,17 +62,17 @@ def can_move_files(state: ServerState) -> bool:
     return state.supports("workspace", "workspaceEdit", "resourceOperations", "rename")
 
 
-def _home(
-    name: ir.TypeName, asking: InterfaceContext, state: ServerState
-) -> InterfaceContext | None:
+def _home(name: ir.TypeName | None, asking: InterfaceContext) -> InterfaceContext | None:
     """Return the interface that a file refers to by a name, if it is one of the workspace's.
 
     Where its folder finds the name elsewhere, as in an install prefix, another folder may have it.
     """
-    for snapshot in sorted(snapshots(state), key=lambda snapshot: snapshot is not asking.snapshot):
-        for interface, source in snapshot.interfaces.values():
-            if interface.name == name:
-                return InterfaceContext(snapshot, interface, source)
+    workspaces = asking.state.workspaces()
+    for workspace in sorted(workspaces, key=lambda workspace: workspace is not asking.workspace):
+        snapshot = workspace.snapshot()
+        for interface, source in snapshot.interfaces.values() if snapshot else ():
+            if interface.name == name and snapshot:
+                return InterfaceContext(asking.state, workspace, snapshot, interface, source)
     return None
 
 
@@ -118,20 +80,17 @@ def rename(state: ServerState, params: RenameParams) -> dict[str, object] | None
     """Return the edits that rename the element at a position, annotated with what they break."""
     state.forget()
     context = state.context(params.text_document.uri)
-    spot = spot_at(state, context, params.position) if context else None
+    spot = spot_at(context, params.position) if context else None
     if context is None or spot is None or prepare(state, params) is None:
         raise RequestError(REQUEST_FAILED, "there is no name of this workspace here")
-    if spot.part == "type":
-        target = spot.element.target
-        home = _home(target, context, state) if target else None
-        assert home is not None
-        return rename_interface(home, params.text_document.uri, params.new_name, context, state)
-    return _rename_definition(spot.element, context, params.new_name, state)
+    if spot.part != "type":
+        return _rename_definition(spot.element, context, params.new_name)
+    home = _home(spot.element.target, context)
+    assert home is not None
+    return rename_interface(home, params.new_name, context)
 
 
-def _rename_definition(
-    element: Element, context: InterfaceContext, new: str, state: ServerState
-) -> dict[str, object]:
+def _rename_definition(element: Element, context: InterfaceContext, new: str) -> dict[str, object]:
     is_constant = isinstance(element.meaning, ir.Constant)
     valid = names.is_constant_name(new) if is_constant else names.is_field_name(new)
     if not valid:
@@ -141,35 +100,31 @@ def _rename_definition(
     if any(definition.name == new and definition is not element.meaning for definition in siblings):
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
     edits = [Edit(span, new) for span in mentions(element, context)]
-    uri = state.uri(context.snapshot.path_of(context.source))
-    changed = {uri: [TextEdit(state.range(edit.span), edit.text) for edit in edits]}
-    changes = _changes(context, apply(context.source.text, edits)[0], state)
-    title = f"Rename {element.body.name.text} to {new}"
-    return _answer(changed, None, title, changes, context, state)
+    changes = _changes(context, apply(context.source.text, edits)[0])
+    edited = by_uri(edits, context.snapshot, context.state)
+    return _answer(edited, None, f"Rename {element.body.name.text} to {new}", changes, context)
 
 
-def _changes(context: InterfaceContext, text: str, state: ServerState) -> Iterable[Change] | None:
+def _changes(context: InterfaceContext, text: str) -> Iterable[Change] | None:
     """Return the changes that a new text of a file makes; `None` if a version has errors."""
-    path = context.snapshot.path_of(context.source)
-    workspace = state.workspace_of(path)
-    after = workspace.snapshot_with(path, text) if workspace else None
-    interface = after.interfaces[path][0] if after and path in after.interfaces else None
-    if after is None or interface is None:
+    path = context.path
+    after = context.workspace.snapshot_with(path, text)
+    if after is None or path not in after.interfaces:
         return None
-    old, new = context.snapshot.model_of(context.interface), after.model_of(interface)
+    interface = after.interfaces[path][0]
+    old, new = context.model, after.model_of(interface)
     name = {interface.name}
     return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
 def rename_interface(
-    home: InterfaceContext, uri: str, new: str, asking: InterfaceContext, state: ServerState
+    home: InterfaceContext, new: str, asking: InterfaceContext
 ) -> dict[str, object] | None:
     """Return the edits for another name of an interface, with the renaming of its file.
 
-    The request came from the document `uri`, whose context is `asking`.
+    The request came from the document of `asking`.
     """
-    old = home.interface.name
-    path = home.snapshot.path_of(home.source)
+    state, old, path = home.state, home.interface.name, home.path
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
     target = path.with_name(f"{new}.{old.kind}")
@@ -177,27 +132,25 @@ def rename_interface(
         raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
     if new == old.name:
         return None
-    if os.path.lexists(target) or state.documents.at(target):
+    if os.path.lexists(target) or state.document_at(target):
         raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
     if not is_file(path):
         raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
     if not can_move_files(state):
         raise RequestError(REQUEST_FAILED, _CANNOT_MOVE)
     report = Report()
-    edits = _edits_of_users(home, new, report, state)
+    edits = _edits_of_users(home, new, report)
     if problem := next(iter(report), None):
         raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
-    document_path = state.path(uri)
     used = users(old, home.snapshot, state)
-    spans = (
-        _last(span) for snapshot, span in used if snapshot.path_of(span.source) == document_path
-    )
+    spans = (_last(span) for snapshot, span in used if snapshot.path_of(span.source) == asking.path)
     own = dict.fromkeys(Edit(Span(asking.source, span.start, span.end), new) for span in spans)
-    state.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
-    move = Move(state.uri(path), uris.from_path(target))
+    after = apply(asking.source.text, list(own))[0]
+    state.renaming = Renaming(path, target, state.uri(asking.path), after)
+    move = {"oldUri": state.uri(path), "newUri": to_uri(target)}
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
     changes = [renamed_interface(home.interface, renamed)]
-    return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, state)
+    return _answer(edits, move, f"Rename {old.name} to {new}", changes, home)
 
 
 def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | None:
@@ -211,20 +164,19 @@ def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | 
     edits: dict[str, list[TextEdit]] = {}
     report = Report()
     for file in {each.old_uri: each for each in params.files}.values():
-        old, new = uris.to_path(file.old_uri), uris.to_path(file.new_uri)
+        old, new = to_path(file.old_uri), to_path(file.new_uri)
         context = state.context(file.old_uri)
         if not (old and new and context and _is_other_name(old, new)):
             continue
         is_own = state.renaming is not None and _is_under_way(state.renaming, old, new, state)
-        by_uri = _edits_of_users(context, new.stem, report, state)
-        for uri, some in by_uri.items():
-            if not is_own or state.documents.get(uri):
+        for uri, some in _edits_of_users(context, new.stem, report).items():
+            if not is_own or uri in state.documents:
                 edits.setdefault(uri, []).extend(some)
     for problem in report:
         state.notify(
             "window/showMessage", {"type": 2, "message": f"{BUILD} is left: {problem.message}"}
         )
-    return of_documents(edits, state) if edits else None
+    return workspace_edit(edits, state) if edits else None
 
 
 def _is_other_name(old: Path, new: Path) -> bool:
@@ -242,17 +194,17 @@ def _is_under_way(renaming: Renaming, old: Path, new: Path, state: ServerState) 
 
 
 def _edits_of_users(
-    context: InterfaceContext, new: str, report: Report, state: ServerState
+    context: InterfaceContext, new: str, report: Report
 ) -> dict[str, list[TextEdit]]:
     """Return the edits of all files that name an interface: its users, and CMakeLists.txt.
 
     Two folders may hold the same file, also by a link: it is edited once, where it is open.
     """
-    old, path = context.interface.name, context.snapshot.path_of(context.source)
+    state, old = context.state, context.interface.name
     used = users(old, context.snapshot, state)
     places = [(snapshot.path_of(span.source), _last(span)) for snapshot, span in used]
-    places += [(Path(span.source.path), span) for span in _in_cmake(old, path, report, state)]
-    places.sort(key=lambda place: state.documents.at(place[0]) is None)
+    places += [(Path(span.source.path), span) for span in _in_cmake(context, report)]
+    places.sort(key=lambda place: state.document_at(place[0]) is None)
     edited: dict[Path, Path] = {}
     edits: dict[str, dict[TextEdit, None]] = {}
     for at, span in places:
@@ -261,10 +213,10 @@ def _edits_of_users(
     return {uri: list(some) for uri, some in edits.items()}
 
 
-def _in_cmake(name: ir.TypeName, path: Path, report: Report, state: ServerState) -> Iterator[Span]:
+def _in_cmake(context: InterfaceContext, report: Report) -> Iterator[Span]:
     """Yield the spans in which a package's CMakeLists.txt names an interface file."""
-    cmake = path.parent.parent / BUILD
-    root = Root(cmake.parent, state.documents.texts())
+    name, cmake = context.interface.name, context.path.parent.parent / BUILD
+    root = Root(cmake.parent, context.state.texts())
     if not root.is_file(cmake):
         return
     source = root.read_source(cmake, str(cmake), report)
@@ -276,53 +228,38 @@ def _in_cmake(name: ir.TypeName, path: Path, report: Report, state: ServerState)
 
 def _answer(
     edits: Mapping[str, list[TextEdit]],
-    move: Move | None,
+    move: Mapping[str, str] | None,
     title: str,
     changes: Iterable[Change] | None,
     context: InterfaceContext,
-    state: ServerState,
 ) -> dict[str, object]:
     """Return the edits, annotated with what they break, which the user sees before applying."""
-    what, is_broken = _what_breaks(changes, context, state)
-    support = ("workspace", "workspaceEdit")
-    if not (
-        state.supports(*support, "changeAnnotationSupport")
-        and state.supports(*support, "documentChanges")
-    ):
-        state.notify("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
-        if move is None:
-            return of_documents(edits, state)
-        return {"documentChanges": [*(document_edit(*item, state) for item in edits.items()), move]}
-    marked = (
-        document_edit(
-            uri, (AnnotatedTextEdit(e.range, e.new_text, _ANNOTATION) for e in some), state
-        )
-        for uri, some in edits.items()
-    )
-    moves = [msgspec.structs.replace(move, annotation_id=_ANNOTATION)] if move else []
-    note = {"label": title, "description": what, "needsConfirmation": is_broken}
-    return {"documentChanges": [*marked, *moves], "changeAnnotations": {_ANNOTATION: note}}
+    state = context.state
+    what, is_broken = _what_breaks(changes, context)
+    capabilities = ("changeAnnotationSupport", "documentChanges")
+    if all(state.supports("workspace", "workspaceEdit", name) for name in capabilities):
+        note = {"label": title, "description": what, "needsConfirmation": is_broken}
+        return workspace_edit(edits, state, move, note)
+    state.notify("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
+    return workspace_edit(edits, state, move)
 
 
-def _what_breaks(
-    changes: Iterable[Change] | None, context: InterfaceContext, state: ServerState
-) -> tuple[str, bool]:
+def _what_breaks(changes: Iterable[Change] | None, context: InterfaceContext) -> tuple[str, bool]:
     """Return a sentence on what a rename breaks, and whether it breaks anything."""
     if changes is None:
         return "there are errors, so idlc cannot say what this breaks", True
-    broken = {level for change in changes for level in change.levels}
-    levels = ", ".join(level for level in LEVELS if level in broken)
+    levels = levels_of(changes)
     if not levels:
         return "breaks nothing that is sent", False
     name = context.interface.name
     holders: dict[ir.TypeName, set[ir.TypeName]] = {}
-    for snapshot, span, target in uses(state):
+    for snapshot, span, target in uses(context.state):
         holder = snapshot.interfaces[snapshot.path_of(span.source)][0].name
         holders.setdefault(target, set()).add(holder)
     direct = sorted(map(str, holders.get(name, ())))
     what = f"breaks {levels} for whoever uses `{name}`"
     what += f": {first_few(direct, NAMED)}" if direct else ""
-    if "hash" in broken and context.snapshot.library.distro.has_hashes:
+    if "hash" in levels and context.snapshot.library.distro.has_hashes:
         reached = {name}
         waiting = [name]
         while waiting:

@@ -6,20 +6,20 @@ Only the line and lists of names are read, so that completions arrive while the 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from itertools import accumulate
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from idlc.check.package.manifest import dependency
 from idlc.check.style import QUANTITIES, expects_unit
 from idlc.diagnostics.codes import CODES
 from idlc.diagnostics.report import Severity
 from idlc.diagnostics.terminal import counted
-from idlc.editor.documents import Document
-from idlc.editor.features.hover import code, shortened
-from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
-from idlc.editor.protocol.parts import Markup, Part, Position, PositionParams, Range, TextEdit
-from idlc.editor.protocol.positions import in_lines, lines_of, units
+from idlc.editor.descriptions import code, markdown, shortened
+from idlc.editor.documents import Document, characters, in_lines, lines_of, units
+from idlc.editor.elements import has_letters
+from idlc.editor.parts import Part, Position, PositionParams, Range, TextEdit
+from idlc.editor.protocol import ADD_DEPENDENCY
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Workspace
 from idlc.language import tree
@@ -32,11 +32,6 @@ BOUNDS = ("1", "3", "6", "9", "16", "32", "36", "64", "128", "256", "1024")
 
 #: Elements of the longest array of which a value is offered.
 MOST_ELEMENTS = 36
-
-
-def suggested_field_name(type_: str) -> str:
-    """Return the name that is suggested first for a field that holds a message."""
-    return names.snake_case(type_.rpartition("/")[2].partition("[")[0])
 
 
 def suggested_values(type_: str) -> Iterator[str]:
@@ -76,20 +71,6 @@ def suggested_constants(lines: list[str], line: int, type_: str) -> Iterator[tup
             yield body.name.text, body.value.text
 
 
-def units_for(name: str) -> tuple[str, ...]:
-    """Return units, first the one that a field's name suggests."""
-    own = expects_unit(name)
-    return tuple(dict.fromkeys((*([own] if own else []), *sorted(set(QUANTITIES.values())))))
-
-
-def command(uri: str, package: str, state: ServerState) -> dict[str, object] | None:
-    """Return the command for a document, if the client can have its files edited."""
-    if not state.supports("workspace", "applyEdit"):
-        return None
-    title = f"Declare {package} in package.xml"
-    return {"title": title, "command": ADD_DEPENDENCY, "arguments": [uri, package]}
-
-
 _KEYWORD, _MODULE, _STRUCT, _VALUE, _UNIT, _FIELD, _SNIPPET = 14, 9, 22, 12, 11, 5, 15
 _AGAIN: dict[str, object] = {"title": "types", "command": "editor.action.triggerSuggest"}
 #: Types of any package that one word may mean; more letters leave fewer.
@@ -110,62 +91,61 @@ class Item(Part, frozen=True):
     data: tuple[str, str, str] | None = None
 
 
-class Items(Part, frozen=True, omit_defaults=False):
-    """All completions at a position; more letters may show others."""
-
-    is_incomplete: bool
-    items: tuple[Item, ...]
-
-
 class TypedLine(NamedTuple):
     """The beginning of a line, and its place.
 
     `undeclared` is whether package.xml lacks each of the packages that were looked up so far.
     """
 
+    state: ServerState
     document: Document
     path: Path
     workspace: Workspace
+    lines: list[str]
     line: int
     before: str
-    encoding: str
     undeclared: dict[str, bool]
 
     def lacks(self, package: str) -> bool:
         """Return whether package.xml could declare a package, and does not."""
         if package not in self.undeclared:
-            edit = self.workspace.dependency(self.path, package)
+            facts = self.workspace.facts(self.path)
+            edit = dependency(facts, package) if facts else None
             self.undeclared[package] = edit is not None
         return self.undeclared[package]
 
     def after(self, start: int) -> str:
         """Return the text that was typed after a position in the line."""
-        places = accumulate(
-            (units(character, self.encoding) for character in self.before), initial=0
-        )
-        return self.before[list(places).index(start) :]
+        return self.before[characters(self.before, start, self.state.encoding) :]
 
     def replacing(self, length: int, text: str) -> TextEdit:
         """Return the edit that puts a text in the place of the last characters."""
-        end = units(self.before, self.encoding)
-        start = end - units(self.before[len(self.before) - length :], self.encoding)
+        encoding = self.state.encoding
+        start = units(self.before[: len(self.before) - length], encoding)
+        end = units(self.before, encoding)
         return TextEdit(Range(Position(self.line, start), Position(self.line, end)), text)
 
 
-def complete(state: ServerState, params: PositionParams) -> Items:
-    """Return the completions at a position."""
+def complete(state: ServerState, params: PositionParams) -> dict[str, object]:
+    """Return the completions at a position; more letters may show others."""
     document = state.documents.get(params.text_document.uri)
     path = document.path if document else None
     workspace = state.workspace_of(path) if path else None
     if document is None or path is None or workspace is None:
-        return Items(False, ())
+        return {"isIncomplete": False, "items": ()}
     lines = lines_of(document.text)
     line, at = in_lines(lines, params.position, state.encoding)
-    typed = TypedLine(document, path, workspace, line, lines[line][:at], state.encoding, {})
-    items = tuple(_items(typed, state))
+    typed = TypedLine(state, document, path, workspace, lines, line, lines[line][:at], {})
+    items = list(_items(typed))
     starts = {item.text_edit.range.start.character for item in items}
-    words = {start: typed.after(start).lower() for start in starts}
-    return Items(len(items) >= MOST, tuple(item for item in items if _fits(item, words)))
+    words = {start: typed.after(start) for start in starts}
+    # not all editors filter items themselves
+    fitting = [
+        item
+        for item in items
+        if has_letters(item.filter_text or item.label, words[item.text_edit.range.start.character])
+    ]
+    return {"isIncomplete": len(items) >= MOST, "items": fitting}
 
 
 def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
@@ -173,28 +153,18 @@ def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
     match item.get("data"):
         case [str(uri), str(package), str(name)] if context := state.context(uri):
             source = context.snapshot.source(ir.TypeName(package, "msg", name))
-            lines = source.text.splitlines() if source else []
-            return {**item, "documentation": Markup(code(shortened(lines)))} if lines else item
-        case _:
-            return item
+            if source and (lines := source.text.splitlines()):
+                return {**item, "documentation": markdown([code(shortened(lines))])}
+    return item
 
 
-def _fits(item: Item, words: Mapping[int, str]) -> bool:
-    """Return whether an item has the letters of the text that it replaces, in their order.
-
-    Not all editors filter items themselves.
-    """
-    letters = iter((item.filter_text or item.label).lower())
-    return all(letter in letters for letter in words[item.text_edit.range.start.character])
-
-
-def _items(typed: TypedLine, state: ServerState) -> Iterator[Item]:
+def _items(typed: TypedLine) -> Iterator[Item]:
     code, sign, comment = typed.before.partition("#")
     words = code.removeprefix("@optional").lstrip().split(maxsplit=2)
     if sign:
         yield from _in_comment(typed, comment, words)
     elif not words or (len(words) == 1 and not code.endswith((" ", "\t"))):
-        yield from _types(typed, words[0] if words else "", state)
+        yield from _types(typed, words[0] if words else "")
     elif "=" in code and re.fullmatch(r"\S+\s+[A-Z]\w*\s*=.*", code.lstrip()):
         word = code.partition("=")[2].lstrip()
         if "[" not in words[0] and ("<=" not in words[0] or "=" in words[-1]):
@@ -205,7 +175,7 @@ def _items(typed: TypedLine, state: ServerState) -> Iterator[Item]:
         yield from _values(typed, words[0], words[2] if len(words) == 3 else "", words[1])
 
 
-def _types(typed: TypedLine, word: str, state: ServerState) -> Iterator[Item]:
+def _types(typed: TypedLine, word: str) -> Iterator[Item]:
     """Yield completions of the first word of a line."""
     if bound := re.fullmatch(r"\S*(?:<=|\[)(\d*)", word):
         for size in BOUNDS:
@@ -214,51 +184,50 @@ def _types(typed: TypedLine, word: str, state: ServerState) -> Iterator[Item]:
     if word and not (word[0].isalpha() and word.isascii()):
         return
     package, slash, _ = word.partition("/")
-    workspace = typed.workspace
+    library = typed.workspace.library
     if slash:
-        for message in workspace.names(package):
-            yield _type(typed, word, f"{package}/{message}", package, "0", state)
+        for message in library.names(package):
+            yield _type(typed, word, f"{package}/{message}", package, "0")
         return
-    name = workspace.name_of(typed.path)
-    own = name.package
+    inputs, file = typed.workspace.inputs(typed.path)
+    own = inputs.package
     for type_ in (*ir.PRIMITIVES, *STRINGS):
         size = counted(ir.PRIMITIVES[type_].size, "byte") if type_ in ir.PRIMITIVES else "text"
         yield Item(type_, _KEYWORD, typed.replacing(len(word), type_), size, f"1{type_}")
-    for message in workspace.names(own):
-        if name != (own, "msg", message):
-            yield _type(typed, word, message, own, "0", state)
-    for other in workspace.packages():
+    for message in library.names(own):
+        if (file.kind, file.name) != ("msg", message):
+            yield _type(typed, word, message, own, "0")
+    for other in filter(library.names, library.packages()):
         edit = typed.replacing(len(word), f"{other}/")
         yield Item(f"{other}/", _MODULE, edit, sort_text=f"3{other}", command=_AGAIN)
     if word:
-        yield from _elsewhere(typed, word, own, state)
-    if not typed.before and name.kind != "msg":
+        yield from _elsewhere(typed, word, own)
+    if not typed.before and file.kind != "msg":
         yield Item("---", _SNIPPET, typed.replacing(len(word), "---\n"), "the next section", "4")
 
 
-def _elsewhere(typed: TypedLine, word: str, own: str, state: ServerState) -> Iterator[Item]:
+def _elsewhere(typed: TypedLine, word: str, own: str) -> Iterator[Item]:
     """Yield messages of other packages by their names alone."""
     count = 0
-    for package in typed.workspace.packages():
-        for name in typed.workspace.names(package) if package != own else ():
+    library = typed.workspace.library
+    for package in library.packages():
+        for name in library.names(package) if package != own else ():
             if name.lower().startswith(word.lower()):
-                yield _type(typed, word, f"{package}/{name}", package, "2", state, name)
+                yield _type(typed, word, f"{package}/{name}", package, "2", name)
                 count += 1
         if count >= MOST:
             return
 
 
 def _type(
-    typed: TypedLine,
-    word: str,
-    text: str,
-    package: str,
-    rank: str,
-    state: ServerState,
-    looked_for: str = "",
+    typed: TypedLine, word: str, text: str, package: str, rank: str, looked_for: str = ""
 ) -> Item:
     """Return a message; if its package is not declared yet, package.xml is edited afterwards."""
-    missing = state.supports("workspace", "applyEdit") and typed.lacks(package)
+    uri = typed.document.uri
+    command: dict[str, object] | None = None
+    if typed.state.supports("workspace", "applyEdit") and typed.lacks(package):
+        title = f"Declare {package} in package.xml"
+        command = {"title": title, "command": ADD_DEPENDENCY, "arguments": [uri, package]}
     return Item(
         text,
         _STRUCT,
@@ -266,22 +235,21 @@ def _type(
         sort_text=rank + text,
         filter_text=looked_for,
         detail=package,
-        command=command(typed.document.uri, package, state) if missing else None,
-        data=(typed.document.uri, package, text.rpartition("/")[2]),
+        command=command,
+        data=(uri, package, text.rpartition("/")[2]),
     )
 
 
 def _names(typed: TypedLine, type_: str, word: str) -> Iterator[Item]:
     """Yield usual names for a field of a type."""
     if "/" in type_ or type_[:1].isupper():
-        name = suggested_field_name(type_)
+        name = names.snake_case(type_.rpartition("/")[2].partition("[")[0])
         yield Item(name, _FIELD, typed.replacing(len(word), name))
 
 
 def _values(typed: TypedLine, type_: str, word: str, name: str) -> Iterator[Item]:
     """Yield values that fit a type, the constants of the section for a field first."""
-    lines = lines_of(typed.document.text)
-    constants = suggested_constants(lines, typed.line, type_) if name else ()
+    constants = suggested_constants(typed.lines, typed.line, type_) if name else ()
     for constant, value in constants:
         edit = typed.replacing(len(word), value)
         yield Item(constant, _VALUE, edit, value, f"0{constant}", f"{value} {constant}")
@@ -297,6 +265,8 @@ def _in_comment(typed: TypedLine, comment: str, words: list[str]) -> Iterator[It
                 yield Item(code.id, _VALUE, typed.replacing(len(word), code.id), code.slug)
     elif bracket := re.search(r"\[([^\[\]]*)$", comment):
         name = words[1] if len(words) > 1 else ""
-        for number, unit in enumerate(units_for(name)):
+        own = expects_unit(name)  # comes first
+        others = sorted(set(QUANTITIES.values()))
+        for number, unit in enumerate(dict.fromkeys((*([own] if own else []), *others))):
             edit = typed.replacing(len(bracket[1]), unit)
             yield Item(unit, _UNIT, edit, sort_text=f"{number:03}")

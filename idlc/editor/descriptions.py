@@ -1,0 +1,284 @@
+"""Descriptions of interfaces: hover, hints within lines, and lenses above them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from idlc.compare.changes import levels_of
+from idlc.compare.packages import compare
+from idlc.diagnostics.report import first_few
+from idlc.diagnostics.terminal import counted
+from idlc.documents.show import outline
+from idlc.editor.documents import TOP, is_built_in
+from idlc.editor.elements import elements, section_names, spot_at, users
+from idlc.editor.parts import DocumentParams, Lens, Position, PositionParams, Range, RangeParams
+from idlc.editor.state import InterfaceContext, ServerState
+from idlc.editor.workspace import Snapshot
+from idlc.model import derive, ir
+from idlc.model.ir import is_range, spell, spell_value
+from idlc.model.link import Model
+from idlc.wire.layout import Placed, layout
+
+if TYPE_CHECKING:
+    from idlc.compare.breaking import Baseline
+
+#: Lines of a message that are shown.
+MOST_LINES = 40
+
+
+def markdown(paragraphs: Iterable[str]) -> dict[str, str]:
+    """Return paragraphs as text for people; empty ones are left out."""
+    return {"kind": "markdown", "value": "\n\n".join(filter(None, paragraphs))}
+
+
+def hover(context: InterfaceContext, params: PositionParams) -> dict[str, object] | None:
+    """Return the description of the element at a position; between definitions, of the file."""
+    spot = spot_at(context, params.position)
+    snapshot = context.snapshot
+    if spot is None or spot.part == "comment":
+        return {"contents": markdown(_interface(context.interface, snapshot))}
+    element = spot.element
+    if spot.part == "type" and element.target is not None:
+        models = (m for m in snapshot.models.values() if element.target in m.interfaces)
+        model = next(models, None)
+        if model is None:
+            return None
+        text = markdown(_interface(model.interfaces[element.target], snapshot))
+    elif element.meaning is not None:
+        text = markdown(_definition(element.meaning, context))
+    else:
+        return None
+    return {"contents": text, "range": context.state.range(spot.span)}
+
+
+def _definition(meaning: ir.Field | ir.Constant, context: InterfaceContext) -> Iterator[str]:
+    value = default = ""
+    if isinstance(meaning, ir.Constant):
+        value = f"={spell_value(meaning.value)}"
+    elif meaning.default:
+        default = spell_value(meaning.default.value)
+        value = f" {default}"
+    yield code([f"{spell(meaning.type)} {meaning.name}{value}"])
+    yield prose(meaning.comment)
+    says_range = meaning.unit is not None and is_range(meaning.unit)
+    facts = [f"{'range' if says_range else 'unit'}: `{meaning.unit}`"] if meaning.unit else []
+    facts += _limits(meaning.type, has_range=says_range)
+    facts += [f"default: `{default}`"] if default else []
+    if each := _placed(context).get(id(meaning)):
+        facts.append(f"on the wire: {each.size.in_bytes} at offset {each.offset}")
+    yield "  \n".join(facts)
+
+
+def _limits(type_: ir.FieldType, *, has_range: bool) -> list[str]:
+    """Return the limits of a type's values, where it is not any float or text."""
+    facts = []
+    element = ir.element_of(type_)
+    if isinstance(element, ir.Primitive) and element.info.low is not None and not has_range:
+        facts.append(f"range: `{element.info.low}` to `{element.info.high}`")
+    if isinstance(element, ir.String) and element.bound is not None:
+        facts.append(f"length: at most {element.bound} characters")
+    if isinstance(type_, ir.Sequence) and type_.bound is not None:
+        facts.append(f"elements: at most {type_.bound}")
+    return facts
+
+
+def _placed(context: InterfaceContext) -> dict[int, Placed]:
+    """Return the places of fields in the bytes of their section, by identity."""
+    model = context.model
+    if model is None:
+        return {}
+    layouts = (layout(part, model.messages)[0] for part in derive.sections(context.interface))
+    return {id(placed.field): placed for fields in layouts for placed in fields}
+
+
+def _interface(interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
+    """Yield the paragraphs that describe an interface."""
+    yield f"**{interface.name}**"
+    model = snapshot.model_of(interface)
+    if model is None:
+        yield prose(derive.sections(interface)[0].comment)
+        return
+    yield code(shortened(list(outline(interface, model))))
+    yield "  \n".join(_sizes(interface, model))
+    if model.distro.has_hashes:
+        yield f"`{model.describer.hash(str(interface.name))}`"
+    if interface.source is not None and is_built_in(interface.source):
+        # the catalogue has no comments
+        package = interface.name.package
+        page = f"https://docs.ros.org/en/{model.distro.name}/p/{package}/"
+        yield f"[{prose((package,))} in the documentation of ROS 2]({page})"
+
+
+def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
+    names = section_names(interface) or ("",)
+    for name, section in zip(names, derive.sections(interface), strict=True):
+        of = f" of the {name.lower()}" if name else ""
+        yield f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}"
+
+
+def shortened(lines: list[str]) -> list[str]:
+    """Return the first lines of a definition, with a remark that counts the others."""
+    more = [f"# {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else []
+    return lines[:MOST_LINES] + more
+
+
+def code(lines: list[str]) -> str:
+    """Return lines as a code block, with a fence that they cannot end."""
+    text = "\n".join(lines)
+    fence = "`" * max(3, 1 + max((len(run) for run in _runs(text)), default=0))
+    return f"{fence}rosmsg\n{text}\n{fence}"
+
+
+def _runs(text: str) -> Iterator[str]:
+    """Yield each run of backticks."""
+    return iter(re.findall("`+", text))
+
+
+#: The start of a heading, list, quotation, table, rule or fenced code, at the start of a line.
+_BLOCK = r"^\s*(?:[#>+=~|:*_-]|\d+(?=[.)]))"
+#: Text in backticks, which is code in Markdown as in comments.
+_CODE = r"(?<!`)`[^`]+`(?!`)"
+#: Characters that Markdown may not take for text: the beginning of a span suffices.
+_MARKS = (
+    r"\\(?=[!-/:-@\[-`{-~])|\\$|`|<(?=[\w/!?])|&(?=[\w#])|\](?=[(\[:])"
+    r"|(?<![^\W_])_+(?=\S)|[*~]+(?=\S)"
+)
+
+
+def prose(lines: tuple[str, ...]) -> str:
+    """Return a comment as Markdown that shows it as it was written.
+
+    Only characters with a meaning in Markdown are escaped, as some editors show each escape.
+    """
+    escape = re.compile(rf"{_CODE}|{_BLOCK}|{_MARKS}")
+    return "  \n".join(escape.sub(_escaped, line) for line in lines)
+
+
+def _escaped(match: re.Match[str]) -> str:
+    text = match[0]
+    if text.startswith("`") and len(text) > 1:
+        return text
+    blanks = text[: len(text) - len(text.lstrip())]
+    mark = text.lstrip()
+    return blanks + (
+        f"{mark}\\" if mark.isdigit() else "".join(f"\\{character}" for character in mark)
+    )
+
+
+def hints(context: InterfaceContext, params: RangeParams) -> list[dict[str, object]]:
+    """Return the hints in a range; none where the file has errors."""
+    state = context.state
+    low, high = (state.offset(context.source, at) for at in (params.range.start, params.range.end))
+    placed = _placed(context) if state.settings.inlay_hints else {}
+    shown: list[dict[str, object]] = []
+    for element in elements(context):
+        place = placed.get(id(element.meaning))
+        if place is not None and low <= element.name.end <= high:
+            tip = f"{place.size.in_bytes} at offset {place.offset} of the message"
+            hint = {
+                "position": state.range(element.name).end,
+                "label": f"@{place.offset}, {place.size} B",
+                "tooltip": f"{tip}, header not counted",
+                "paddingLeft": True,
+            }
+            shown.append(hint)
+    return shown
+
+
+_HASH, _USERS, _BREAKS = "hash", "users", "breaks"
+#: Defaults that a lens lists.
+MOST_DEFAULTS = 5
+#: Letters that it shows of a default.
+MOST_LETTERS = 40
+
+
+def lenses(context: InterfaceContext, params: DocumentParams) -> list[Lens]:
+    """Return the lenses of a file; `resolve` computes their texts when they are shown."""
+    settings = context.state.settings
+    if not settings.code_lens:
+        return []
+    kinds = [_HASH] if context.snapshot.library.distro.has_hashes else []
+    kinds += [_USERS] if context.interface.name.kind == "msg" else []
+    kinds += [_BREAKS] if baseline(context).name else []
+    of_file = [Lens(TOP, data=[params.text_document.uri, kind]) for kind in kinds]
+    return [*of_file, *(_defaults(context) if settings.default_lens else ())]
+
+
+def resolve(state: ServerState, lens: Lens) -> Lens:
+    """Return a lens with its text."""
+    if lens.command is not None:
+        return lens
+    uri, kind = lens.data
+    context = state.context(uri)
+    return _with_text(_text(context, kind) if context else "", lens.range, lens.data)
+
+
+def _with_text(text: str, place: Range, data: object = None) -> Lens:
+    return Lens(place, {"title": text, "command": ""}, data)
+
+
+def _defaults(context: InterfaceContext) -> Iterator[Lens]:
+    """Yield a lens above the first default of each section, which lists all of them."""
+    for section in derive.sections(context.interface):
+        with_default = [field for field in section.fields if field.default and field.name_span]
+        if with_default:
+            texts = (_default(field, section) for field in with_default)
+            assert with_default[0].name_span is not None
+            start = Position(context.state.range(with_default[0].name_span).start.line, 0)
+            text = f"defaults: {first_few(texts, MOST_DEFAULTS)}"
+            yield _with_text(text, Range(start, start))
+
+
+def _default(field: ir.Field, section: ir.Message) -> str:
+    """Return a field with its default, by the name of a constant if only one has that value."""
+    assert field.default is not None
+    value = field.default.value
+    same = [
+        constant
+        for constant in section.constants
+        if (constant.type, constant.value) == (field.type, value)
+    ]
+    own = [constant for constant in same if constant.name.lower().startswith(f"{field.name}_")]
+    named = own or same
+    text = named[0].name if len(named) == 1 else spell_value(value)
+    return f"{field.name} {text if len(text) <= MOST_LETTERS else text[:MOST_LETTERS] + '…'}"
+
+
+def _text(context: InterfaceContext, kind: str) -> str:
+    name = context.interface.name
+    if kind == _USERS:
+        return counted(len(list(users(name, context.snapshot, context.state))), "use")
+    if kind == _BREAKS:
+        return _what_breaks(context)
+    model = context.model
+    return model.describer.hash(str(name)) if model else "no type hash: there are errors"
+
+
+def baseline(context: InterfaceContext) -> Baseline:
+    """Return the version that a file's folder is compared with, without a name if with none."""
+    return context.workspace.baseline(context.state.settings.against)
+
+
+def _what_breaks(context: InterfaceContext) -> str:
+    """Return a sentence on what a file's changes break against the version of the settings."""
+    name, against = context.interface.name, baseline(context)
+    side = context.workspace.before(context.state.settings.against)
+    before = side.models.get(name.package)
+    after = context.model
+    if after is None:
+        return ""
+    if name in side.broken:
+        return f"not compared: there are errors in {against.name}"
+    if side.error and not side.models:
+        return f"not compared: {side.error}"
+    if before is None or name not in {own.name for own in before.own}:
+        return f"nothing to compare with in {against.name}"
+    changes = compare(before.only({name}), after.only({name})).changes
+    levels = levels_of(against.not_allowed(changes))
+    if not levels:
+        return f"breaks nothing against {against.name}"
+    used = users(name, context.snapshot, context.state)
+    count = len({snapshot.path_of(span.source) for snapshot, span in used})
+    return f"breaks: {levels} for {counted(count, 'user')} against {against.name}"

@@ -1,1 +1,0 @@
-"""The language server protocol: messages, positions, URIs, framing."""

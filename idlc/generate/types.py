@@ -1,0 +1,46 @@
+"""The types of a package as data, which its `_type_data.py` holds."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+from idlc.generate.idl import file_text
+from idlc.model import derive, link
+from idlc.model.describe import IndividualDict
+
+
+class TypesDict(TypedDict):
+    """Descriptions and hashes by full name, and the package's own files by interface name.
+
+    Other packages' files are left out: their text differs between an installation and the
+    catalogue, and the same input must give the same output.
+    """
+
+    package: str
+    descriptions: dict[str, IndividualDict]
+    hashes: dict[str, str]
+    sources: dict[str, str]
+
+
+def content(model: link.Model) -> TypesDict:
+    """Return the descriptions of a package's types and of everything that they refer to."""
+    describer = model.describer
+    descriptions: dict[str, IndividualDict] = {}
+    for interface in model.own:
+        structures = (*derive.messages(interface), *derive.pseudo_structures(interface))
+        for structure in structures:
+            full = describer.description(str(structure.name))
+            for description in (full["type_description"], *full["referenced_type_descriptions"]):
+                descriptions[description["type_name"]] = description
+    sources = {
+        # rosidl reads texts so, and no checkout of git's makes a difference then
+        str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
+        for interface in model.own
+        if interface.source is not None
+    }
+    return {
+        "package": model.package,
+        "descriptions": dict(sorted(descriptions.items())),
+        "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
+        "sources": dict(sorted(sources.items())),
+    }
