@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import Facts, GeneratedOutput, statements
+from idlc.project.root import MANIFEST
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
@@ -133,24 +135,17 @@ def _generates(cmake: Source) -> bool:
 
 def _files(folder: Path) -> Iterator[Path]:
     """Yield every file below a package's folder that may be a source, other packages' excluded."""
-    waiting = [folder]
-    while waiting:
-        current = waiting.pop()
-        try:
-            entries = sorted(current.iterdir())
-        except OSError:
+    for place, folders, names in os.walk(folder):
+        current = Path(place)
+        closing = any(name in CLOSING or name == MANIFEST for name in (*folders, *names))
+        open_ones = [name for name in folders if name[0] != "." and name not in SKIPPED]
+        folders[:] = sorted(open_ones, reverse=True)
+        if current != folder and closing:
+            folders.clear()
             continue
-        if current != folder and any(
-            entry.name in CLOSING or entry.name == "package.xml" for entry in entries
-        ):
-            continue
-        for entry in entries:
-            if entry.name.startswith(".") or entry.name in SKIPPED:
-                continue
-            if entry.is_dir() and not entry.is_symlink():
-                waiting.append(entry)
-            elif entry.is_file():
-                yield entry
+        for name in sorted(names):
+            if name[0] != "." and name not in SKIPPED and (file := current / name).is_file():
+                yield file
 
 
 def _modules(
