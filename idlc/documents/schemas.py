@@ -138,11 +138,9 @@ def _value(type_: ir.FieldType) -> Json:
 
 def mcap(interface: ir.Interface, model: Model) -> str:
     """Return a message's MCAP schema of encoding `ros2msg`: its text and nested messages' texts."""
-    used = [model.interfaces[name] for name in _used(derive.sections(interface), model)]
-    heads = [f"{MCAP_LINE}\nMSG: {message.name.package}/{message.name.name}\n" for message in used]
-    texts = [_ended(file_text(part)) for part in (interface, *used)]
-    return "".join(head + text for head, text in zip(("", *heads), texts, strict=True))
-
-
-def _ended(text: str) -> str:
-    return text if not text or text.endswith("\n") else text + "\n"
+    text = file_text(interface)
+    for name in _used(derive.sections(interface), model):
+        line_end = "" if not text or text.endswith("\n") else "\n"
+        text += f"{line_end}{MCAP_LINE}\nMSG: {name.package}/{name.name}\n"
+        text += file_text(model.interfaces[name])
+    return text if not text or text.endswith("\n") else f"{text}\n"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.project import lock
-from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
+from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import Facts, GeneratedOutput, statements
@@ -44,7 +44,13 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         return None
     folder = path.parent
     files = list(_files(folder))
-    locks = _locks(files)
+    locks = {
+        file: record
+        for file in files
+        if file.name == lock.FILE and (record := load_lock(file.parent, "", Report()))
+    }
+    interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
+    checked = {entry.file.path.resolve() for entry in package.files}
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
     modules = dict(_modules(folder, files, generated, root))
@@ -58,9 +64,13 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         setup_cfg=_optional(folder / "setup.cfg", root),
         pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
-        generates=cmake is not None and _generates(cmake),
+        generates=any(
+            # other interfaces are for tests of the package's own
+            command.name == GENERATE and "SKIP_INSTALL" not in command.words
+            for command in (calls(cmake) if cmake else ())
+        ),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=_whole(package, files, scope.exclude),
+        whole=bool(checked) and checked.issuperset(file.resolve() for file in interfaces),
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
             GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
@@ -109,28 +119,6 @@ def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
         if file.name == "__init__.py" and parts:
             is_package[".".join(parts)] = True
     return is_package
-
-
-def _locks(files: Iterable[Path]) -> dict[Path, lock.Lock]:
-    """Return the readable lock files by path."""
-    lock_files = [file for file in files if file.name == lock.FILE]
-    loaded = ((file, load_lock(file.parent, "", Report())) for file in lock_files)
-    return {file: lock for file, lock in loaded if lock}
-
-
-def _whole(package: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
-    """Return whether a package has no other interface files."""
-    existing = {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)}
-    return bool(package.files) and existing <= {
-        entry.file.path.resolve() for entry in package.files
-    }
-
-
-def _generates(cmake: Source) -> bool:
-    """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
-    return any(
-        command.name == GENERATE and "SKIP_INSTALL" not in command.words for command in calls(cmake)
-    )
 
 
 def _files(folder: Path) -> Iterator[Path]:
