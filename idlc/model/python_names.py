@@ -27,7 +27,6 @@ CODEC_NAMES = frozenset(
         "kind",
         "limit",
         "listed",
-        "low",
         "message",
         "order",
         "pad2",

@@ -42,10 +42,17 @@ class Number(msgspec.Struct, frozen=True):
     code: str
     size: int
 
+    @property
+    def unit(self) -> int:
+        """The same bytes, at a multiple of which it begins."""
+        return self.size
+
 
 class Dummy(msgspec.Struct, frozen=True):
     """The zero byte of a structure without fields."""
 
+    code: str = "x"
+    unit: int = 1
     size: int = 1
 
 
@@ -62,7 +69,7 @@ class Block(msgspec.Struct, frozen=True):
         return ir.PRIMITIVES[self.primitive].size
 
     @property
-    def token(self) -> str:
+    def code(self) -> str:
         """The array in the layout of a Struct, where it is a number of bytes or numbers."""
         lists = self.primitive in LIST_PRIMITIVES
         return f"{self.count}{'B' if lists else ir.PRIMITIVES[self.primitive].code}"
@@ -144,7 +151,9 @@ class Items(msgspec.Struct, frozen=True):
     bound: int | None
 
 
-Step: TypeAlias = Number | Dummy | Block | Text | Numbers | Bytes | Texts | Enter | Items
+#: Steps whose size is fixed: `code` is their code in a Struct, they begin at a multiple of `unit`.
+Plain: TypeAlias = Number | Dummy | Block
+Step: TypeAlias = Plain | Text | Numbers | Bytes | Texts | Enter | Items
 
 #: The struct character where it is not the one of PRIMITIVES.
 CODES = {"bool": "?", "byte": "c"}
@@ -209,39 +218,42 @@ def _step(
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
 
 
-def alignment(step: Step) -> int:
-    """Return the alignment at which a step begins; 1 for a step without bytes of its own."""
+def smallest(body: tuple[Step, ...]) -> int:
+    """Return the least number of bytes that steps can take, padding not counted."""
+    return sum(map(_least, body))
+
+
+def _least(step: Step) -> int:
     match step:
-        case Number() | Dummy():
+        case Number() | Dummy() | Block():
             return step.size
-        case Block():
-            return step.unit
-        case Items(size=int()):
-            return next((a for a in map(alignment, step.body) if a > 1), 1)
+        case Texts(size=int(size)):
+            return 4 * size
+        case Items(size=int(size)):
+            return size * smallest(step.body)
         case Enter():
-            return 1
+            return 0
         case _:
             return 4
 
 
-def smallest(body: tuple[Step, ...]) -> int:
-    """Return the least number of bytes that steps can take, padding not counted."""
-    total = 0
-    for step in body:
-        match step:
-            case Number() | Dummy() | Block():
-                total += step.size
-            case Text(wide=False):
-                total += 4
-            case Texts(size=int(size)):
-                total += 4 * size
-            case Items(size=int(size)):
-                total += size * smallest(step.body)
-            case Enter():
-                pass
-            case _:
-                total += 4
-    return total
+def widest(body: tuple[Step, ...]) -> int:
+    """Return the widest alignment of all values, counts among them."""
+    return max(map(_width, body), default=1)
+
+
+def _width(step: Step) -> int:
+    match step:
+        case Number() | Dummy() | Block():
+            return step.unit
+        case Numbers():
+            return max(4, step.unit)
+        case Items():
+            return max(4, widest(step.body))
+        case Enter():
+            return 1
+        case _:
+            return 4
 
 
 def is_many(step: Items) -> bool:
@@ -284,8 +296,7 @@ def fixed(body: tuple[Step, ...]) -> Fixed | None:
             continue
         if not isinstance(step, (Number, Dummy, Block)):
             return None
-        unit = alignment(step)
-        first = first or unit
-        align = max(align, unit)
-        at += -at % unit + step.size
+        first = first or step.unit
+        align = max(align, step.unit)
+        at += -at % step.unit + step.size
     return Fixed(align, at, at + -at % align) if first == align else None

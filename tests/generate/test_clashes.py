@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from tests.support import generated
+
 #: Names of helpers in generated modules, of what these import, and of Python's own.
 NAMES = [
     "Any",
@@ -70,3 +72,15 @@ def test_a_message_and_a_service_of_that_name(package, name):
     command = [sys.executable, "-c", ROUND_TRIP, str(package), name]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-1500:]
+
+
+def test_fields_whose_paths_read_alike(tmp_path):
+    files = {
+        "msg/Inner.msg": "string[] b\n",
+        "msg/Outer.msg": "string[2] a_b\nInner a\n",
+    }
+    generated.write_package(tmp_path, "alike_msgs", files)
+    with generated.importable(tmp_path):
+        message = generated.class_of("alike_msgs/msg/Outer")(a_b=["x", "y"])
+        message.a.b = ["z"]
+        assert type(message).deserialize(message.serialize()) == message

@@ -1,5 +1,6 @@
 """What columns must hold: what the messages hold, one by one."""
 
+from contextlib import suppress
 from copy import deepcopy
 
 import numpy as np
@@ -81,8 +82,8 @@ def check(cls, buffers, rng):
     if buffers:
         columns = cls.to_columns(batch_of(buffers, rng), ragged=True)
         assert repr(columns.to_list()) == repr(wanted)
-    rows = cls.to_columns(buffers)
-    if isinstance(rows, np.ndarray) and "\ufffd" not in repr(wanted):  # there texts are bytes
+    with suppress(ValueError):  # not all columns fit into one array
+        rows = cls.to_columns(buffers, ragged=True).structured()
         assert repr([plain_row(row) for row in rows]) == repr(short_texts(wanted))
     table = cls.to_arrow(iter(map(memoryview, buffers)))
     table.validate(full=True)

@@ -9,157 +9,39 @@ afterwards, by the runtime.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
-from idlc.generate.python.lines import Comprehension, Group, call
-from idlc.generate.python.positions import START, Block, Cursor, Emitter, Line, Statement, Tables
+from idlc.generate.python.lines import Block, Comprehension, Group, Line, Statement, call
+from idlc.generate.python.positions import Builder, Cursor, Run, Tables
 from idlc.model import ir
+from idlc.model.names import snake_case
 from idlc.wire import plan
 from idlc.wire.layout import multiple_of
 
 TOO_SHORT = (Line('raise ValueError("too short")'),)
 TOO_MANY = (Line('raise ValueError("too many elements")'),)
+UNENDED = (Line('raise ValueError("text without end")'),)
 
 
-class UnpackedGroup:
-    """Fixed-size values that are read together; `path` is that of the first."""
+class UnpackedRun(Run):
+    """Values with what follows them, and the alignment and size of each."""
 
     def __init__(self) -> None:
-        self.path = ""
-        self.fields: list[str] = []
-        self.targets: list[str] = []
+        super().__init__()
         self.sizes: list[tuple[int, int]] = []
         self.after: list[Statement] = []
-
-    def add(self, token: str, align: int, size: int, target: str, path: str) -> None:
-        """Add a value of `size` bytes, stored in `target` unless that is empty."""
-        self.path = self.path or path
-        self.fields.append(token)
-        self.sizes.append((align, size))
-        if target:
-            self.targets.append(target)
 
     def skipped(self, cursor: Cursor) -> Cursor:
         """Return the position after the values, of which the first is at `cursor`."""
         for align, size in self.sizes:
             if not cursor.alignment.knows(align):
                 cursor = cursor.with_alignment(multiple_of(align))
-            cursor = cursor.skip(cursor.alignment.padding(align) + size)
+            cursor = cursor.aligned(align).skip(size)
         return cursor
 
     def assignment(self, value: str) -> Line:
         """Return the statement that reads the values."""
-        return Line(value, Group("", tuple(self.targets))) if self.targets else Line(value)
-
-
-class UnpackBuilder(Emitter):
-    """Emits statements that read; `group` is not yet emitted, `position` is before it.
-
-    `source` names the variable that buffers are slices of. `limited`: a check needs the buffer's
-    size. `unchecked`: no statement has noticed yet that a buffer was cut short. `worded`: the
-    sizes of strings are in `words` and their text in `chars`.
-    """
-
-    def __init__(self, tables: Tables, source: str) -> None:
-        super().__init__()
-        self.tables = tables
-        self.source = source
-        self.position = START
-        self.group = UnpackedGroup()
-        self.limited = False
-        self.unchecked = False
-        self.worded = False
-
-    def flush(self, *, last: bool = False) -> None:
-        """Emit the group; the position after the `last` one is not needed."""
-        group, self.group = self.group, UnpackedGroup()
-        if not group.fields:
-            return
-        self.unchecked = False
-        widest = max(align for align, _ in group.sizes)
-        if group.sizes[0][0] == widest:
-            self.align(widest)
-        fields = "".join(group.fields)
-        offset = self.position.text()
-        if self.worded and fields == "I":
-            self.line(f"words[{self.position.text(4)} >> 2]", group.targets[0])
-            self.position = group.skipped(self.position)
-        elif self.position.alignment.knows(widest):
-            reader = self.tables.reader(group.path, fields, self.position.alignment.residue)
-            self.body.append(group.assignment(call(reader, "data", offset)))
-            self.position = group.skipped(self.position)
-        else:
-            table = f"{self.tables.reader(group.path, fields, None)}[{offset} & 7]"
-            struct = table if last else "struct"
-            if not last:
-                self.line(table, struct)
-            self.body.append(group.assignment(call(f"{struct}.unpack_from", "data", offset)))
-            if not last:
-                self.line(f"{offset} + struct.size", "at")
-                self.position = group.skipped(self.position).at("at")
-        self.body += group.after
-
-    def align(self, align: int) -> None:
-        """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.position.alignment.knows(align):
-            self.position = self.position.skip(self.position.alignment.padding(align))
-        elif align == 8:
-            self.line(f"({self.position.text(3)} & -8) + 4", "at")
-            self.position = Cursor("at", 0, multiple_of(8))
-        else:
-            lead = 4 if self.worded and align == 4 else 0  # what comes after the size
-            self.line(f"{self.position.text(align - 1 + lead)} & -{align}", "at")
-            self.position = Cursor("at", -lead, multiple_of(align))
-
-    def store_position(self, base: str, offset: int = 0) -> None:
-        """Store the position in the variable `base`, as `base + offset`."""
-        value = self.position.text(-offset)
-        if value != base:
-            self.line(value, base)
-        self.position = self.position.at(base, offset)
-
-    def number(self, target: str, path: str) -> None:
-        """Read a count or size into a variable, together with the numbers before it."""
-        self.group.add("I", 4, 4, target, path)
-        self.flush()
-
-    def count(self, bound: int | None, path: str) -> str:
-        """Read the count of a sequence and check its upper limit."""
-        self.number("count", path)
-        if bound is not None:
-            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
-        return "count"
-
-    def start(self) -> str:
-        """Return the position as an expression that stays true when `end` changes."""
-        if self.position.base == "end":
-            self.store_position("at")
-        return self.position.text()
-
-    def buffer(self, count: str, align: int, size: int, source: str) -> str:
-        """Return the slice of `count` elements, and move after it.
-
-        It is shorter if the buffer is, which whatever is read next notices.
-        """
-        if not self.position.alignment.is_at(align):
-            self.store_position("at")
-            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
-            self.position = self.position.with_alignment(multiple_of(4))
-        start = self.start()
-        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
-        self.unchecked = True
-        self.position = Cursor("end", 0, self.position.alignment.modulo(size & -size))
-        return f"{source}{slice_of(start)}"
-
-    def finish(self) -> None:
-        """Emit the check of the last buffer, unless a later statement makes it."""
-        if self.unchecked:
-            self.short_if(f"{self.position.text()} > limit")
-
-    def short_if(self, condition: str) -> None:
-        """Emit a check that the buffer is long enough."""
-        self.limited = True
-        self.body.append(Block(f"if {condition}:", TOO_SHORT))
+        return Line(value, Group("", tuple(self.values))) if self.values else Line(value)
 
 
 def slice_of(start: str, end: str = "end") -> str:
@@ -167,9 +49,6 @@ def slice_of(start: str, end: str = "end") -> str:
     if " " in start + end:
         return f"[{start} : {end}]"
     return f"[{start}:{end}]"
-
-
-UNENDED = (Line('raise ValueError("text without end")'),)
 
 
 def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
@@ -201,17 +80,24 @@ def decode(
     for step in steps:
         decoder.step(step)
     decoder.flush(last=True)
-    decoder.finish()
+    if decoder.unchecked:
+        decoder.short_if(f"{decoder.position.text()} > limit")
     first = []
-    if decoder.limited or decoder.source == "view":
+    if decoder.limited or bulk:
         first.append(Line("len(data)", "limit"))
-    if decoder.source == "view":
-        first.append(Line(f"data if limit < {tables.small()} else memoryview(data)", "view"))
+    if bulk:
+        small = tables.define("small", "reading.small")
+        first.append(Line(f"data if limit < {small} else memoryview(data)", "view"))
     return (*first, *decoder.body, Line("return message"))
 
 
-class _Decoder(UnpackBuilder):
-    """Emits a message's steps; `makers` name the functions that make empty objects."""
+class _Decoder(Builder):
+    """Emits statements that read; `run` is not yet emitted, `position` is before it.
+
+    `source` names the variable that buffers are slices of. `limited`: a check needs the buffer's
+    size. `unchecked`: no statement has noticed yet that a buffer was cut short. `worded`: the
+    sizes of strings are in `words` and their text in `chars`.
+    """
 
     def __init__(
         self,
@@ -220,10 +106,93 @@ class _Decoder(UnpackBuilder):
         foreign: Mapping[ir.TypeName, str],
         source: str,
     ) -> None:
-        super().__init__(tables, source)
+        super().__init__(tables, Cursor("", 4, multiple_of(8)))
         self.makers = makers
         self.foreign = foreign
-        self.looping = False
+        self.source = source
+        self.run = UnpackedRun()
+        self.limited = False
+        self.unchecked = False
+        self.worded = False
+
+    def flush(self, *, last: bool = False) -> None:
+        """Emit the run; the position after the `last` one is not needed."""
+        run, self.run = self.run, UnpackedRun()
+        if not run.fields:
+            return
+        self.unchecked = False
+        if run.sizes[0][0] == run.widest:
+            self.align(run.widest)
+        offset = self.position.text()
+        if self.worded and run.fields == ["I"]:
+            self.line(f"words[{self.position.text(4)} >> 2]", run.values[0])
+            self.position = run.skipped(self.position)
+        elif self.position.alignment.knows(run.widest):
+            reader = self.reader(run, self.position.alignment.residue)
+            self.body.append(run.assignment(call(reader, "data", offset)))
+            self.position = run.skipped(self.position)
+        else:
+            table = f"{self.reader(run, None)}[{offset} & 7]"
+            struct = table if last else "struct"
+            if not last:
+                self.line(table, struct)
+            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", offset)))
+            if not last:
+                self.line(f"{offset} + struct.size", "at")
+                self.position = run.skipped(self.position).at("at")
+        self.body += run.after
+
+    def reader(self, run: Run, start: int | None) -> str:
+        """Return the function that reads a run, or without `start` a table of Structs."""
+        return self.tables.struct("read", run.path, run.fields, start, "unpack_from")
+
+    def align(self, align: int) -> None:
+        """Go to the next multiple of `align`, counted from the end of the header."""
+        # from one size to the next, words are found by what comes after
+        lead = 4 if self.worded and align == 4 else 0
+        self.position = self.position.skip(lead).aligned(align)
+        if self.position.masked:
+            self.store_position("at")
+        self.position = self.position.skip(-lead)
+
+    def number(self, target: str, path: str) -> None:
+        """Read a count or size into a variable, together with the numbers before it."""
+        self.run.add("I", 4, target, path)
+        self.run.sizes.append((4, 4))
+        self.flush()
+
+    def count(self, bound: int | None, path: str) -> str:
+        """Read the count of a sequence and check its upper limit."""
+        self.number("count", path)
+        if bound is not None:
+            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
+        return "count"
+
+    def start(self) -> str:
+        """Return the position as an expression that stays true when `end` changes."""
+        if self.position.base == "end":
+            self.store_position("at")
+        return self.position.text()
+
+    def buffer(self, count: str, align: int, size: int, source: str) -> str:
+        """Return the slice of `count` elements, and move after it.
+
+        It is shorter if the buffer is, which whatever is read next notices.
+        """
+        if not self.position.alignment.is_at(align):
+            self.store_position("at")
+            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
+            self.position = self.position.with_alignment(multiple_of(4))
+        start = self.start()
+        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
+        self.unchecked = True
+        self.position = Cursor("end", 0, self.position.alignment.modulo(size & -size))
+        return f"{source}{slice_of(start)}"
+
+    def short_if(self, condition: str) -> None:
+        """Emit a check that the buffer is long enough."""
+        self.limited = True
+        self.body.append(Block(f"if {condition}:", TOO_SHORT))
 
     def step(self, step: plan.Step) -> None:
         """Emit one step."""
@@ -231,14 +200,14 @@ class _Decoder(UnpackBuilder):
             case plan.Block() if step.is_large:
                 self.block(step)
             case plan.Number() | plan.Dummy() | plan.Block():
-                self.fixed(step, self.group)
+                self.fixed(step, self.run)
             case plan.Enter(place, type_):
                 self.body += self.make_nested(place, type_)
             case plan.Text(place, wide):
                 self.line(self.wide_text(place) if wide else self.text(place), place.text)
             case plan.Bytes(place, primitive, bound):
                 raw = self.buffer(self.count(bound, place.path), 1, 1, self.source)
-                self.line(call(self.tables.list_reader(primitive), raw), place.text)
+                self.line(call(self.list_reader(primitive), raw), place.text)
             case plan.Numbers():
                 self.numbers(step)
             case plan.Texts():
@@ -248,17 +217,28 @@ class _Decoder(UnpackBuilder):
 
     # Values of fixed size.
 
-    def fixed(self, step: plan.Step, group: UnpackedGroup) -> None:
-        """Add a value to a group."""
-        match step:
-            case plan.Number(place, letter, size):
-                group.add(letter, size, size, place.text, place.path)
-            case plan.Block(place):
-                group.add(step.token, step.unit, step.size, place.local, place.path)
-                reader = self.tables.block_reader(step)
-                group.after.append(Line(call(reader, place.local), place.text))
-            case _:
-                group.add("x", 1, 1, "", "nothing")
+    def fixed(self, step: plan.Plain, run: UnpackedRun) -> None:
+        """Add a value to a run."""
+        if isinstance(step, plan.Dummy):
+            run.add(step.code, 1, "", "nothing")
+        elif isinstance(step, plan.Number):
+            run.add(step.code, step.unit, step.place.text, step.place.path)
+        else:
+            run.add(step.code, step.unit, step.place.local, step.place.path)
+            reader = self.block_reader(step)
+            run.after.append(Line(call(reader, step.place.local), step.place.text))
+        run.sizes.append((step.unit, step.size))
+
+    def block_reader(self, step: plan.Block) -> str:
+        """Return the function that turns bytes into a fixed-size array."""
+        if step.primitive in plan.LIST_PRIMITIVES:
+            return self.list_reader(step.primitive)
+        return self.tables.array("array_of", "array_reader", step, "reading")
+
+    def list_reader(self, primitive: str) -> str:
+        """Return the function that turns bytes into a list of bools or bytes."""
+        kind = plan.LIST_PRIMITIVES[primitive]
+        return self.tables.function(f"list_of_{kind}", f"read_{kind}")
 
     def make_nested(self, place: plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
         """Return the statements that make a nested object."""
@@ -272,7 +252,7 @@ class _Decoder(UnpackBuilder):
         The last byte must be zero; reading it checks the bounds.
         """
         size = "size"
-        if self.worded and not self.group.fields:
+        if self.worded and not self.run.fields:
             self.align(4)
             self.position = self.position.skip(4)
             start = self.start()
@@ -285,7 +265,7 @@ class _Decoder(UnpackBuilder):
         self.position = Cursor("end", 1, multiple_of(1))
         if self.worded:
             return call("to_str", f"chars{slice_of(start)}")
-        return call(self.tables.text(), f"data{slice_of(start)}")
+        return call(self.tables.define("text", "reading.text"), f"data{slice_of(start)}")
 
     def wide_text(self, place: plan.Place) -> str:
         """Read the size of a wstring; return the expression that reads the wstring."""
@@ -296,8 +276,12 @@ class _Decoder(UnpackBuilder):
     def numbers(self, step: plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
         raw = self.buffer(self.count(step.bound, step.place.path), step.unit, step.unit, "view")
-        foreign = self.foreign.get(step.place.type)
-        self.line(call(self.tables.sequence_reader(step, foreign), raw), step.place.text)
+        name, reading = step.numpy, "reading"
+        if foreign := self.foreign.get(step.place.type):  # the class that holds it
+            name, reading = f"{name}_of_{snake_case(foreign)}", f"reading.of({foreign})"
+        function = call("sequence_reader", "order", f'"{step.code}"', reading)
+        reader = self.tables.function(f"sequence_of_{name}", function)
+        self.line(call(reader, raw), step.place.text)
 
     def block(self, step: plan.Block) -> None:
         """Read a large array of fixed size as one buffer."""
@@ -306,7 +290,7 @@ class _Decoder(UnpackBuilder):
         start, end = self.position.text(), self.position.text(step.size)
         self.short_if(f"{end} > limit")
         self.position = self.position.skip(step.size)
-        reader = self.tables.block_reader(step)
+        reader = self.block_reader(step)
         self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
 
     def begin(self, step: plan.Texts | plan.Items) -> str:
@@ -320,7 +304,11 @@ class _Decoder(UnpackBuilder):
         """Read an array or sequence of strings."""
         count = self.begin(step)
         self.align(4)
-        reader = self.tables.texts_reader(step)
+        if step.wide:
+            function = "wide_texts_reader(order)"
+        else:
+            function = call("texts_reader", "order", self.tables.define("text", "reading.text"))
+        reader = self.tables.function(f"read_{step.place.path}", function)
         texts = call(reader, "data", self.position.text(), count)
         self.line(texts, f"{step.place.text}, end")
         self.position = Cursor("end", 0, multiple_of(4 if step.wide else 1))
@@ -351,10 +339,12 @@ class _Decoder(UnpackBuilder):
         many = plan.is_many(step) and plan.is_text(step.body)
         # not within a loop: it goes over all that follows
         if many and not worded and self.source == "data" and not self.looping:
-            strings = call(self.tables.strings(), "data", self.position.text())
-            self.line(strings, "words, chars, to_str")
+            strings = self.tables.function("strings", "strings_reader(order, reading.text)")
+            self.line(call(strings, "data", self.position.text()), "words, chars, to_str")
             self.worded = True
+        unchecked = self.unchecked
         self.loop(f"for {step.item} in {step.place.local}:", element)
+        self.unchecked |= unchecked  # there may be no element
         self.worded = worded
 
     def rows(self, step: plan.Items, repeat: plan.Fixed) -> None:
@@ -364,51 +354,22 @@ class _Decoder(UnpackBuilder):
         self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)
-        group = UnpackedGroup()
+        run = UnpackedRun()
         entered: list[Statement] = []
         for part in step.body:
             if isinstance(part, plan.Enter):
                 entered += self.make_nested(part.place, part.type)
-            else:
-                self.fixed(part, group)
-        reader = self.tables.rows(step.item, "".join(group.fields))
-        values = self.tables.local(f"{step.item}_values") if group.targets else "_"
+            elif isinstance(part, (plan.Number, plan.Dummy, plan.Block)):
+                self.fixed(part, run)
+        reader = self.tables.struct("read", step.item, run.fields, 4, "iter_unpack")
+        values = self.tables.local(f"{step.item}_values") if run.values else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
-        stored = [Line(values, Group("", tuple(group.targets)))] if group.targets else []
+        stored = [run.assignment(values)] if run.values else []
         body = (
             Line(f"{self.makers[step.type]}()", step.item),
             Line(call(f"{step.place.local}.append", step.item)),
             *entered,
             *stored,
-            *group.after,
+            *run.after,
         )
         self.body.append(Block(f"for {values} in {reader}({rows}):", body))
-
-    def loop(self, head: str, emit: Callable[[], None]) -> None:
-        """Emit a loop; `emit` emits its body, until the known alignment holds for each round.
-
-        Between two rounds the position is in `at`, or in `end` if the body ends with a string.
-        """
-        entry, first = self.position, self.position.at("at")
-        unchecked = self.unchecked
-        looping, self.looping = self.looping, True
-        while True:
-            mark = self.tables.mark()
-            with self.within(head):
-                self.position = first
-                emit()
-                again = first.with_alignment(first.alignment.meet(self.position.alignment))
-                if first.base == "at" and self.position.base == "end":
-                    again = again.at("end", self.position.offset)
-                self.store_position(again.base, again.offset)
-            loop = self.body.pop()
-            if again == first:
-                break
-            first = again
-            self.tables.reset(mark)
-        self.looping = looping
-        self.position = entry
-        self.store_position(first.base, first.offset)
-        self.body.append(loop)
-        self.position = first
-        self.unchecked |= unchecked

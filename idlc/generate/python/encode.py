@@ -3,197 +3,125 @@
 Numbers that follow each other are written by one precompiled Struct; so is a string between
 them, by one Struct for each of its sizes. Positions modulo 8 are followed as far as they are
 known, so that padding is part of the Structs. After a string or a sequence of unknown size,
-the statement picks the Struct by the position, which is noted in `at` (or, if 4 is enough, its
-remainder in `low`) only where a later statement reads it.
+the statement picks the Struct by the position, which is noted in `at` only where a later
+statement reads it.
 """
 
 from __future__ import annotations
 
-import re
-from functools import lru_cache
+from msgspec.structs import replace
 
-import msgspec
-
-from idlc.generate.python.lines import Comprehension, Group, Node, call
-from idlc.generate.python.positions import (
+from idlc.generate.python.lines import (
     Block,
-    Emitter,
+    Comprehension,
+    Group,
     Line,
+    Node,
     Note,
-    Position,
     Put,
-    Tables,
-    aligned_to_8,
-    function,
-    prune,
+    Statement,
+    call,
 )
+from idlc.generate.python.positions import Builder, Cursor, Run, Tables
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
-_POSITIONS = re.compile(r"\b(?:at|low)\b")
 
-
-class PackedGroup:
-    """Fixed-size values that follow each other, with at most one text: one Struct.
-
-    `path` is that of the first value.
-    """
-
-    def __init__(self, start: Position) -> None:
-        self.start = start.alignment
-        self.path = ""
-        self.fields: list[str] = []
-        self.values: list[Node] = []
-        self.text_size = ""
-        self.widest = 1
-
-    def phase(self) -> str:
-        """Return the subscript that picks a Struct by the position, empty if one is enough."""
-        if self.start.knows(self.widest):
-            return ""
-        return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
-
-
-class PackBuilder(Emitter):
-    """Emits statements that write; `group` is not yet emitted, `position` is after it."""
-
-    def __init__(self, tables: Tables, position: Position) -> None:
-        super().__init__()
-        self.tables = tables
-        self.position = position
-        self.group = PackedGroup(position)
-
-    def put(self, part: Node, reads: str = "") -> None:
-        """Emit a part of the message."""
-        self.body.append(Put(part, positions(reads)))
-
-    def fixed(self, step: plan.Step) -> None:
-        """Add a value of fixed size to the group."""
-        match step:
-            case plan.Number(place, "?"):
-                truths = self.tables.function("truths", "TRUTHS")
-                self.field("?", 1, 1, f"{truths}[{place.text}]", place.path)
-            case plan.Number(place, letter, size):
-                self.field(letter, size, size, place.text, place.path)
-            case plan.Block(place):
-                value = call(self.tables.block_writer(step), place.text)
-                self.field(step.token, step.unit, step.size, value, place.path)
-            case _:
-                self.field("x", 1, 1, None, "nothing")
-
-    def field(self, token: str, align: int, size: int, value: Node | None, path: str) -> None:
-        """Add a value to the group."""
-        group = self.group
-        group.path = group.path or path
-        group.fields.append(token)
-        group.widest = max(group.widest, align)
-        if value is not None:
-            group.values.append(value)
-        self.position.align(align)
-        self.position.advance(size)
-
-    def text(self, place: plan.Place) -> None:
-        """Add a string to the group; a group has at most one."""
-        if self.group.text_size:
-            self.flush(4)
-        size = self.tables.local(f"{place.path}_size")
-        self.line(f"{place.text}.encode()", place.local)
-        self.line(call("len", place.local), size)
-        self.field("I", 4, 4, f"{size} + 1", place.path)
-        self.group.fields.append("*")
-        self.group.values.append(place.local)
-        self.group.text_size = size
-        self.position.skip(size, 1)
-        self.position.advance(1)
-
-    def flush(self, align: int) -> None:
-        """Emit the group, with the padding for a following `align` where that is known."""
-        group = self.group
-        if group.fields:
-            if max(group.start.modulus, group.widest) < align:
-                align = 1
-            group.widest = max(group.widest, align)
-            phase = group.phase()
-            start = None if phase else group.start.residue
-            writer = self.tables.writer(group.path, "".join(group.fields), start, align)
-            key = f"[{group.text_size}]" if group.text_size else ""
-            method = ".pack" if phase and not key else ""
-            self.put(Group(f"{writer}{phase}{key}{method}", tuple(group.values)), phase)
-            self.position.align(align)
-        self.note_position()
-
-    def note_position(self) -> None:
-        """Note the position in `at` and `low`, and begin a new group there."""
-        position = self.position
-        for target, value in position.before:
-            self.note(target, value)
-        position.before.clear()
-        if not position.constant:
-            self.note("at", position.text)
-            if not position.alignment.knows(4):
-                self.note("low", position.low)
-            self.position = Position.variable(position.alignment)
-        self.group = PackedGroup(self.position)
-
-    def pad(self, align: int, unless_empty: str = "") -> None:
-        """Emit padding as a part of its own."""
-        position = self.position
-        if position.alignment.is_at(align):
-            return
-        phase = "[at & 7]" if align == 8 else "[low & 3]"
-        index = f"[{position.alignment.residue}]" if position.alignment.knows(align) else phase
-        part = f"{self.tables.pad(align)}{index}"
-        self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
-        if not unless_empty:
-            position.align(align)
-
-    def note(self, target: str, value: str) -> None:
-        """Note a position; dropped later unless it is read."""
-        value = without_parentheses(value)
-        if target != value:
-            self.body.append(Note(target, value, positions(value)))
-
-
-@lru_cache(maxsize=1024)  # few are different
-def positions(expression: str) -> frozenset[str]:
-    """Return the variables in an expression that hold positions."""
-    return frozenset(_POSITIONS.findall(expression))
-
-
-def without_parentheses(value: str) -> str:
-    """Return an expression without parentheses around all of it."""
-    if not value.startswith("("):
-        return value
-    depth = 0
-    for place, character in enumerate(value):
-        depth += (character == "(") - (character == ")")
-        if depth == 0 and place < len(value) - 1:
-            return value
-    return value[1:-1]
-
-
-NONE: frozenset[str] = frozenset()
-
-
-def encode(steps: tuple[plan.Step, ...], tables: Tables, indent: int) -> list[str]:
-    """Return the lines that write a message; what they use is defined in `tables`."""
-    encoder = _Encoder(tables, Position(Alignment()))
+def encode(steps: tuple[plan.Step, ...], tables: Tables) -> tuple[Statement, ...]:
+    """Return the statements that write a message; what they use is defined in `tables`."""
+    encoder = _Encoder(tables, Alignment(), plan.widest(steps))
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"), "head")
     for step in steps:
         encoder.step(step)
     encoder.flush(1)
-    body = prune(tuple(encoder.body), NONE)
-    return function(body, indent, tuple(encoder.again))
+    return _joined(_pruned(tuple(encoder.body), live=False)[0], tuple(encoder.again))
 
 
-class _Encoder(PackBuilder):
-    """Emits a message's steps."""
+def _pruned(body: tuple[Statement, ...], *, live: bool) -> tuple[tuple[Statement, ...], bool]:
+    """Return the statements without the notes that nothing reads, and whether they read `at`.
 
-    def __init__(self, tables: Tables, position: Position) -> None:
-        super().__init__(tables, position)
+    `live`: it is read afterwards.
+    """
+    kept: list[Statement] = []
+    for statement in reversed(body):
+        match statement:
+            case Note(_, reads):
+                if not live:
+                    continue
+                live = reads
+            case Put(_, reads):
+                live |= reads
+            case Block(head, inner):
+                remaining, before = _pruned(inner, live=live)
+                if before and not live:  # one round of a loop reads what another notes
+                    live = True
+                    remaining, _ = _pruned(inner, live=True)
+                if not remaining:
+                    continue
+                statement = Block(head, remaining)
+            case Line():
+                pass
+        kept.append(statement)
+    return tuple(reversed(kept)), live
+
+
+def _interferes(statement: Statement, waiting: list[Put]) -> bool:
+    """Return whether a statement must not run before the parts that wait to be put."""
+    match statement:
+        case Note():
+            return any(put.reads for put in waiting)
+        case Block(_, inner):
+            return any(isinstance(s, Put) or _interferes(s, waiting) for s in inner)
+        case _:
+            return False
+
+
+def _joined(body: tuple[Statement, ...], again: tuple[str, ...]) -> tuple[Statement, ...]:
+    """Return the statements of a function that returns the result of `join` for the parts.
+
+    Parts are collected as long as no position that they read changes. If one of the conditions
+    of `again` is true in the end, the function begins anew.
+    """
+    result: list[Statement] = []
+    waiting: list[Put] = []
+    begun = False
+    for statement in body:
+        if isinstance(statement, Put):
+            waiting.append(statement)
+            continue
+        if _interferes(statement, waiting):
+            result += waiting if begun else [Line(_listed(waiting), "parts"), _BEGUN]
+            waiting, begun = [], True
+        result.append(statement)
+    if not begun and not again:
+        return (*result, Line(Group("return join", (_listed(waiting),))))
+    result += waiting if begun else [Line(_listed(waiting), "parts")]
+    if not again:
+        return (*result, Line("return join(parts)"))
+    once_more = (Line("return encode(message, join)"),)
+    blocks = [Block(f"if {condition}:", once_more) for condition in again]
+    return (*result, Line("join(parts)", "raw"), *blocks, Line("return raw"))
+
+
+def _listed(parts: list[Put]) -> Group:
+    return Group("", tuple(put.part for put in parts), brackets="[]")
+
+
+_BEGUN = Line("parts.append", "put")
+
+
+class _Encoder(Builder):
+    """Emits statements that write; `run` is not yet emitted, `position` is after it.
+
+    Positions matter modulo `widest` only.
+    """
+
+    def __init__(self, tables: Tables, alignment: Alignment, widest: int) -> None:
+        super().__init__(tables, Cursor("", alignment.residue, alignment))
+        self.widest = widest
         #: Conditions that hold if another thread changed the length of an uncopied array.
         self.again: list[str] = []
-        self.looping = False
+        self.run, self.start, self.text_size = Run(), alignment, ""
 
     def step(self, step: plan.Step) -> None:
         """Emit one step."""
@@ -222,75 +150,160 @@ class _Encoder(PackBuilder):
             case plan.Items():
                 self.items(step)
 
+    # Values of fixed size, and texts, are parts of a Struct.
+
+    def fixed(self, step: plan.Plain) -> None:
+        """Add a value of fixed size to the run."""
+        path, value = "nothing", ""
+        if not isinstance(step, plan.Dummy):
+            path, value = step.place.path, step.place.text
+        if step.code == "?":
+            value = f"{self.tables.function('truths', 'TRUTHS')}[{value}]"
+        elif isinstance(step, plan.Block):
+            value = call(self.block_writer(step, "bytes_of", "array_writer"), value)
+        self.field(step.code, step.unit, step.size, value, path)
+
+    def block_writer(self, step: plan.Block, stem: str, function: str) -> str:
+        """Return the function that turns a fixed-size array into bytes."""
+        if step.primitive in plan.LIST_PRIMITIVES:
+            kind = plan.LIST_PRIMITIVES[step.primitive]
+            return self.tables.function(f"{kind}_{step.count}", f"{kind}_writer({step.count})")
+        return self.tables.array(stem, function, step)
+
+    def field(self, code: str, align: int, size: int, value: Node, path: str) -> None:
+        """Add a value to the run, which begins with it if it is empty."""
+        if not self.run.fields:
+            self.note_position()
+            self.start = self.position.alignment
+        self.run.add(code, align, value, path)
+        self.position = self.position.aligned(align).skip(size)
+
+    def text(self, place: plan.Place) -> None:
+        """Add a string to the run, which has at most one."""
+        if "*" in self.run.fields:
+            self.flush(4)
+        size = self.text_size = self.tables.local(f"{place.path}_size")
+        self.line(f"{place.text}.encode()", place.local)
+        self.line(call("len", place.local), size)
+        self.field("I", 4, 4, f"{size} + 1", place.path)
+        self.run.add("*", 1, place.local, place.path)
+        self.position = self.position.skip_by(size, 1).skip(1)
+
+    def flush(self, align: int) -> None:
+        """Emit the run, with the padding for a following `align` where that is known."""
+        run, start = self.run, self.start
+        if run.fields:
+            if max(start.modulus, run.widest) < align:
+                align = 1
+            known = start.knows(max(run.widest, align))
+            residue = start.residue if known else None
+            key = "" if known else "[at & 7]"
+            if "*" in run.fields:
+                key += f"[{self.text_size}]"
+            elif not known:
+                key += ".pack"
+            writer = self.tables.struct("write", run.path, run.fields, residue, "pack", align)
+            self.body.append(Put(Group(f"{writer}{key}", tuple(run.values)), not known))
+            self.position = self.position.aligned(align)
+            self.run = Run()
+
+    def note_position(self) -> None:
+        """Note the position in `at`, unless all that matters of it is known."""
+        alignment = self.position.alignment
+        if alignment.knows(self.widest):
+            self.position = Cursor("", alignment.residue, alignment)
+        else:
+            self.store_position("at")
+
+    def note(self, value: str, target: str) -> None:
+        """Note a position; dropped later unless it is read."""
+        assert target == "at"
+        self.body.append(Note(value, self.position.reads))
+
     # Values of variable or large size are parts of their own.
+
+    def pad(self, align: int, unless_empty: str = "") -> None:
+        """Emit padding as a part of its own."""
+        alignment = self.position.alignment
+        if alignment.is_at(align):
+            return
+        known = alignment.knows(align)
+        pad = self.tables.function(f"pad{align}", f"PAD{align}")
+        part = f"{pad}[{alignment.residue if known else f'{self.position.text()} & 7'}]"
+        part = f'{part} if {unless_empty} else b""' if unless_empty else part
+        self.body.append(Put(part, self.position.reads and not known))
+        if not unless_empty:
+            self.position = self.position.aligned(align)
+
+    def put(self, part: str, size: str, modulus: int) -> None:
+        """Emit a part of `size` bytes, a multiple of `modulus`."""
+        self.body.append(Put(part))
+        self.position = self.position.skip_by(size, modulus)
 
     def block(self, step: plan.Block) -> None:
         """Emit a large array of fixed size."""
         self.flush(step.unit)
         self.pad(step.unit)
-        self.put(call(self.tables.buffer_writer(step), step.place.text))
-        self.position.advance(step.size)
-        self.note_position()
+        writer = self.block_writer(step, "buffer_of", "buffer_writer")
+        self.body.append(Put(call(writer, step.place.text)))
+        self.position = self.position.skip(step.size)
 
     def check(self, condition: str, problem: str) -> None:
         """Emit a check; `validate` finds the field and the words afterwards."""
         raised = Line(f'raise ValueError("{problem}")')
         self.body.append(Block(f"if {condition}:", (raised,)))
 
-    def bound(self, count: str, bound: int | None) -> None:
-        """Check a sequence's upper limit."""
-        if bound is not None:
+    def count(self, size: int | None, bound: int | None, count: str, path: str) -> None:
+        """Emit the check of a size or bound, and the count of a sequence."""
+        if size is not None:
+            self.check(f"{count} != {size}", "wrong number of elements")
+        elif bound is not None:
             self.check(f"{count} > {bound}", "too many elements")
+        if size is None:
+            self.field("I", 4, 4, count, path)
+            self.flush(1)
 
-    def buffer(self, place: plan.Place, value: Node, unit: int, bound: int | None = None) -> None:
+    def buffer(self, place: plan.Place, value: str, unit: int, bound: int | None = None) -> None:
         """Emit the count of a buffer's units, and the buffer."""
         local = place.local
         self.line(value, local)
-        self.bound(f"len({local})", bound)
         count = f"len({local})" if unit == 1 else f"len({local}) // {unit}"
-        self.field("I", 4, 4, count, place.path)
-        self.flush(1)
-        self.put(local)
-        self.position.skip(f"len({local})", unit)
-        self.note_position()
+        self.count(None, bound, count, place.path)
+        self.put(local, f"len({local})", unit)
 
     def numbers(self, step: plan.Numbers) -> None:
         """Emit a numeric sequence."""
-        local = step.place.local
+        local, value = step.place.local, step.place.text
         count = self.tables.local(f"{step.place.path}_count")
+        arguments = f'order, "{step.code}"'
         if self.looping:
-            self.line(call(self.tables.sequence_copier(step), step.place.text), local)
+            copier = self.tables.function(f"bytes_of_{step.numpy}", f"sequence_copier({arguments})")
+            self.line(call(copier, value), local)
             self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
         else:
-            self.line(step.place.text, local)
-            converted = Line(call(self.tables.sequence_writer(step), local), local)
+            self.line(value, local)
+            writer = self.tables.function(f"array_of_{step.numpy}", f"sequence_writer({arguments})")
             array = self.tables.function("array", "array_of(order)")
+            converted = Line(call(writer, local), local)
             self.body.append(Block(f"if type({local}) is not {array}:", (converted,)))
             self.line(f"len({local})", count)
             self.again.append(f"len({local}) != {count}")
-        self.bound(count, step.bound)
-        self.field("I", 4, 4, count, step.place.path)
-        self.flush(1)
-        repeat = plan.Fixed(step.unit, step.unit, step.unit)
-        self.elements(local, count, repeat, unless=count)
+        self.count(None, step.bound, count, step.place.path)
+        self.elements(local, count, plan.Fixed(step.unit, step.unit, step.unit), unless=count)
 
     def texts(self, step: plan.Texts) -> None:
         """Emit an array or sequence of strings, its count included."""
-        local = step.place.local
+        local, path = step.place.local, step.place.path
         self.flush(4)
         self.pad(4)
-        self.line(call(self.tables.texts_writer(step), step.place.text), local)
-        self.put(local)
-        self.position.skip(f"len({local})", 4 if step.wide else 1)
-        self.note_position()
-
-    def count(self, step: plan.Items, count: str) -> None:
-        """Emit the check of a size, or the count."""
-        self.bound(count, step.bound)
-        if step.size is None:
-            self.field("I", 4, 4, count, step.place.path)
-        else:
-            self.check(f"{count} != {step.size}", "wrong number of elements")
+        arguments = ["order"]
+        if step.size is not None:
+            arguments.append(f"size={step.size}")
+        elif step.bound is not None:
+            arguments.append(f"bound={step.bound}")
+        function = call("wide_block" if step.wide else "text_block", *arguments)
+        self.line(call(self.tables.function(f"write_{path}", function), step.place.text), local)
+        self.put(local, f"len({local})", 4 if step.wide else 1)
 
     def rows(self, step: plan.Items) -> None:
         """Emit structures of strings: sizes and ends are looked up, all is encoded once."""
@@ -316,13 +329,11 @@ class _Encoder(PackBuilder):
         attempt = Block("try:", (Block(f"{loop}:", tuple(lines)),))
         instead = Block("except IndexError:", (Line(unsized, rows),))
         self.body.append(Block(f"if len({local}):", (attempt, instead)))
-        self.count(step, f"len({rows}) // {len(parts)}")
+        self.count(step.size, step.bound, f"len({rows}) // {len(parts)}", path)
         self.flush(4)
         self.pad(4)
         self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
-        self.put(block)
-        self.position.skip(f"len({block})", 1)
-        self.note_position()
+        self.put(block, f"len({block})", 1)
 
     def items(self, step: plan.Items) -> None:
         """Emit an array or sequence of structures, as many as there are at one moment."""
@@ -333,21 +344,36 @@ class _Encoder(PackBuilder):
             return
         local = step.place.local
         self.line(call(self.tables.function("listed", "listed"), step.place.text), local)
-        self.count(step, f"len({local})")
+        self.count(step.size, step.bound, f"len({local})", step.place.path)
+
+        def element() -> None:
+            for part in step.body:
+                self.step(part)
+            self.flush(1)
+
         if repeat is None:
-            self.loop(step)
+            self.flush(1)
+            self.loop(f"for {step.item} in {local}:", element)
         else:
             self.fused(step, repeat)
 
     def fused(self, step: plan.Items, repeat: plan.Fixed) -> None:
         """Emit structures of constant size: one Struct, one join."""
         local = step.place.local
-        self.flush(1 if step.size is None else repeat.align)
-        inner = _Encoder(self.tables, Position(Alignment(8, 4)))
-        for part in inlined(step):
-            inner.fixed(part)
-        writer = self.tables.writer(step.item, "".join(inner.group.fields), 4, 1)
-        row = Group(writer, tuple(inner.group.values))
+        self.flush(repeat.align)
+        inner = _Encoder(self.tables, multiple_of(8), 8)
+        paths = {step.item: step.item}
+        for part in step.body:
+            if isinstance(part, plan.Enter):
+                paths[part.place.local] = f"{paths[part.place.owner]}.{part.place.slot}"
+            elif isinstance(part, (plan.Number, plan.Block)):
+                # a comprehension has attribute chains instead of variables
+                place = replace(part.place, owner=paths[part.place.owner])
+                inner.fixed(replace(part, place=place))
+            elif isinstance(part, plan.Dummy):
+                inner.fixed(part)
+        writer = self.tables.struct("write", step.item, inner.run.fields, 4, "pack")
+        row = Group(writer, tuple(inner.run.values))
         block = self.tables.local(f"{step.place.path}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
         blocks = Comprehension(row, ((step.item, local),))
@@ -359,76 +385,14 @@ class _Encoder(PackBuilder):
         gap = repeat.stride - repeat.size
         size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
         size += f" - {gap}" if gap else ""
-        modulus = power_of_two(repeat.size, repeat.stride)
+        modulus = min(each & -each for each in (repeat.size, repeat.stride, 8))
         if not unless or (self.position.alignment.is_at(repeat.align) and not gap):
             self.pad(repeat.align)
-            self.put(part)
-            self.position.skip(size, modulus)
-        else:
-            self.note_position()
-            if self.position.constant:
-                self.note("at", self.position.text)
-            self.note("low", self.position.low)
-            self.pad(repeat.align, unless)
-            self.put(part)
-            with self.within(f"if {unless}:"):
-                start = aligned_to_8("at") if repeat.align == 8 else "at"
-                self.note("at", f"{start} + {size}")
-                self.note("low", size)
-            self.position = Position.variable(multiple_of(4).modulo(modulus))
-        self.note_position()
-
-    def loop(self, step: plan.Items) -> None:
-        """Emit structures one by one."""
-        self.flush(1)
-        entry = self.position
-        if entry.constant:
-            self.note("at", entry.text)
-        if entry.alignment.knows(4):
-            self.note("low", entry.low)
-        head = entry.alignment
-        looping, self.looping = self.looping, True
-        while True:
-            mark = self.tables.mark()
-            with self.within(f"for {step.item} in {step.place.local}:"):
-                self.position = Position.variable(head)
-                self.group = PackedGroup(self.position)
-                for part in step.body:
-                    self.step(part)
-                self.flush(1)
-                end = self.position
-                if end.alignment.knows(4) and not head.knows(4):
-                    self.note("low", end.low)
-            met = head.meet(end.alignment)
-            if met == head:
-                break
-            head = met
-            self.tables.reset(mark)
-            self.body.pop()
-        self.looping = looping
-        self.position = Position.variable(head)
-        self.group = PackedGroup(self.position)
-
-
-def power_of_two(*sizes: int) -> int:
-    """Return the largest power of two, up to 8, that divides all sizes."""
-    return min(size & -size for size in (*sizes, 8))
-
-
-def inlined(step: plan.Items) -> list[plan.Step]:
-    """Return an element's fixed-size steps, with attribute chains instead of variables."""
-    paths = {step.item: step.item}
-    steps: list[plan.Step] = []
-    for part in step.body:
-        match part:
-            case plan.Enter(place):
-                paths[place.local] = f"{paths[place.owner]}.{place.slot}"
-            case plan.Number(place, letter, size):
-                moved = msgspec.structs.replace(place, owner=paths[place.owner])
-                steps.append(plan.Number(moved, letter, size))
-            case plan.Block(place, primitive, count):
-                moved = msgspec.structs.replace(place, owner=paths[place.owner])
-                steps.append(plan.Block(moved, primitive, count))
-            case _:
-                steps.append(part)
-    return steps
+            self.put(part, size, modulus)
+            return
+        self.pad(repeat.align, unless)
+        self.body.append(Put(part))
+        self.store_position("at")
+        end = self.position.aligned(repeat.align).skip_by(size, 1)
+        self.body.append(Block(f"if {unless}:", (Note(end.text(), reads=True),)))
+        self.position = self.position.with_alignment(multiple_of(4).modulo(modulus))

@@ -1,8 +1,7 @@
-"""Statements of codecs as lines: a run of values has one to a line, all else is on one."""
+"""Statements of codecs, and their lines: a run of values has one to a line, all else is on one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TypeAlias
 
 import msgspec
@@ -56,6 +55,38 @@ class Comprehension(msgspec.Struct, frozen=True):
 Node: TypeAlias = str | Group | Comprehension
 
 
+class Line(msgspec.Struct, frozen=True):
+    """A statement without effect on the position: `target = value`, or `value` alone."""
+
+    value: Node
+    target: Node = ""
+    operator: str = "="
+
+
+class Put(msgspec.Struct, frozen=True):
+    """A part of the message; `reads` tells that its bytes depend on `at`."""
+
+    part: Node
+    reads: bool = False
+
+
+class Note(msgspec.Struct, frozen=True):
+    """An update of `at`, without other effect; `reads` tells that it depends on `at` before."""
+
+    value: str
+    reads: bool
+
+
+class Block(msgspec.Struct, frozen=True):
+    """A compound statement; a loop runs any number of times, a branch at most once."""
+
+    head: str
+    body: tuple[Statement, ...]
+
+
+Statement: TypeAlias = Line | Put | Note | Block
+
+
 def call(function: str, *arguments: str) -> str:
     """Return a call on one line."""
     return f"{function}({', '.join(arguments)})"
@@ -79,21 +110,20 @@ def layout_lines(node: Node, indent: int, before: str = "", after: str = "") -> 
     return [opening, *inner, f"{margin}{node.brackets[1]}{after}"]
 
 
-def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[str]:
-    """Return an assignment as lines."""
-    *targets, last = layout_lines(target, indent)
-    return [*targets, *layout_lines(value, indent, f"{last.strip()} {operator} ")]
-
-
-def any_of(conditions: Sequence[str], indent: int, before: str, after: str) -> list[str]:
-    """Return the lines of `before`, whether any condition is true, and `after`."""
-    margin = " " * indent
-    first, *rest = conditions
-    if not rest:
-        return [f"{margin}{before}{first}{after}"]
-    return [
-        f"{margin}{before}(",
-        f"{margin}    {first}",
-        *(f"{margin}    or {condition}" for condition in rest),
-        f"{margin}){after}",
-    ]
+def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
+    """Return statements as lines, each part of a message appended by `put`."""
+    lines: list[str] = []
+    for statement in body:
+        match statement:
+            case Line(value, "", _):
+                lines += layout_lines(value, indent)
+            case Line(value, target, operator):
+                *targets, last = layout_lines(target, indent)
+                lines += [*targets, *layout_lines(value, indent, f"{last.strip()} {operator} ")]
+            case Note(value):
+                lines += text_of((Line(value, "at"),), indent)
+            case Put(part):
+                lines += layout_lines(Group("put", (part,)), indent)
+            case Block(head, inner):
+                lines += [" " * indent + head, *text_of(inner, indent + 4)]
+    return lines

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import jinja2
 import msgspec
 
-from idlc.generate.python import classes, fields, imports, positions
+from idlc.generate.python import classes, fields, imports
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
 from idlc.generate.python.encode import encode
 from idlc.generate.python.imports import ALONE, Homes, References, Surroundings
-from idlc.generate.python.lines import assign, call
+from idlc.generate.python.lines import call, text_of
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.positions import Tables
 from idlc.generate.types import TypesDict, content
@@ -43,6 +43,7 @@ class CodecView(msgspec.Struct, frozen=True):
     encode: tuple[Code, ...]
     decode: tuple[Code, ...]
     is_bulk: bool
+    has_texts: bool
 
 
 def codec(structure: ir.Message, references: References, messages: plan.Messages) -> CodecView:
@@ -50,18 +51,15 @@ def codec(structure: ir.Message, references: References, messages: plan.Messages
     names = python_names.Locals()
     steps = plan.steps(structure, messages, names)
     tables = Tables(names)
-    writing = encode(steps, tables, 8)
+    writing = text_of(encode(steps, tables), 8)
     makers = _makers(structure.name, steps, references, tables)
     foreign = {
         type_: references.name(type_) for type_ in makers if type_.package != references.package
     }
     bulk = is_bulk(steps)
-    reading = positions.text_of(
-        decode(steps, tables, makers[structure.name], makers, foreign, bulk=bulk), 8
-    )
-    constants = tuple(line for name, value in tables.definitions for line in assign(name, value, 4))
+    reading = text_of(decode(steps, tables, makers[structure.name], makers, foreign, bulk=bulk), 8)
     inside, outside = references.imports(set(makers) - {structure.name}, 4)
-    if any("_arrays." in line for line in constants):
+    if tables.has_arrays:
         runtime = references.surroundings.runtime
         inside.insert(0, f"    from {runtime}_idlc import arrays as _arrays")
     return CodecView(
@@ -69,10 +67,11 @@ def codec(structure: ir.Message, references: References, messages: plan.Messages
         function=Code(f"{snake_case(structure.name.name).replace('__', '_')}_codec"),
         imports=_code(inside),
         outside=_code(outside),
-        constants=_code(constants),
+        constants=_code(text_of(tables.definitions, 4)),
         encode=_code(writing),
         decode=_code(reading),
         is_bulk=bulk,
+        has_texts=tables.has_texts,
     )
 
 
@@ -89,7 +88,7 @@ def _makers(
         if type_ not in makers:
             name = "kind" if type_ == own else references.name(type_)
             stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
-            makers[type_] = tables.define(stem, f"maker {name}", call("_idlc.maker", name))
+            makers[type_] = tables.function(stem, call("maker", name))
     return makers
 
 
@@ -192,7 +191,7 @@ def module_views(
         title=Text(f"The codecs of {interface.name}."),
         runtime=Code(surroundings.runtime),
         codecs=codecs,
-        has_texts=any("*" in line for codec in codecs for line in codec.constants),
+        has_texts=any(codec.has_texts for codec in codecs),
     )
     path = f"{interface.name.kind}/{python_names.codec_module(homes.classes)}.py"
     yield Module("codec", path, view)

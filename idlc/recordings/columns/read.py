@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
@@ -18,7 +19,7 @@ from idlc.recordings.columns.scan import (
     scan_uniform,
 )
 from idlc.recordings.columns.source import Flat, Pieces, Source
-from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
+from idlc.recordings.columns.table import Elements, Table, columns_of
 from idlc.runtime.cdr import order_of
 from idlc.runtime.names import DecodeError, owner_of
 from idlc.runtime.typeinfo import CarefulReader, Structure, structure_of
@@ -83,15 +84,22 @@ def to_columns(
     ragged: bool | None = None,
     datetimes: bool = False,
 ) -> Any:
-    """Return a row for each message, as a structured array or as Columns."""
-    table, top = table_of(kind, messages, fields, datetimes)
-    if not ragged:
-        try:
-            return structured(table, top)
-        except UnevenError as error:
-            if ragged is not None:
-                raise ValueError(f"{error}; ragged=True takes it") from None
-    return columns_of(table, top)
+    """Return Columns with a row for each message, or without `ragged` what was returned before."""
+    columns = columns_of(*table_of(kind, messages, fields, datetimes))
+    if ragged:
+        return columns
+    warnings.warn(
+        "to_columns will return Columns: `to_columns(..., ragged=True)` does so now, "
+        "and `.structured()` makes a structured array of them",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    try:
+        return columns.structured()
+    except ValueError as error:
+        if ragged is None:
+            return columns
+        raise ValueError(f"{error}; ragged=True takes it") from None
 
 
 def table_of(
@@ -125,8 +133,7 @@ def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
             VectorScan(source, order, result).level(plan, cursors.select(rest), first)
             done.append(rows[rest])
     order = ">" if big.any() and not mixed else "<"
-    size = int((messages.stops - messages.starts).sum())
-    table = Table(source, size, order, result)
+    table = Table(source, order, result)
     order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
     return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
 

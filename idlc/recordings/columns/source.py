@@ -53,21 +53,6 @@ class Flat:
         first = int(starts[0])
         return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
 
-    def strings(self, starts: Any, sizes: Any, width: int) -> Any:
-        """Return bytes, at most `width` from each start, as numpy has them."""
-        same = bool((sizes == sizes[:1]).all())
-        distance = _regular(starts) if same and len(sizes) and sizes[0] else None
-        if distance is not None:
-            dtype, first = f"S{sizes[0]}", int(starts[0])
-            return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
-        if width > SHORT or (starts + width > len(self.array)).any():
-            return _padded(self, starts, sizes, width)
-        rows = self._windows(f"V{width}")[starts].view(np.uint8)
-        inside = np.arange(width) < np.arange(width + 1)[:, None]
-        masks = np.where(inside, np.uint8(255), np.uint8(0)).view(f"V{width}")[:, 0]
-        rows &= masks[sizes].view(np.uint8)
-        return rows.view(f"S{width}")
-
     def blocks(self, starts: Any, size: int) -> Place:
         """Return where the bytes from each start are: if they are regular, where they were."""
         distance = _regular(starts)
@@ -142,10 +127,6 @@ class Pieces:
         item = np.dtype(dtype)
         return self.ranges(starts, np.full(len(starts), item.itemsize)).view(item)
 
-    def strings(self, starts: Any, sizes: Any, width: int) -> Any:
-        """Return bytes, at most `width` from each start, as numpy has them."""
-        return _padded(self, starts, sizes, width)
-
     def blocks(self, starts: Any, size: int) -> Place:
         """Return where copies of the bytes from each start are."""
         rows = self.ranges(starts, np.full(len(starts), size))
@@ -169,17 +150,6 @@ class Pieces:
 Source = Flat | Pieces
 
 
-def rows_of(source: Source, starts: Any, counts: Any, item: int) -> Place | None:
-    """Return where as many items from each start are; None if they are not as many."""
-    if not len(counts) or (counts != counts[0]).any():
-        return None
-    count = int(counts[0])
-    place = Place(b"", 0, (len(counts),), (0,))
-    if count:
-        place = source.blocks(starts, count * item)
-    return place._replace(shape=(*place.shape, count), strides=(*place.strides, item))
-
-
 def fresh(size: int) -> Any:
     """Return bytes of memory, so that if they are many, large pages are all they are made of."""
     if size < 2 * PAGE:
@@ -195,12 +165,6 @@ def _regular(starts: Any) -> int | None:
         return None
     distance = int(starts[1] - starts[0])
     return distance if (starts[1:] - starts[:-1] == distance).all() else None
-
-
-def _padded(source: Source, starts: Any, sizes: Any, width: int) -> Any:
-    result = np.zeros((len(sizes), width), np.uint8)
-    result[np.arange(width) < sizes[:, None]] = source.ranges(starts, sizes)
-    return result.reshape(-1).view(f"S{width}")
 
 
 # strings, as `deserialize` reads them: invalid UTF-8 and UTF-16 become U+FFFD

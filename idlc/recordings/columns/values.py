@@ -8,6 +8,11 @@ from typing import Any
 
 import numpy as np
 
+#: In a structured array texts take as much room as the longest of their column. So many bytes are
+#: always taken, and more only up to so many for each byte of the columns.
+ALWAYS_TAKEN = 1 << 28
+MOST_PER_BYTE = 100
+
 
 class Column:
     """The base of Texts, Ragged and Columns: access to elements, as of a list."""
@@ -115,11 +120,16 @@ class Ragged(_Sliced):
         values: Any = self.values
         if not isinstance(values, np.ndarray):
             raise TypeError("only numbers can be stacked")
-        other = np.flatnonzero(sizes != sizes[:1])
-        if len(other):
-            raise ValueError(f"[{other[0]}] has {sizes[other[0]]} elements and [0] has {sizes[0]}")
+        other = self.uneven()
+        if other is not None:
+            raise ValueError(f"[{other}] has {sizes[other]} elements and [0] has {sizes[0]}")
         size = int(sizes[0]) if len(sizes) else 0
         return values.reshape(len(self), size, *values.shape[1:])
+
+    def uneven(self) -> int | None:
+        """Return the index of the first sequence that has another size than the first one."""
+        other = np.flatnonzero(self.sizes != self.sizes[:1])
+        return int(other[0]) if len(other) else None
 
 
 class Columns(Column):
@@ -162,6 +172,23 @@ class Columns(Column):
         names = self.keys()
         return [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
 
+    def structured(self) -> Any:
+        """Return a structured array, with texts as bytes in UTF-8.
+
+        Raises ValueError where it cannot hold them: where a sequence has another size than the
+        first, or where the longest text would take room in each row that few of them need.
+        """
+        dtype = _dtype(self, "[{}]")
+        needed, present = self._count * dtype.itemsize, _size_of(self)
+        if needed > max(ALWAYS_TAKEN, MOST_PER_BYTE * present):
+            raise ValueError(
+                f"the array would take {needed:,} bytes for {present:,} bytes of columns, "
+                f"as each text takes as much as the longest of its column"
+            )
+        result = np.zeros(self._count, dtype)
+        _fill(result, self)
+        return result
+
     def flat(self) -> dict[str, Any]:
         """Return all columns that are no Columns, by names such as "header.stamp.sec"."""
         result: dict[str, Any] = {}
@@ -172,6 +199,59 @@ class Columns(Column):
             else:
                 result[name] = column
         return result
+
+
+# structured arrays
+
+
+def _dtype(column: Any, path: str) -> Any:
+    """Return the dtype of a column at a path, in which `{}` stands for the row."""
+    if isinstance(column, Columns):
+        inner = dict(column).items()
+        return np.dtype([(name, _dtype(inside, f"{path}.{name}")) for name, inside in inner])
+    if isinstance(column, np.ndarray):
+        return np.dtype((column.dtype, column.shape[1:]))
+    sizes = column.sizes
+    if isinstance(column, Texts):
+        return np.dtype(f"S{max(1, int(sizes.max(initial=0)))}")
+    other = column.uneven()
+    if other is not None:
+        raise ValueError(
+            f"{path.format(other)}: has {sizes[other]} elements and {sizes[0]} before; "
+            f"a structured array needs the same number in each"
+        )
+    element = _dtype(column.values, path.removeprefix("[{}]."))
+    return np.dtype((element, (int(sizes[0]) if len(sizes) else 0,)))
+
+
+def _size_of(column: Any) -> int:
+    """Return the number of bytes in a column."""
+    if isinstance(column, Columns):
+        return sum(map(_size_of, dict(column).values()))
+    if isinstance(column, np.ndarray):
+        return column.nbytes
+    return int(column.offsets.nbytes) + _size_of(column.values)
+
+
+def _fill(target: Any, column: Any) -> None:
+    """Copy a column to where a structured array has it."""
+    if isinstance(column, Columns):
+        for name, inner in dict(column).items():
+            _fill(target[name], inner)
+    elif isinstance(column, Ragged):
+        _fill(target, column.values)
+    else:
+        rows = _padded(column, target.itemsize) if isinstance(column, Texts) else column
+        target[...] = rows.reshape(target.shape)
+
+
+def _padded(texts: Texts, width: int) -> Any:
+    """Return texts as numpy has them: all as wide."""
+    rows = texts.values
+    if len(rows) != len(texts) * width:
+        rows = np.zeros((len(texts), width), np.uint8)
+        rows[np.arange(width) < texts.sizes[:, None]] = texts.values
+    return np.ascontiguousarray(rows).reshape(-1).view(f"S{width}")
 
 
 def column_list(column: Any) -> Any:

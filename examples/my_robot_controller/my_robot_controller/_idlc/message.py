@@ -381,8 +381,8 @@ class Message(metaclass=MessageMeta):
     ) -> Any:
         """Return many serialized messages as columns of numpy, without making messages.
 
-        They are a structured array; or Columns, where that cannot hold them or if `ragged`. An
-        `idlc.Batch` of messages is not copied. Needs idlc itself.
+        They are Columns with `ragged=True`, which is to be the default; else a structured array, if
+        that can hold them. An `idlc.Batch` of messages is not copied. Needs idlc itself.
         """
         return _columns().to_columns(cls, messages, fields, ragged, datetimes)
 

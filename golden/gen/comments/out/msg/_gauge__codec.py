@@ -40,16 +40,12 @@ def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     def encode(message: Any, join: _idlc.Join) -> Any:
         label = message._label.encode()
         label_size = len(label)
-        at = label_size + 20 & -4
         notes = write_notes(message._notes)
-        at = at + len(notes)
-        low = len(notes)
         samples = message._samples
         if type(samples) is not array:
             samples = array_of_int16(samples)
         samples_count = len(samples)
-        at = (at + 3 & -4) + 4
-        at = at + 2 * samples_count
+        at = (label_size + 20 & -4) + len(notes)
         parts = [
             write_head[label_size](
                 encapsulation,
@@ -59,13 +55,15 @@ def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 label,
             ),
             notes,
-            write_count_at[low & 3].pack(samples_count),
+            write_count_at[at & 7].pack(samples_count),
             samples,
-            write_covariance_at[at & 7].pack(
-                bytes_of_float64_9(message._covariance),
-                message._flags,
-            ),
         ]
+        put = parts.append
+        at = (at + 3 & -4) + 2 * samples_count + 4
+        put(write_covariance_at[at & 7].pack(
+            bytes_of_float64_9(message._covariance),
+            message._flags,
+        ))
         raw = join(parts)
         if len(samples) != samples_count:
             return encode(message, join)

@@ -85,9 +85,8 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
         inner_c = inner._c.encode()
         inner_c_size = len(inner_c)
         inner_d = wide_text(inner._d)
-        at = (inner_c_size + 28 & -4) + 4
-        at = at + len(inner_d)
         inners = listed(message._inners)
+        at = (inner_c_size + 28 & -4) + len(inner_d) + 4
         at = at + 4
         parts = [
             write_head[inner_c_size](
@@ -114,13 +113,11 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
                 inners_item_c,
                 len(inners_item_d) // 4,
             ))
-            at = ((at + 4 & -8) + inners_item_c_size + 20 & -4) + 4
             put(inners_item_d)
-            at = at + len(inners_item_d)
+            at = ((at + 4 & -8) + inners_item_c_size + 20 & -4) + len(inners_item_d) + 4
         rows = listed(message._rows)
         if len(rows) > 4:
             raise ValueError("too many elements")
-        at = at + 4
         rows_block = b"\x00\x00\x00".join([
             write_rows_item(
                 rows_item._a,
@@ -129,10 +126,9 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
             )
             for rows_item in rows
         ])
-        low = 0
+        at = at + 4
         if rows:
             at = at + 12 * len(rows) - 3
-            low = 12 * len(rows) - 3
         pair = listed(message._pair)
         if len(pair) != 2:
             raise ValueError("wrong number of elements")
@@ -144,58 +140,48 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
             )
             for pair_item in pair
         ])
-        at = (at + 3 & -4) + 12 * len(pair) - 3
         put(write_count(len(rows)))
         put(rows_block)
-        put(pad4[low & 3])
+        put(pad4[at & 7])
         put(pair_block)
-        low = 12 * len(pair) - 3
+        at = (at + 3 & -4) + 12 * len(pair) - 3
         nothings = listed(message._nothings)
-        at = (at + 4 & -4) + 4
         nothings_block = b"".join([write_nothings_item() for nothings_item in nothings])
-        at = at + len(nothings)
-        put(write_nothing_at[low & 3].pack(len(nothings)))
-        put(nothings_block)
-        low = len(nothings)
         doubles = message._doubles
         if type(doubles) is not array:
             doubles = array_of_float64(doubles)
         doubles_count = len(doubles)
-        at = (at + 3 & -4) + 4
-        put(write_count_at[low & 3].pack(doubles_count))
-        put(pad8[at & 7] if doubles_count else b"")
+        put(write_nothing_at[at & 7].pack(len(nothings)))
+        put(nothings_block)
+        at = (at + 4 & -4) + len(nothings) + 4
+        put(write_count_at[at & 7].pack(doubles_count))
+        put(pad8[(at + 3 & -4) + 4 & 7] if doubles_count else b"")
         put(doubles)
+        at = (at + 3 & -4) + 4
         if doubles_count:
-            at = (at + 3 & -8) + 4 + 8 * doubles_count
+            at = (at + 3 & -8) + 8 * doubles_count + 4
         shorts = message._shorts
         if type(shorts) is not array:
             shorts = array_of_int16(shorts)
         shorts_count = len(shorts)
         if shorts_count > 3:
             raise ValueError("too many elements")
-        at = at + 4
-        at = at + 2 * shorts_count
-        low = 2 * shorts_count
         flags = flags_of(message._flags)
-        at = (at + 3 & -4) + 4
-        at = at + len(flags)
+        at = at + 2 * shorts_count + 4
         put(write_count(shorts_count))
         put(shorts)
-        put(write_count_at[low & 3].pack(len(flags)))
+        put(write_count_at[at & 7].pack(len(flags)))
         put(flags)
-        low = len(flags)
-        at = at + 2
-        low = low + 2
+        at = (at + 3 & -4) + len(flags) + 4
         texts = write_texts(message._texts)
-        at = (at + 3 & -4) + len(texts)
-        put(write_octets(octets_2(message._octets)))
-        put(pad4[low & 3])
-        put(texts)
-        low = len(texts)
         wides = write_wides(message._wides)
-        at = (at + 3 & -4) + len(wides)
         stamps = listed(message._stamps)
-        at = at + 4
+        put(write_octets(octets_2(message._octets)))
+        put(pad4[at + 2 & 7])
+        put(texts)
+        put(pad4[(at + 5 & -4) + len(texts) & 7])
+        put(wides)
+        at = ((at + 5 & -4) + len(texts) + 3 & -4) + len(wides)
         stamps_block = b"".join([
             write_stamps_item(
                 stamps_item._sec,
@@ -203,9 +189,7 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
             )
             for stamps_item in stamps
         ])
-        at = at + 8 * len(stamps)
-        put(pad4[low & 3])
-        put(wides)
+        at = at + 8 * len(stamps) + 4
         put(write_count(len(stamps)))
         put(stamps_block)
         put(write_weights_at[at & 7].pack(
@@ -213,10 +197,9 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
             message._last,
         ))
         raw = join(parts)
-        if (
-            len(doubles) != doubles_count
-            or len(shorts) != shorts_count
-        ):
+        if len(doubles) != doubles_count:
+            return encode(message, join)
+        if len(shorts) != shorts_count:
             return encode(message, join)
         return raw
 

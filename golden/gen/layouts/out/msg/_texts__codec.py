@@ -24,13 +24,13 @@ def texts_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     sized = _idlc.sizes(order)
     ended = _idlc.ENDS
     unsized = _idlc.unsized
-    write_head = _idlc.layout(order, "4sI", align=4).pack
+    write_head = _idlc.layout(order, "4sI").pack
     write_rows = _idlc.rows_writer(order)
     listed = _idlc.listed
     write_count_at = _idlc.phases(order, "I")
     write_text_4_at = _idlc.text_phases(order, "I*", align=4)
     write_text = _idlc.Texts(order, "I*")
-    write_titled_item_level = _idlc.Texts(order, "BI*I", align=4)
+    write_titled_item_level = _idlc.Texts(order, "BI*I")
     write_titled_item_number_at = _idlc.phases(order, "d")
     new_texts = _idlc.maker(kind)
     new_pair = _idlc.maker(Pair)
@@ -60,41 +60,38 @@ def texts_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
             except IndexError:
                 pairs_rows = unsized([each for pairs_item in pairs for each in (pairs_item._key, pairs_item._value)])
         pairs_block = write_rows(pairs_rows)
-        at = len(pairs_block) + 8
-        low = len(pairs_block)
         few = listed(message._few)
         if len(few) > 2:
             raise ValueError("too many elements")
-        at = (at + 3 & -4) + 4
+        at = len(pairs_block) + 8
         parts = [
             write_head(
                 encapsulation,
                 len(pairs_rows) // 6,
             ),
             pairs_block,
-            write_count_at[low & 3].pack(len(few)),
+            write_count_at[at & 7].pack(len(few)),
         ]
         put = parts.append
-        low = 0
+        at = (at + 3 & -4) + 4
         for few_item in few:
             few_item_key = few_item._key.encode()
             few_item_key_size = len(few_item_key)
-            put(write_text_4_at[low & 3][few_item_key_size](
+            put(write_text_4_at[at & 7][few_item_key_size](
                 few_item_key_size + 1,
                 few_item_key,
             ))
-            at = (at + 3 & -4) + few_item_key_size + 8 & -4
             few_item_value = few_item._value.encode()
             few_item_value_size = len(few_item_value)
+            at = (at + 3 & -4) + few_item_key_size + 8 & -4
             put(write_text[few_item_value_size](
                 few_item_value_size + 1,
                 few_item_value,
             ))
             at = at + few_item_value_size + 5
-            low = few_item_value_size + 1
         titled = listed(message._titled)
+        put(write_count_at[at & 7].pack(len(titled)))
         at = (at + 3 & -4) + 4
-        put(write_count_at[low & 3].pack(len(titled)))
         for titled_item in titled:
             titled_item_title = titled_item._title.encode()
             titled_item_title_size = len(titled_item_title)
@@ -121,10 +118,9 @@ def texts_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 titled_item_title,
                 len(titled_item_pairs_rows) // 6,
             ))
-            at = (at + titled_item_title_size + 12 & -4) + 4
             titled_item_pairs_block = write_rows(titled_item_pairs_rows)
             put(titled_item_pairs_block)
-            at = at + len(titled_item_pairs_block)
+            at = (at + titled_item_title_size + 12 & -4) + len(titled_item_pairs_block) + 4
             put(write_titled_item_number_at[at & 7].pack(titled_item._number))
             at = (at + 3 & -8) + 12
         last = message._last.encode()

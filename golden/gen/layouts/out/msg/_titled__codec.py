@@ -23,7 +23,7 @@ def titled_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     sized = _idlc.sizes(order)
     ended = _idlc.ENDS
     unsized = _idlc.unsized
-    write_head = _idlc.Texts(order, "4sBI*I", align=4)
+    write_head = _idlc.Texts(order, "4sBI*I")
     write_rows = _idlc.rows_writer(order)
     write_number_at = _idlc.phases(order, "d")
     new_titled = _idlc.maker(kind)
@@ -54,9 +54,8 @@ def titled_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                     )
             except IndexError:
                 pairs_rows = unsized([each for pairs_item in pairs for each in (pairs_item._key, pairs_item._value)])
-        at = (title_size + 16 & -4) + 4
         pairs_block = write_rows(pairs_rows)
-        at = at + len(pairs_block)
+        at = (title_size + 16 & -4) + len(pairs_block) + 4
         return join([
             write_head[title_size](
                 encapsulation,

@@ -60,16 +60,15 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         names = write_names(message._names)
-        at = len(names) + 4
-        low = len(names)
         words_ = listed(message._words)
-        at = (at + 3 & -4) + 4
+        at = len(names) + 4
         parts = [
             write_head(encapsulation),
             names,
-            write_count_at[low & 3].pack(len(words_)),
+            write_count_at[at & 7].pack(len(words_)),
         ]
         put = parts.append
+        at = (at + 3 & -4) + 4
         for words_item in words_:
             words_item_text = words_item._text.encode()
             words_item_text_size = len(words_item_text)
@@ -100,29 +99,27 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         flags = flags_of(message._flags)
         if len(flags) > 4:
             raise ValueError("too many elements")
-        low = len(flags)
-        low = low + 2
+        at = at + len(flags) + 4
         wide = write_wide(message._wide)
         str_ = write_str(message._str)
         put(write_count(len(flags)))
         put(flags)
         put(write_raw(octets_2(message._raw)))
-        put(pad4[low & 3])
+        put(pad4[at + 2 & 7])
         put(wide)
         put(str_)
-        low = len(str_)
+        at = (at + 5 & -4) + len(wide) + len(str_)
         data_ = message._data
         if type(data_) is not array:
             data_ = array_of_uint8(data_)
         data_count = len(data_)
-        put(write_position_at[low & 3].pack(
+        texts_in_a_long_field_name = write_texts_in_a_long_field_name(message._texts_in_a_long_field_name)
+        put(write_position_at[at & 7].pack(
             bytes_of_float32_3(message._position),
             data_count,
         ))
         put(data_)
-        low = data_count
-        texts_in_a_long_field_name = write_texts_in_a_long_field_name(message._texts_in_a_long_field_name)
-        put(pad4[low & 3])
+        put(pad4[(at + 3 & -4) + data_count + 16 & 7])
         put(texts_in_a_long_field_name)
         raw = join(parts)
         if len(data_) != data_count:

@@ -44,12 +44,9 @@ def odd_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     def encode(message: Any, join: _idlc.Join) -> Any:
         list_ = message._list.encode()
         list_size = len(list_)
-        at = (list_size + 34 & -4) + 4
         str_ = write_str(message._str)
-        at = at + len(str_)
-        low = len(str_)
+        at = (list_size + 34 & -4) + len(str_) + 4
         item = listed(message._item)
-        at = (at + 3 & -4) + 16
         item_block = b"".join([
             write_item_item(
                 item_item._x,
@@ -72,18 +69,19 @@ def odd_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 message._float,
             ),
             str_,
-            write_message_at[low & 3].pack(
+            write_message_at[at & 7].pack(
                 message._message,
                 message._data,
                 message._at,
                 len(item),
             ),
-            pad8[at & 7] if item else b"",
+            pad8[(at + 3 & -4) + 16 & 7] if item else b"",
             item_block,
         ]
         put = parts.append
+        at = (at + 3 & -4) + 16
         if item:
-            at = (at + 3 & -8) + 4 + 16 * len(item)
+            at = (at + 3 & -8) + 16 * len(item) + 4
         array_ = message._array
         put(write_array_x_at[at & 7].pack(
             array_._x,
