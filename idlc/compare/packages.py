@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -231,33 +231,6 @@ class Allowance(msgspec.Struct, frozen=True):
             return False
         names = [change.subject, change.subject.partition(".")[0], change.cause]
         return any(fnmatchcase(name, self.at) for name in names if name)
-
-
-def without_allowed(
-    changes: Sequence[Change],
-    allowances: Iterable[Allowance],
-    today: str,
-    path: str,
-    report: Report,
-) -> tuple[Change, ...]:
-    """Return the changes without an allowance.
-
-    Reports entries that have expired, or that no change needs; `path` is the file that
-    holds them, `today` a day as YYYY-MM-DD.
-    """
-    allowed: set[int] = set()
-    for entry in allowances:
-        covered = [at for at, change in enumerate(changes) if entry.covers(change)]
-        if not covered:
-            message = f"no change needs the allowance for `{entry.at}`"
-            report.add(codes.UNUSED_ALLOWANCE.of(path, message, hint="remove the entry"))
-        elif entry.until.isoformat() < today:
-            message = f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})"
-            hint = "take the change back, or decide again and set a new day"
-            report.add(codes.EXPIRED_ALLOWANCE.of(path, message, hint=hint))
-        else:
-            allowed.update(covered)
-    return tuple(change for at, change in enumerate(changes) if at not in allowed)
 
 
 def against(config: Config, report: Report) -> str | None:
