@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
+from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.model import derive, ir
 from idlc.project import inputs
@@ -82,21 +82,12 @@ class Compiler:
         self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
     ) -> tuple[ir.Interface, ...]:
         """Return the interfaces of texts; from now on, references resolve to them."""
-        from idlc.language.parse import parse_any
-        from idlc.model.lower import lower
-
         own = []
         for name, source in sources:
-            lowered = self._pool.remembered(name, source)
-            if lowered is None:
-                with stage("parse", source.path):
-                    tree = parse_any(source)
-                with stage("lower", source.path):
-                    problems = Report()
-                    interface = lower(tree, name, problems, self.library.distro)
-                    lowered = self._pool.remember(interface, problems)
-            own.append(lowered.interface)
-            report.extend(lowered.problems)
+            with stage("parse", source.path):
+                entry = self._pool.lower(name, source)
+            own.append(entry.interface)
+            report.extend(entry.problems)
         return tuple(own)
 
     def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
@@ -110,17 +101,19 @@ class Compiler:
             check(model, report, self._checked)
         return model
 
+    def models(
+        self, interfaces: Mapping[ir.TypeName, ir.Interface], report: Report
+    ) -> dict[str, Model]:
+        """Return the models of interfaces by package; every problem is reported."""
+        packages: dict[str, list[ir.Interface]] = {}
+        for name in sorted(interfaces):
+            packages.setdefault(name.package, []).append(interfaces[name])
+        return {package: self.model(package, own, report) for package, own in packages.items()}
+
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
         """Return interfaces and all that they refer to, without missing ones."""
-        interfaces: dict[ir.TypeName, ir.Interface] = {}
-        waiting = list(names)
-        while waiting:
-            name = waiting.pop()
-            entry = None if name in interfaces else self._pool.get(name)
-            if entry is not None:
-                interfaces[name] = entry.interface
-                waiting += (target for _, target in entry.references)
-        return interfaces
+        graph = self._pool.graph(names)
+        return {name: interface for name, (interface, _) in graph.items() if interface}
 
     def all(
         self, packages: Iterable[inputs.Inputs], report: Report
@@ -209,7 +202,7 @@ def without_errors(
 
     An error in a file counts for its file in `also` as well.
     """
-    errors = [problem for problem in report if problem.severity is Severity.ERROR]
+    errors = report.errors
     broken = {problem.where[0] for problem in errors}
     broken |= {also[path] for path in broken & also.keys()}
     is_all = any(problem.code == codes.INVALID_PACKAGE_NAME.id for problem in errors)
@@ -220,5 +213,4 @@ def without_errors(
 
 def derived_names(interface: ir.Interface) -> list[str]:
     """Return the names of an interface and of all structures derived from it, sorted."""
-    parts = (*derive.messages(interface), *derive.pseudo_structures(interface))
-    return sorted({str(part.name) for part in parts})
+    return sorted({str(part.name) for part in derive.structures(interface)})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.format import format_file
 from idlc.language.parse import parse
@@ -20,8 +20,7 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
     problems, again = Report(), Report()
     tree = parse(source)
     before = lower(tree, name, problems, NEWEST)
-    errors = [problem for problem in problems if problem.severity is Severity.ERROR]
-    unreadable = [problem for problem in errors if problem.code.startswith(_UNREADABLE)]
+    unreadable = [problem for problem in problems.errors if problem.code.startswith(_UNREADABLE)]
     if unreadable:
         report.extend(unreadable)
         return None
@@ -29,11 +28,11 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
     if new == source.text:
         return new
     after = lower(parse(Source(source.path, new)), name, again, NEWEST)
-    same = [problem.code for problem in errors] == [
-        problem.code for problem in again if problem.severity is Severity.ERROR
+    same = [problem.code for problem in problems.errors] == [
+        problem.code for problem in again.errors
     ]
     if same and meaning(after) == meaning(before):
         return new
-    if errors:  # the meaning of a wrong definition cannot be compared reliably
+    if problems.had_errors:  # the meaning of a wrong definition cannot be compared reliably
         return source.text
     raise AssertionError("the layout would change the meaning; the file was left alone")

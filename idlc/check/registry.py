@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from idlc.check import names, portability, style
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.model import derive, ir
-from idlc.model.link import Model
+from idlc.model import ir
+from idlc.model.link import Model, dependents
 
 if TYPE_CHECKING:
     from idlc.project.package_xml import Facts
@@ -28,22 +28,15 @@ class IncrementalFindings:
         self._packages: dict[str, tuple[dict[ir.TypeName, ir.Interface | None], Findings]] = {}
 
     def still_valid(self, model: Model) -> Findings:
-        """Return the findings of a package's unchanged interfaces; the caller adds the others.
-
-        Takes linear time in interfaces and references, circles or not.
-        """
+        """Return the findings of a package's unchanged interfaces; the caller adds the others."""
         graph = model.graph()
         before, findings = self._packages.get(model.package, ({}, {}))
-        waiting = [
+        new = [
             name
             for name, (now, _) in graph.items()
             if name not in before or before[name] is not now
         ]
-        users: dict[ir.TypeName, list[ir.TypeName]] = {}
-        for name, (_, targets) in graph.items():
-            for target in targets:
-                users.setdefault(target, []).append(name)
-        changed = derive.closure(waiting, lambda name: users.get(name, ()))
+        changed = dependents(new, ((name, targets) for name, (_, targets) in graph.items()))
         own = (interface.name for interface in model.own)
         kept = {name: findings[name] for name in own if name in findings and name not in changed}
         self._packages[model.package] = {name: now for name, (now, _) in graph.items()}, kept

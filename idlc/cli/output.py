@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from idlc.diagnostics import codes, terminal
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import MANY, counted, statistics, summary
 from idlc.diagnostics.text import one_line, visible
 from idlc.version import __version__
@@ -106,16 +106,15 @@ def texts(parts: Iterable[str], style: str, stream: TextIO) -> None:
 
 def counts(report: Report) -> dict[str, int]:
     """Return the number of errors and warnings."""
-    errors = sum(diagnostic.severity is Severity.ERROR for diagnostic in report)
+    errors = len(report.errors)
     return {"errors": errors, "warnings": len(report) - errors}
 
 
 def status(report: Report) -> int:
     """Return the exit status: 0 clean, 1 findings, 2 usage or configuration."""
-    errors = [diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR]
-    if any(diagnostic.code in codes.USAGE for diagnostic in errors):
+    if any(diagnostic.code in codes.USAGE for diagnostic in report.errors):
         return 2
-    return 1 if errors else 0
+    return 1 if report.had_errors else 0
 
 
 def write_report(

@@ -23,7 +23,7 @@ from idlc.compare.packages import (
     raised,
 )
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
@@ -217,7 +217,7 @@ def _compare(
     before = _before(options, packages, revision, report)
     problems = Report()
     after = _side(packages, {}, options.scope, problems)
-    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
+    report.extend(problems.errors)
     if before is None or any(problem.code in codes.USAGE for problem in report):
         return None
     others, submodules, skipped = set[ir.TypeName](), set[str](), set[ir.TypeName]()
@@ -308,7 +308,7 @@ def _side(
     names = {*compiled, *every.values()}
     sound = {own.name for model in models for own in model.own}
     error = ""
-    if first := next((problem for problem in report if problem.severity is codes.ERROR), None):
+    if first := next(iter(report.errors), None):
         line = first.span.source.position(first.span.start)[0] if first.span else 1
         error = f"the first error is {first.code} at {first.where[0]}:{line}: {first.message}"
     return Side({model.package: model for model in models}, frozenset(names - sound), error)
@@ -339,7 +339,7 @@ def error_free_models(packages: Packages, scope: Scope, report: Report) -> dict[
         extents: ContentSizes = {}
         for model in models.values():
             problems.extend(oversized(model, extents))
-    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
+    report.extend(problems.errors)
     return models
 
 
@@ -407,9 +407,7 @@ class Baseline:
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = msgspec.structs.replace(self._options, paths=paths, scope=scope)
             side = read_baseline(options, tuple(packages), report) if paths and self.name else None
-            why = next(
-                (problem.message for problem in report if problem.severity is Severity.ERROR), ""
-            )
+            why = next((problem.message for problem in report.errors), "")
             self._side = side or Side({}, frozenset(), why)
         return self._side
 

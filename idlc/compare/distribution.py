@@ -93,7 +93,7 @@ class _LayeredLibrary(Library):
 def _models(packages: Sequence[inputs.Inputs], library: Library, report: Report) -> list[Model]:
     problems = Report()
     models = [model for _, model in Compiler(library).all(packages, problems)]
-    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
+    report.extend(problems.errors)
     return models
 
 

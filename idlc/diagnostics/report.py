@@ -134,6 +134,11 @@ class Report:
         """True if any problem is an error."""
         return self._had_errors
 
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """The problems that are errors, in order."""
+        return [problem for problem in self if problem.severity is Severity.ERROR]
+
 
 def enumerated(texts: Sequence[str]) -> str:
     """Return texts as a sentence lists them: `a`, `a and b`, `a, b and c`."""

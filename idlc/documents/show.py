@@ -57,7 +57,7 @@ def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | N
         report.add(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
         return None
     with stage("describe", tops[0]):
-        return {**model.describer.installed(tops[0])}
+        return model.describer.installed(tops[0])
 
 
 def _with_hashes(scope: Scope, report: Report) -> Scope:

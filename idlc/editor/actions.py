@@ -304,8 +304,7 @@ def _update(state: ServerState, uri: str) -> None:
         raise RequestError(REQUEST_FAILED, f"nothing was generated: {error}") from error
     state.forget()
     if report.had_errors:
-        errors = (each for each in report if each.severity is Severity.ERROR)
-        texts = (f"{each.where[0]}: {each.code}: {each.message}" for each in errors)
+        texts = (f"{each.where[0]}: {each.code}: {each.message}" for each in report.errors)
         message = f"idlc gen: nothing was written: {first_few(texts, NAMED)}"
     else:
         message = f"idlc gen: {first_few(map(_outcome, generated), NAMED)}"

@@ -150,7 +150,7 @@ def elements(context: InterfaceContext) -> Iterator[Element]:
             if not code.definition:
                 continue
             body = parse_definition(code.definition)
-            if not isinstance(body, tree.Broken):
+            if not isinstance(body, tree.Fault):
                 meaning = meanings.get(code.start + body.name.start)
                 yield Element(context.source, code, body, message, meaning)
 

@@ -106,10 +106,7 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
         """
         for model in self.models.values():
             if model.interfaces.get(interface.name) is interface:
-                reach = model.reach(interface.name)
-                paths = {needed.source.path for needed in reach if needed and needed.source}
-                is_sound = model.is_sound(interface.name) and not paths & self._broken
-                return model.restricted_to(interface) if is_sound else None
+                return model.restricted_to(interface, self._broken)
         return None
 
     def source(self, name: ir.TypeName) -> Source | None:

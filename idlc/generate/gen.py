@@ -13,6 +13,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.generate.package import Generated, generated, up_to_date, with_needs
 from idlc.generate.target import (
+    Output,
     Target,
     borrowed,
     completed,
@@ -153,36 +154,18 @@ def _targets(
     packages: Sequence[inputs.Inputs], options: GenOptions, report: Report
 ) -> tuple[Target, ...]:
     """Return the folder that each package is written to."""
+    scope = options.scope
+    distros = tuple(distro.name for distro in scope.distros)
+    output = Output(scope.root, report, options.force, options.runtime, distros)
     if not options.ament:
-        return folder_targets(
-            packages,
-            options.out,
-            options.scope.root,
-            report,
-            force=options.force,
-            runtime=options.runtime,
-        )
+        return folder_targets(packages, options.out, output)
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
     prefix = options.ament.rstrip("/") or "/"
-    homes = (
-        (each.package, next(iter(each.folders), None) if each.borrowed else each.home)
-        for each in packages
-    )
-    distros = [distro.name for distro in options.scope.distros]
-    overlays = [
-        Overlay(
-            prefix,
-            name,
-            home,
-            options.scope.root,
-            report,
-            force=options.force,
-            runtime=options.runtime,
-            distros=distros,
-        )
-        for name, home in homes
-    ]
+    overlays = []
+    for package in packages:
+        home = next(iter(package.folders), None) if package.borrowed else package.home
+        overlays.append(Overlay(prefix, package.package, home, output))
     return tuple(overlays) if overlays[0].usable() else ()
 
 

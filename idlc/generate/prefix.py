@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,12 +12,11 @@ from idlc.check.compiler import stage
 from idlc.diagnostics.report import Report
 from idlc.generate.idl import file_text, idl
 from idlc.generate.native.inspect import inspect
-from idlc.generate.target import Target
+from idlc.generate.target import Output, Target
 from idlc.project import prefixes, write
 from idlc.project.library import Library
-from idlc.project.lock import Runtime, Tree, Vendoring
+from idlc.project.lock import Tree, Vendoring
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
-from idlc.project.root import Root
 from idlc.project.write import Change, Plan
 
 if TYPE_CHECKING:
@@ -129,20 +128,9 @@ MARK = b"# Written by idlc"
 class Overlay(Target):
     """A package in a prefix. Its lock is in its share folder."""
 
-    def __init__(
-        self,
-        name: str,
-        package: str,
-        home: Path | None,
-        root: Root,
-        report: Report,
-        *,
-        force: bool = False,
-        runtime: Runtime | None = None,
-        distros: Sequence[str] = (),
-    ) -> None:
-        super().__init__(name, package, root, report, force=force, runtime=runtime)
-        self._distros = distros
+    def __init__(self, name: str, package: str, home: Path | None, output: Output) -> None:
+        super().__init__(name, package, output)
+        root, report = output.root, output.report
         declared = root.manifest(home) if home else None
         #: The content of its package.xml; `None` if there is none to be copied.
         self.manifest = (
@@ -160,9 +148,9 @@ class Overlay(Target):
     def distribution(self) -> Distribution:
         """The distribution that libraries are for: the installed one, unless others are chosen."""
         installed = distribution((self.path, *prefixes.ament_prefixes()))
-        if not self._distros or installed.name in self._distros:
+        if not self._output.distros or installed.name in self._output.distros:
             return installed
-        chosen = self._distros[0]
+        chosen = self._output.distros[0]
         self.report.notes.append(
             f"`{self.name}` gets libraries for {chosen}, not for {installed.name} ({installed.why})"
         )
@@ -170,17 +158,8 @@ class Overlay(Target):
 
     def beside(self, package: str) -> Overlay:
         """Return another package in the prefix."""
-        home = Library((), self._root, Report()).home(package)
-        return Overlay(
-            self.name,
-            package,
-            home,
-            self._root,
-            self.report,
-            force=self._force,
-            runtime=self.runtime,
-            distros=self._distros,
-        )
+        home = Library((), self._output.root, Report()).home(package)
+        return Overlay(self.name, package, home, self._output._replace(runtime=self.runtime))
 
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""

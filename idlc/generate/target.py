@@ -8,6 +8,7 @@ from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -181,35 +182,25 @@ def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
 
 
 def folder_targets(
-    packages: Sequence[inputs.Inputs],
-    out: str,
-    root: Root,
-    report: Report,
-    *,
-    force: bool,
-    runtime: Runtime | None,
+    packages: Sequence[inputs.Inputs], out: str, output: Output
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
     Reports IDL608 where a package of an earlier run is in the way, IDL612 for other files.
     """
-    top = root.absolute(out)
+    top = output.root.absolute(out)
+    names = [each.package for each in packages]
     if len(packages) == 1:
-        package = packages[0].package
-        beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
-        folder = f"{out}/{package}" if beside_others else out
-        targets = [Target(folder, package, root, report, force=force, runtime=runtime)]
+        beside_others = is_file(top / names[0] / FILE) and not is_file(top / FILE)
+        targets = [Target(f"{out}/{names[0]}" if beside_others else out, names[0], output)]
     elif is_file(top / FILE):
         message = f"`{out}` holds one package, and these are {len(packages)}"
         hint = "choose a folder for all of them with -o, each gets one of its name there"
-        report.add(codes.SEVERAL_PACKAGES.of(out, message, hint=hint))
+        output.report.add(codes.SEVERAL_PACKAGES.of(out, message, hint=hint))
         return ()
     else:
         base = out.rstrip("/") or out
-        targets = [
-            Target(f"{base}/{name}", name, root, report, force=force, runtime=runtime)
-            for name in (each.package for each in packages)
-        ]
+        targets = [Target(f"{base}/{name}", name, output) for name in names]
     return tuple(targets) if all(target.usable() for target in targets) else ()
 
 
@@ -223,9 +214,6 @@ _MAKERS = (
     _PACKAGE / "templates",
     _PACKAGE.parent / "templates",
 )
-#: The support code by digest: packages have the same, and comparing is faster than hashing.
-_support: dict[str, bytes] = {}
-_MOST = 128
 
 
 def unchanged(
@@ -271,19 +259,8 @@ def _outputs_stand(out: Path, lock: Lock) -> bool:
     tree = Tree(out)
     for path, expected in lock.outputs.items():
         content = tree.read(path)
-        if content is None or isinstance(content, Obstacle) or not _has(content, expected, path):
+        if content is None or isinstance(content, Obstacle) or digest(content) != expected:
             return False
-    return True
-
-
-def _has(content: bytes, expected: str, path: str) -> bool:
-    """Return whether a file's content has a digest."""
-    if _support.get(expected) == content:
-        return True
-    if digest(content) != expected:
-        return False
-    if _COPY in path and len(_support) < _MOST:
-        _support[expected] = content
     return True
 
 
@@ -334,6 +311,19 @@ def _newest(folder: str | Path) -> int:
     return newest
 
 
+class Output(NamedTuple):
+    """The manner in which packages are written: with `force` over files that were edited.
+
+    Without `runtime`, each package keeps its own. `distros` are those that were chosen.
+    """
+
+    root: Root
+    report: Report
+    force: bool = False
+    runtime: Runtime | None = None
+    distros: tuple[str, ...] = ()
+
+
 class Target:
     """A package folder, existing or not; `name` is its name in reports."""
 
@@ -342,35 +332,17 @@ class Target:
     #: The folder of the package's modules, in the same form.
     modules = ""
 
-    def __init__(
-        self,
-        name: str,
-        package: str,
-        root: Root,
-        report: Report,
-        *,
-        force: bool = False,
-        runtime: Runtime | None = None,
-    ) -> None:
+    def __init__(self, name: str, package: str, output: Output) -> None:
         self.name = name
         self.package = package
-        self._root = root
-        self.path = root.absolute(name)
-        self.report = report
-        self._force = force
-        self._runtime = runtime
+        self.path = output.root.absolute(name)
+        self.report = output.report
+        self._output = output
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
-        return Target(
-            name,
-            package,
-            self._root,
-            self.report,
-            force=self._force,
-            runtime=self.runtime,
-        )
+        return Target(name, package, self._output._replace(runtime=self.runtime))
 
     def locks_beside(self) -> dict[str, Lock]:
         """Return the locks of the packages in the folder that this one is in, by their folders."""
@@ -381,13 +353,13 @@ class Target:
     @cached_property
     def lock(self) -> Lock | None:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
-        report = Report() if self._force else self.report
+        report = Report() if self._output.force else self.report
         return load_lock(self.path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
 
     @property
     def runtime(self) -> Runtime:
         """How the package has its runtime: as was chosen, or as in the last run."""
-        return self._runtime or (self.lock.runtime if self.lock else "carried")
+        return self._output.runtime or (self.lock.runtime if self.lock else "carried")
 
     def usable(self) -> bool:
         """Return whether this is or can become a folder; reports IDL612."""
@@ -443,7 +415,7 @@ class Target:
         }
         outputs = self.lock.outputs if self.lock else {}
         owned = write.owned_files(self.path / self.home, outputs)
-        force, record = check or self._force, self.home + FILE
+        force, record = check or self._output.force, self.home + FILE
         return plan(self.path, self.name, content, owned, self.report, record=record, force=force)
 
     def apply(self, changes: Plan, record: Lock) -> bool:

@@ -27,8 +27,7 @@ def content(model: link.Model) -> TypesDict:
     describer = model.describer
     descriptions: dict[str, IndividualDict] = {}
     for interface in model.own:
-        structures = (*derive.messages(interface), *derive.pseudo_structures(interface))
-        for structure in structures:
+        for structure in derive.structures(interface):
             full = describer.description(str(structure.name))
             for description in (full["type_description"], *full["referenced_type_descriptions"]):
                 descriptions[description["type_name"]] = description

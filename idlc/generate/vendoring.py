@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from idlc.check.compiler import Compiler
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.generate.package import Package, as_inputs, package_of
 from idlc.generate.target import Target
-from idlc.model import derive, ir
+from idlc.model import derive
 from idlc.project import inputs
 from idlc.project.inputs import accept_name
 from idlc.project.lock import Vendoring
@@ -52,14 +52,12 @@ def _copies(model: Model, compiler: Compiler, report: Report) -> list[Model]:
     names = set(model.interfaces)
     if any(own.name.kind == "action" for own in model.own):
         names |= derive.ACTION_PROTOCOL
-    used: dict[str, list[ir.Interface]] = {}
-    for name, interface in sorted(compiler.reached(names).items()):
-        used.setdefault(name.package, []).append(interface)
-    used.pop(model.package, None)
+    reached = compiler.reached(names).items()
+    others = {name: own for name, own in reached if name.package != model.package}
     problems = Report()
-    copies = [compiler.model(package, own, problems) for package, own in used.items()]
-    report.extend(each for each in problems if each.severity is Severity.ERROR)
-    return copies
+    copies = compiler.models(others, problems)
+    report.extend(problems.errors)
+    return [*copies.values()]
 
 
 class _Beside:
@@ -90,7 +88,7 @@ class _Beside:
         names = library.interfaces(package)
         sources = [(name, source) for name in names if (source := library.source(name))]
         whole = self._compiler.model(package, self._compiler.add(sources, report), report)
-        target.report.extend(each for each in report if each.severity is Severity.ERROR)
+        target.report.extend(report.errors)
         self._needed[package] = _needed(whole)
         if not accept_name(package, "what is depended on", target.report) or report.had_errors:
             return None

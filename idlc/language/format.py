@@ -147,7 +147,7 @@ def _words(line: tree.Line) -> Iterator[_Word]:
 
 def _pieces(text: str) -> Iterator[tuple[str, tree.Piece]]:
     body = parse_definition(text)
-    if isinstance(body, tree.Broken):
+    if isinstance(body, tree.Fault):
         yield "type", tree.Piece(text, 0)
         return
     yield "type", body.type.whole

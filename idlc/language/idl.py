@@ -13,7 +13,6 @@ from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedInput
 
 from idlc.diagnostics.source import Source, Span
-from idlc.language.lalr import piece
 from idlc.language.tree import Piece
 
 
@@ -116,8 +115,14 @@ class IdlFile(msgspec.Struct, frozen=True):
 _WORD = re.compile(r"\w+|\S")
 
 
+def _piece(token: Token) -> Piece:
+    """Return a token as a piece."""
+    position: Any = token.start_pos  # Optional in lark 1.x, an int in the stubs of 0.12
+    return Piece(str(token), int(position))
+
+
 def _optional(token: Token | None) -> Piece | None:
-    return None if token is None else piece(token)
+    return None if token is None else _piece(token)
 
 
 @v_args(inline=True)
@@ -126,28 +131,28 @@ class _IdlBuilder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x
 
     def file(self, *parts: Any) -> tuple[Any, ...]:
         package, kind, *rest = (part for part in parts if part is not None)
-        return piece(package), piece(kind), tuple(rest)
+        return _piece(package), _piece(kind), tuple(rest)
 
     def include(self, _: Token) -> None:
         return None
 
     def typedef(self, type_: Any, name: Token, size: Token | None = None) -> Typedef:
-        return Typedef(type_, piece(name), _optional(size))
+        return Typedef(type_, _piece(name), _optional(size))
 
     def constants(self, name: Token, *constants: IdlConstant) -> Constants:
-        return Constants(piece(name), constants)
+        return Constants(_piece(name), constants)
 
     def constant(self, *parts: Any) -> IdlConstant:
         *annotations, type_, name, value = parts
-        return IdlConstant(tuple(annotations), type_, piece(name), value)
+        return IdlConstant(tuple(annotations), type_, _piece(name), value)
 
     def struct(self, *parts: Any) -> Structure:
         at = next(i for i, part in enumerate(parts) if isinstance(part, Token))
-        return Structure(parts[:at], piece(parts[at]), parts[at + 1 :])
+        return Structure(parts[:at], _piece(parts[at]), parts[at + 1 :])
 
     def member(self, *parts: Any) -> Member:
         *annotations, type_, name = parts
-        return Member(tuple(annotations), type_, piece(name))
+        return Member(tuple(annotations), type_, _piece(name))
 
     def type(self, type_: Any) -> Any:
         return type_
@@ -156,19 +161,19 @@ class _IdlBuilder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x
         return Sequence(element, _optional(bound))
 
     def element(self, *tokens: Token) -> Element:
-        bound = piece(tokens[-1]) if tokens[-1].type == "SIZE" else None
-        names = [piece(token) for token in tokens if token.type == "NAME"]
+        bound = _piece(tokens[-1]) if tokens[-1].type == "SIZE" else None
+        names = [_piece(token) for token in tokens if token.type == "NAME"]
         parts = tuple(name.text for name in names)
         return Element(Piece("::".join(parts), names[0].start), parts, bound)
 
     def annotation(self, name: Token, *parameters: tuple[str, Any]) -> Annotation:
-        return Annotation(piece(name), dict(parameters))
+        return Annotation(_piece(name), dict(parameters))
 
     def parameter(self, name: Token, value: Value) -> tuple[str, Value]:
         return str(name), value
 
     def value(self, *tokens: Token) -> Value:
-        return Value(tuple(map(piece, tokens)))
+        return Value(tuple(map(_piece, tokens)))
 
 
 @lru_cache(maxsize=1)

@@ -1,103 +1,66 @@
-"""Source → syntax tree. Never raises on a user's text: a line without meaning becomes `Broken`."""
+"""Source → syntax tree. Never raises on a user's text: a line without meaning becomes a `Fault`.
+
+`grammar.lark` is the reference, and no construct of it is hard to find in a text. So this reads
+files without lark, which takes longer to load than all other work on a file; lark says where a
+type goes wrong. `tests/language/test_parse.py::test_any_text_is_read_as_lark_reads_it`
+"""
 
 from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, cast
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source
 from idlc.language import tree
-from idlc.language.grammar import LINE_ENDS, terminals
 
 if TYPE_CHECKING:
+    from lark import Lark
+
     from idlc.language import idl
 
-_UNUSUAL_ENDS = frozenset(LINE_ENDS[1:])
-_SEPARATOR = "---"
+#: The characters that end a line, as `str.splitlines` has it (language 1.1).
+LINE_ENDS = "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
+#: Longer lines are parsed again rather than remembered.
+REMEMBERED_LENGTH = 1000
 
 
 @lru_cache(maxsize=1)
-def _definition() -> re.Pattern[str]:
-    patterns = terminals()
-    size = patterns["SIZE"]
-    return re.compile(
-        rf"(?P<type>(?P<base>{patterns['TYPE_NAME']})(?:<=(?P<bound>{size}))?"
-        rf"(?P<array>\[(?:(?P<most><=)?(?P<size>{size}))?\])?) \s*"
-        rf"(?:(?P<field>{patterns['NAME']})(?: \s*(?P<default>{patterns['DEFAULT']}))?"
-        rf"|(?P<constant>{patterns['CONSTANT_NAME']})?(?P<sign>=)(?P<value>{patterns['VALUE']})?)"
-    )
+def grammar() -> str:
+    """Return the content of grammar.lark."""
+    return Path(__file__).with_name("grammar.lark").read_text(encoding="utf-8")
 
 
-def quick_lines(text: str) -> tuple[object, ...] | None:
-    """Return the same as `lalr.lines`, or `None` for a text with unusual line ends."""
-    if not _UNUSUAL_ENDS.isdisjoint(text):
-        return None
-    parts: list[object] = []
-    section: list[tree.Line] = []
-    start = 0
-    for line in text[:-1].split("\n"):
-        if line == _SEPARATOR:
-            parts += [tuple(section), start]
-            section = []
-        else:
-            code, sign, comment = line.partition("#")
-            section.append(tree.Line(start, code, sign + comment, "\n"))
-        start += len(line) + 1
-    return (*parts, tuple(section))
-
-
-def quick_definition(text: str) -> tree.Body | None:
-    """Return the same as `lalr.definition`, or `None` for code that is not an ordinary line."""
-    match = _definition().fullmatch(text) if text.isprintable() else None
-    if match is None:
-        return None
-    type_ = tree.Type(
-        _piece(match, "type"),
-        _piece(match, "base"),
-        _optional(match, "bound"),
-        _optional(match, "array"),
-        bool(match["most"]),
-        _optional(match, "size"),
-    )
-    if match["field"] is not None:
-        return tree.Field(type_, _piece(match, "field"), _optional(match, "default"))
-    name, value = _optional(match, "constant"), _optional(match, "value")
-    return tree.constant(type_, name, match.start("sign"), value, len(text))
-
-
-def _piece(match: re.Match[str], group: str) -> tree.Piece:
-    return tree.Piece(match[group], match.start(group))
-
-
-def _optional(match: re.Match[str], group: str) -> tree.Piece | None:
-    return None if match[group] is None else _piece(match, group)
-
-
-#: Longer lines are parsed again rather than remembered.
-SHARED_LENGTH = 1000
-
-
-def _lines(text: str) -> tuple[Any, ...]:
-    from idlc.language import lalr  # lark is slow to load, and few files need it
-
-    return lalr.lines(text)
+@lru_cache(maxsize=1)
+def terminals() -> dict[str, str]:
+    """Return the regular expressions of the grammar's terminals by their names."""
+    definitions = re.findall(r"(?m)^(\w+)(?:\.\d+)?: /(.*)/([a-z]*)$", grammar())
+    return {
+        name: f"(?{flags}:{pattern})" if flags else pattern for name, pattern, flags in definitions
+    }
 
 
 def parse(source: Source) -> tree.File:
     """Return the sections and lines of a file; always succeeds."""
-    text = source.text
-    if not text or text[-1] not in LINE_ENDS:
-        text += "\n"
-    parts = cast("Any", quick_lines(text) or _lines(text))
-    sections = parts[::2]
-    separators = parts[1::2]
-    starts = (0, *(source.line_starts_after(offset) for offset in separators))
-    return tree.File(
-        source,
-        tuple(tree.Section(start, lines) for start, lines in zip(starts, sections, strict=True)),
-        separators,
-    )
+    sections: list[tree.Section] = []
+    separators: list[int] = []
+    lines: list[tree.Line] = []
+    first = start = 0
+    for line in source.text.splitlines(keepends=True) or ("",):
+        text = line.rstrip(LINE_ENDS)
+        end = start + len(line)
+        if text == "---":
+            sections.append(tree.Section(first, tuple(lines)))
+            separators.append(start)
+            lines = []
+            first = end
+        else:
+            code, sign, comment = text.partition("#")
+            lines.append(tree.Line(start, code, sign + comment, line[len(text) :] or "\n"))
+        start = end
+    return tree.File(source, (*sections, tree.Section(first, tuple(lines))), tuple(separators))
 
 
 def parse_any(source: Source) -> tree.File | idl.IdlFile:
@@ -111,16 +74,96 @@ def parse_any(source: Source) -> tree.File | idl.IdlFile:
 
 def parse_definition(text: str) -> tree.Body:
     """Return the definition on one line; `text` is a `Line.definition` and not empty."""
-    return _shared(text) if len(text) < SHARED_LENGTH else _parse_code(text)
+    return _remembered(text) if len(text) < REMEMBERED_LENGTH else _definition(text)
 
 
-def _parse_code(text: str) -> tree.Body:
-    body = quick_definition(text)
-    if body is not None:
-        return body
-    from idlc.language import lalr  # lark is slow to load, and few files need it
+def _definition(text: str) -> tree.Body:
+    type_, space, rest = text.partition(" ")
+    if text[0].isspace() or not space or not _type_pattern().fullmatch(type_):
+        return _fault(text, type_)
+    rest = rest.lstrip()
+    at = len(text) - len(rest)
+    name, equals, value = rest.partition("=")
+    if equals:
+        value = value.lstrip()
+        pieces = tree.Piece(name.rstrip(), at), tree.Piece(value, len(text) - len(value))
+        return tree.Constant(_type(type_), *pieces)
+    name, _, value = rest.partition(" ")
+    value = value.lstrip()
+    default = tree.Piece(value, len(text) - len(value)) if value else None
+    return tree.Field(_type(type_), tree.Piece(name, at), default)
 
-    return lalr.definition(text)
+
+_remembered = lru_cache(maxsize=4096)(_definition)
 
 
-_shared = lru_cache(maxsize=4096)(_parse_code)
+@lru_cache(maxsize=1)
+def _type_pattern() -> re.Pattern[str]:
+    name, size = terminals()["TYPE_NAME"], terminals()["SIZE"]
+    return re.compile(rf"{name}(?:<={size})?(?:\[(?:(?:<=)?{size})?\])?")
+
+
+def _type(text: str) -> tree.Type:
+    element, _, size = text.partition("[")
+    name, _, bound = element.partition("<=")
+    at_most = size.startswith("<=")
+    size = size.removeprefix("<=").removesuffix("]")
+    at = len(element)
+    return tree.Type(
+        tree.Piece(text, 0),
+        tree.Piece(name, 0),
+        tree.Piece(bound, at - len(bound)) if bound else None,
+        tree.Piece(text[at:], at) if at < len(text) else None,
+        at_most,
+        tree.Piece(size, len(text) - 1 - len(size)) if size else None,
+    )
+
+
+def _fault(text: str, type_: str) -> tree.Fault:
+    """Return the problem of a `text` that is no definition; `type_` is its first word."""
+    start, end = 0, len(type_)
+    if text[0].isspace():
+        code, end = codes.INDENTED_DEFINITION, len(text) - len(text.lstrip())
+        message = "a definition must begin in the first column"
+        hint = "remove the white space before it"
+    elif text == "---":
+        code, message = codes.MALFORMED_SEPARATOR, "a separator must be alone on its line"
+        hint = "remove the blanks or the comment after it"
+    elif not text.strip("-"):
+        code, message = codes.MALFORMED_SEPARATOR, f"`{text}` is not a separator"
+        hint = "a separator is a line of exactly three dashes, `---`"
+    elif text == type_:
+        code, message = codes.MISSING_NAME, f"`{type_}` has no name after it"
+        hint = "write `TYPE name`; a comment begins with `#`"
+    else:
+        code, message = codes.MALFORMED_TYPE, f"malformed type `{type_}`"
+        hint = _type_hint(type_)
+        start = _error(text, end - 1)
+    return tree.Fault(code, message, start, end, hint)
+
+
+def _error(text: str, last: int) -> int:
+    """Return the offset at which lark gives up on a definition, or `last` if that is before."""
+    from lark.exceptions import UnexpectedInput
+
+    try:
+        lark().parse(text, start="definition")
+    except UnexpectedInput as error:
+        return min(getattr(error, "pos_in_stream", None) or 0, last)
+    return 0
+
+
+@lru_cache(maxsize=1)
+def lark() -> Lark:
+    """Return the parser that lark makes of the grammar."""
+    from lark import Lark
+
+    return Lark(grammar(), parser="lalr", start=["file", "definition", "literal"])
+
+
+def _type_hint(type_: str) -> str:
+    if type_.count("[") > 1:
+        return "arrays do not nest; put the inner array into a message of its own"
+    if "<" in type_ and "<=" not in type_:
+        return "an upper bound is written `<=`, as in `string<=10` or `int32[<=10]`"
+    return "write `T`, `T[]`, `T[3]`, `T[<=3]`, `string<=10` or `package/Name`"

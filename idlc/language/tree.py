@@ -58,33 +58,21 @@ class Constant(msgspec.Struct, frozen=True):
     value: Piece
 
 
-def constant(
-    type_: Type, name: Piece | None, equals: int, value: Piece | None, end: int
-) -> Constant:
-    """Return a constant without the spaces around its parts, of which one may be missing.
-
-    `equals` is the offset of its `=`, `end` the offset of the line's end.
-    """
-    name = name or Piece("", equals)
-    value = value or Piece("", end)
-    stripped = value.text.lstrip()
-    return Constant(
-        type_,
-        Piece(name.text.rstrip(), name.start),
-        Piece(stripped, value.start + len(value.text) - len(stripped)),
-    )
-
-
-class Broken(msgspec.Struct, frozen=True):
-    """Code that is no definition: the piece at fault, and the problem to report."""
+class Fault(msgspec.Struct, frozen=True):
+    """A problem of a line or a value; `start` and `end` count from the beginning of its text."""
 
     code: Code
-    piece: Piece
     message: str
-    hint: str
+    start: int
+    end: int
+    hint: str | None = None
+
+    def moved(self, offset: int) -> Fault:
+        """Return the same fault in a longer text that has `offset` characters before."""
+        return msgspec.structs.replace(self, start=self.start + offset, end=self.end + offset)
 
 
-Body: TypeAlias = Field | Constant | Broken
+Body: TypeAlias = Field | Constant | Fault
 
 
 class Line(msgspec.Struct, frozen=True):

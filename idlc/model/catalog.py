@@ -22,19 +22,17 @@ from idlc.model.distros import DEFAULT, DISTROS, NEWEST, Distro, later
 #: The distribution of functions that get none as an argument.
 distro = DEFAULT
 
-_HERE = Path(__file__)
-
 
 @lru_cache(maxsize=1)
 def _common() -> dict[str, msgspec.Raw]:
-    data = _HERE.with_name("catalog.json").read_bytes()
+    data = Path(__file__).with_name("catalog.json").read_bytes()
     return msgspec.json.decode(data, type=dict[str, msgspec.Raw])
 
 
 @lru_cache(maxsize=1)
 def _differences() -> dict[str, dict[str, msgspec.Raw]]:
     """Return definitions by name, and by the names of the distributions that have them."""
-    data = _HERE.with_name("catalog_differences.json").read_bytes()
+    data = Path(__file__).with_name("catalog_differences.json").read_bytes()
     return msgspec.json.decode(data, type=dict[str, dict[str, msgspec.Raw]])
 
 

@@ -29,76 +29,53 @@ IMPLICIT_PACKAGES: dict[ir.Kind, tuple[str, ...]] = {
 }
 
 
-def _named(parent: ir.TypeName, suffix: str) -> ir.TypeName:
-    return parent._replace(name=parent.name + suffix)
-
-
-def _field(name: str, type_: ir.FieldType) -> ir.Field:
-    return ir.Field(name=name, type=type_)
+def _message(parent: ir.TypeName, suffix: str, **types: ir.FieldType) -> ir.Message:
+    """Return the message of a derived name with these fields."""
+    fields = tuple(ir.Field(name=name, type=type_) for name, type_ in types.items())
+    return ir.Message(name=parent._replace(name=parent.name + suffix), fields=fields)
 
 
 def event(service: ir.Service) -> ir.Message:
     """Return the X_Event message of a service, which service introspection publishes."""
-    return ir.Message(
-        name=_named(service.name, "_Event"),
-        fields=(
-            _field("info", ir.Ref(SERVICE_EVENT_INFO)),
-            _field("request", ir.Sequence(ir.Ref(service.request.name), 1)),
-            _field("response", ir.Sequence(ir.Ref(service.response.name), 1)),
-        ),
+    return _message(
+        service.name,
+        "_Event",
+        info=ir.Ref(SERVICE_EVENT_INFO),
+        request=ir.Sequence(ir.Ref(service.request.name), 1),
+        response=ir.Sequence(ir.Ref(service.response.name), 1),
     )
 
 
-def send_goal(action: ir.Action) -> ir.Service:
-    """Return the service A_SendGoal of an action."""
-    name = _named(action.name, "_SendGoal")
+def _send_goal(action: ir.Action) -> ir.Service:
+    name = action.name._replace(name=f"{action.name.name}_SendGoal")
     return ir.Service(
         name=name,
-        request=ir.Message(
-            name=_named(name, "_Request"),
-            fields=(_field("goal_id", ir.Ref(UUID)), _field("goal", ir.Ref(action.goal.name))),
-        ),
-        response=ir.Message(
-            name=_named(name, "_Response"),
-            fields=(_field("accepted", ir.Primitive("bool")), _field("stamp", ir.Ref(TIME))),
-        ),
+        request=_message(name, "_Request", goal_id=ir.Ref(UUID), goal=ir.Ref(action.goal.name)),
+        response=_message(name, "_Response", accepted=ir.Primitive("bool"), stamp=ir.Ref(TIME)),
     )
 
 
-def get_result(action: ir.Action) -> ir.Service:
-    """Return the service A_GetResult of an action."""
-    name = _named(action.name, "_GetResult")
+def _get_result(action: ir.Action) -> ir.Service:
+    name = action.name._replace(name=f"{action.name.name}_GetResult")
+    status, result = ir.Primitive("int8"), ir.Ref(action.result.name)
     return ir.Service(
         name=name,
-        request=ir.Message(
-            name=_named(name, "_Request"), fields=(_field("goal_id", ir.Ref(UUID)),)
-        ),
-        response=ir.Message(
-            name=_named(name, "_Response"),
-            fields=(
-                _field("status", ir.Primitive("int8")),
-                _field("result", ir.Ref(action.result.name)),
-            ),
-        ),
+        request=_message(name, "_Request", goal_id=ir.Ref(UUID)),
+        response=_message(name, "_Response", status=status, result=result),
     )
 
 
 def feedback_message(action: ir.Action) -> ir.Message:
     """Return the A_FeedbackMessage of an action."""
-    return ir.Message(
-        name=_named(action.name, "_FeedbackMessage"),
-        fields=(
-            _field("goal_id", ir.Ref(UUID)),
-            _field("feedback", ir.Ref(action.feedback.name)),
-        ),
-    )
+    goal_id, feedback = ir.Ref(UUID), ir.Ref(action.feedback.name)
+    return _message(action.name, "_FeedbackMessage", goal_id=goal_id, feedback=feedback)
 
 
 def composites(interface: ir.Interface) -> tuple[ir.Message, ...]:
     """Return the structures in which an action's goals, results and feedback are sent."""
     if not isinstance(interface, ir.Action):
         return ()
-    send, get = send_goal(interface), get_result(interface)
+    send, get = services(interface)
     return (send.request, get.response, feedback_message(interface))
 
 
@@ -110,7 +87,7 @@ def services(interface: ir.Interface) -> tuple[ir.Service, ...]:
         case ir.Service():
             return (interface,)
         case ir.Action():
-            return (send_goal(interface), get_result(interface))
+            return (_send_goal(interface), _get_result(interface))
 
 
 def messages(interface: ir.Interface) -> tuple[ir.Message, ...]:
@@ -156,34 +133,33 @@ def references(interface: ir.Interface) -> set[ir.TypeName]:
     return {target for section in sections(interface) for target in section.references}
 
 
-def pseudo_structures(interface: ir.Interface) -> tuple[ir.Message, ...]:
-    """Return the structures that exist only in type descriptions: services and actions as such."""
-    structures = [
-        ir.Message(
-            name=service.name,
-            fields=(
-                _field("request_message", ir.Ref(service.request.name)),
-                _field("response_message", ir.Ref(service.response.name)),
-                _field("event_message", ir.Ref(event(service).name)),
-            ),
+def structures(interface: ir.Interface) -> tuple[ir.Message, ...]:
+    """Return all structures, those included that exist only in type descriptions.
+
+    These are services and actions as such.
+    """
+    described = [
+        _message(
+            service.name,
+            "",
+            request_message=ir.Ref(service.request.name),
+            response_message=ir.Ref(service.response.name),
+            event_message=ir.Ref(event(service).name),
         )
         for service in services(interface)
     ]
     if isinstance(interface, ir.Action):
-        structures.append(_action_structure(interface))
-    return tuple(structures)
-
-
-def _action_structure(action: ir.Action) -> ir.Message:
-    send, result = services(action)
-    return ir.Message(
-        name=action.name,
-        fields=(
-            _field("goal", ir.Ref(action.goal.name)),
-            _field("result", ir.Ref(action.result.name)),
-            _field("feedback", ir.Ref(action.feedback.name)),
-            _field("send_goal_service", ir.Ref(send.name)),
-            _field("get_result_service", ir.Ref(result.name)),
-            _field("feedback_message", ir.Ref(feedback_message(action).name)),
-        ),
-    )
+        send, get = services(interface)
+        described.append(
+            _message(
+                interface.name,
+                "",
+                goal=ir.Ref(interface.goal.name),
+                result=ir.Ref(interface.result.name),
+                feedback=ir.Ref(interface.feedback.name),
+                send_goal_service=ir.Ref(send.name),
+                get_result_service=ir.Ref(get.name),
+                feedback_message=ir.Ref(feedback_message(interface).name),
+            )
+        )
+    return (*messages(interface), *described)

@@ -51,20 +51,6 @@ class DescriptionDict(TypedDict):
     referenced_type_descriptions: list[IndividualDict]
 
 
-class HashDict(TypedDict):
-    """One entry of a Name.json file's hashes."""
-
-    type_name: str
-    hash_string: str
-
-
-class InstalledDict(TypedDict):
-    """The content of the Name.json file that ROS 2 installs."""
-
-    type_description_msg: DescriptionDict
-    type_hashes: list[HashDict]
-
-
 def _element_type(element: ir.Element) -> tuple[int, int, str]:
     match element:
         case ir.Primitive():
@@ -119,8 +105,6 @@ class Describer:
     def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
         self._described: set[ir.TypeName] = set()
         self._individuals: dict[str, IndividualDict] = {}
-        self._direct: dict[str, frozenset[str]] = {}
-        self._closures: dict[str, list[str]] = {}
         self._hashes: dict[str, str] = {}
         self._texts: dict[str, str] = {}
         self.add(interfaces)
@@ -131,24 +115,16 @@ class Describer:
         self._described |= new
         for name in new:
             interface = interfaces[name]
-            for message in (*derive.messages(interface), *derive.pseudo_structures(interface)):
-                own = individual(message)
-                nested = (field["type"]["nested_type_name"] for field in own["fields"])
-                self._individuals[own["type_name"]] = own
-                self._direct[own["type_name"]] = frozenset(filter(None, nested))
+            for message in derive.structures(interface):
+                self._individuals[str(message.name)] = individual(message)
 
     def _closure(self, name: str) -> list[str]:
         """Return all names that `name` refers to, itself excluded, in code-point order."""
-        closure = self._closures.get(name)
-        if closure is None:
-            reached: set[str] = set()
-            queue = [name]
-            while queue:
-                fresh = self._direct[queue.pop()] - reached
-                reached |= fresh
-                queue.extend(fresh)
-            closure = self._closures[name] = sorted(reached)
-        return closure
+        return sorted(derive.closure(self._direct(name), self._direct))
+
+    def _direct(self, name: str) -> set[str]:
+        types = (field["type"] for field in self._individuals[name]["fields"])
+        return {type_["nested_type_name"] for type_ in types} - {""}
 
     def description(self, name: str) -> DescriptionDict:
         """Return the full description of a structure, service or action by its full name."""
@@ -182,11 +158,10 @@ class Describer:
             self._texts[name] = text
         return text
 
-    def installed(self, name: str) -> InstalledDict:
-        """Return the content of the Name.json file for a full name."""
-        description = self.description(name)
-        names = [name, *(r["type_name"] for r in description["referenced_type_descriptions"])]
-        return {
-            "type_description_msg": description,
-            "type_hashes": [{"type_name": n, "hash_string": self.hash(n)} for n in names],
-        }
+    def installed(self, name: str) -> dict[str, object]:
+        """Return the content of the Name.json file that ROS 2 installs for a full name."""
+        hashes = [
+            {"type_name": described, "hash_string": self.hash(described)}
+            for described in (name, *self._closure(name))
+        ]
+        return {"type_description_msg": self.description(name), "type_hashes": hashes}

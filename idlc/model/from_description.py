@@ -13,7 +13,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import one_line
 from idlc.language.parse import parse
-from idlc.model import ir
+from idlc.model import catalog, ir
 from idlc.model.describe import (
     ARRAY_OFFSET,
     STRING_TYPE_IDS,
@@ -24,7 +24,7 @@ from idlc.model.describe import (
 )
 from idlc.model.distros import NEWEST
 from idlc.model.ir import spell
-from idlc.model.link import Model, Pool, circles, link
+from idlc.model.link import Model, circles, link
 from idlc.model.lower import lower
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -82,38 +82,28 @@ def _messages(
 
 def _message(part: IndividualDict, program: str) -> ir.Message:
     name = _type_name(part["type_name"])
-    fields = part["fields"] if [*map(_bare, part["fields"])] != [_DUMMY] else []
-    names = [field["name"] for field in fields]
-    seen: set[str] = set()
-    for field_name in names:
-        if not _NAME.fullmatch(field_name) or field_name in seen:
-            raise DescriptionError(f"`{one_line(field_name)}` is not the name of one field")
-        seen.add(field_name)
-    types = [_type(field["type"]) for field in fields]
-    lines = [f"{spell(type_, name.package)} " for type_ in types]
-    text = "".join(f"{line}{field_name}\n" for line, field_name in zip(lines, names, strict=True))
+    written = part["fields"] if [*map(_bare, part["fields"])] != [_DUMMY] else []
+    types: dict[str, ir.FieldType] = {}
+    for field in written:
+        if not _NAME.fullmatch(field["name"]) or field["name"] in types:
+            raise DescriptionError(f"`{one_line(field['name'])}` is not the name of one field")
+        types[field["name"]] = _type(field["type"])
+    lines = {field: spell(type_, name.package) for field, type_ in types.items()}
+    text = "".join(f"{type_} {field}\n" for field, type_ in lines.items())
     source = Source(f"{name} ({program})", text)
-    return ir.Message(name=name, source=source, fields=tuple(_fields(source, names, types, lines)))
+    fields: list[ir.Field] = []
+    start = 0
+    for own, type_ in types.items():
+        middle = start + len(lines[own])
+        end = middle + 1 + len(own)
+        spans = Span(source, start, middle), Span(source, middle + 1, end)
+        fields.append(ir.Field(name=own, type=type_, type_span=spans[0], name_span=spans[1]))
+        start = end + 1
+    return ir.Message(name=name, source=source, fields=tuple(fields))
 
 
 def _bare(field: FieldDict) -> FieldDict:
     return {**field, "default_value": ""}
-
-
-def _fields(
-    source: Source, names: Iterable[str], types: Iterable[ir.FieldType], lines: Iterable[str]
-) -> Iterator[ir.Field]:
-    at = 0
-    for name, type_, line in zip(names, types, lines, strict=True):
-        middle = at + len(line)
-        end = middle + len(name)
-        yield ir.Field(
-            name=name,
-            type=type_,
-            type_span=Span(source, at, middle - 1),
-            name_span=Span(source, middle, end),
-        )
-        at = end + 1
 
 
 def _type_name(text: str) -> ir.TypeName:
@@ -176,44 +166,14 @@ def reported_model(
 
 def _compiled(sources: Mapping[str, str], name: str, program: str) -> Model | None:
     """Return the model of a message, nested messages included, if the sources have it."""
-    library = _ProgramSources(sources, program)
     report = Report()
-    try:
-        top = ir.TypeName.parse(name)
-    except ValueError:
+    texts = {_type_name(text_name): text for text_name, text in sources.items()}
+    top = _type_name(name)
+    if top.kind != "msg" or top not in texts or sum(map(len, sources.values())) > MAX_TEXT:
         return None
-    source = library.source(top)
-    if top.kind != "msg" or source is None or sum(map(len, sources.values())) > MAX_TEXT:
-        return None
-    pool = Pool(library)
-    own = lower(parse(source), top, report, library.distro)
-    pool.add(own, report)
-    model = link(top.package, [own], library, report, pool)
+    own = [
+        lower(parse(Source(f"{own} ({program})", text)), own, report, NEWEST)
+        for own, text in texts.items()
+    ]
+    model = link(top.package, own, catalog, report)
     return None if report.had_errors else model.only({top})
-
-
-class _ProgramSources:
-    """The sources of one program, as `link.Library`; ROS 2 has accepted them there."""
-
-    distro = NEWEST
-
-    def __init__(self, sources: Mapping[str, str], program: str) -> None:
-        self._sources = sources
-        self._program = program
-
-    def source(self, name: ir.TypeName) -> Source | None:
-        """Return the text of an interface, or `None` if there is none of that name."""
-        text = self._sources.get(str(name))
-        return Source(f"{name} ({self._program})", text) if text is not None else None
-
-    def names(self, _package: str) -> Iterable[str]:
-        """Return nothing: hints at other names are for people who write files."""
-        return ()
-
-    def packages(self) -> Iterable[str]:
-        """Return nothing, for the same reason."""
-        return ()
-
-    def nearby(self, _package: str) -> str | None:
-        """Return nothing, for the same reason."""
-        return None

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, Severity
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean, including, package_hint
 from idlc.language.parse import parse_any
 from idlc.model import catalog, derive, ir, lower_types, names
-from idlc.model.distros import DEFAULT, Distro, titles
+from idlc.model.distros import Distro, titles
 from idlc.model.lower import lower
 from idlc.model.lower_types import STRINGS
 
@@ -65,11 +65,26 @@ def circles(
                 entered = target
 
 
+def dependents(
+    names: Iterable[ir.TypeName],
+    references: Iterable[tuple[ir.TypeName, Iterable[ir.TypeName]]],
+) -> set[ir.TypeName]:
+    """Return interfaces with all that refer to one of them, in linear time, circles or not.
+
+    `references` has the names that each interface refers to.
+    """
+    users: dict[ir.TypeName, list[ir.TypeName]] = {}
+    for user, targets in references:
+        for target in targets:
+            users.setdefault(target, []).append(user)
+    return derive.closure(names, lambda name: users.get(name, ()))
+
+
 def check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
     """Add an error for each field that closes a circle."""
     for path, field in circles(interfaces, pool.references, pool.searched):
         if field.type_span is not None:
-            pool[path[-1]].errors.append(_circle(path, field.type_span))
+            pool.linked[path[-1]].append(_circle(path, field.type_span))
 
 
 def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
@@ -85,19 +100,7 @@ def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
     )
 
 
-class Entry(msgspec.Struct):
-    """An interface, its fields that hold messages of other files, and its errors.
-
-    `linked`: its references were looked up.
-    """
-
-    interface: ir.Interface
-    references: tuple[tuple[ir.Field, ir.TypeName], ...]
-    errors: list[Diagnostic]
-    linked: bool = False
-
-
-class LoweredInterface(msgspec.Struct, frozen=True):
+class Entry(msgspec.Struct, frozen=True):
     """The interface of a text, its problems, and its fields that hold messages of other files."""
 
     interface: ir.Interface
@@ -108,7 +111,7 @@ class LoweredInterface(msgspec.Struct, frozen=True):
 #: Interfaces with the names that they refer to; `None` for a name without an interface.
 Graph: TypeAlias = dict[ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]]
 #: Lowered interfaces by name, valid for the same `Source` and distribution.
-Memory: TypeAlias = dict[ir.TypeName, LoweredInterface]
+Memory: TypeAlias = dict[ir.TypeName, Entry]
 
 
 class Pool:
@@ -121,59 +124,33 @@ class Pool:
         self.library = library
         self._memory = {} if memory is None else memory
         self._entries: dict[ir.TypeName, Entry | None] = {}
+        #: The errors of references, of each interface whose references were looked up.
+        self.linked: dict[ir.TypeName, list[Diagnostic]] = {}
         #: The interfaces that were searched for circles.
         self.searched: set[ir.TypeName] = set()
 
-    def add(self, interface: ir.Interface, problems: Iterable[Diagnostic] = ()) -> Entry:
-        """Add an interface with the problems of its file, unless it was added before."""
+    def add(self, interface: ir.Interface) -> None:
+        """Add an interface that has no problems of its own, unless it was added before."""
         entry = self._entries.get(interface.name)
         if entry is None or entry.interface is not interface:
-            errors = [
-                diagnostic for diagnostic in problems if diagnostic.severity is Severity.ERROR
-            ]
-            entry = Entry(interface, tuple(_references(interface)), errors)
-            self._entries[interface.name] = entry
+            self._entries[interface.name] = _entry(interface, Report())
+
+    def lower(self, name: ir.TypeName, source: Source) -> Entry:
+        """Add and return the interface of a text, remembered or new."""
+        entry = self._memory.get(name)
+        if entry is None or entry.interface.source is not source:
+            problems = Report()
+            interface = lower(parse_any(source), name, problems, self.library.distro)
+            entry = self._memory[name] = _entry(interface, problems)
+        self._entries[name] = entry
         return entry
-
-    def remembered(self, name: ir.TypeName, source: Source) -> LoweredInterface | None:
-        """Add and return the remembered interface of a text; `None` if the text is new."""
-        lowered = self._memory.get(name)
-        if lowered is None or lowered.interface.source is not source:
-            return None
-        self._add(lowered)
-        return lowered
-
-    def remember(self, interface: ir.Interface, problems: Report) -> LoweredInterface:
-        """Add and remember the interface of a text."""
-        lowered = LoweredInterface(interface, problems, tuple(_references(interface)))
-        self._memory[interface.name] = lowered
-        self._add(lowered)
-        return lowered
-
-    def _add(self, lowered: LoweredInterface) -> None:
-        errors = [
-            diagnostic for diagnostic in lowered.problems if diagnostic.severity is Severity.ERROR
-        ]
-        self._entries[lowered.interface.name] = Entry(lowered.interface, lowered.references, errors)
 
     def get(self, name: ir.TypeName) -> Entry | None:
         """Return an interface by name; `None` if there is none."""
         if name not in self._entries:
             source = self.library.source(name)
-            self._entries[name] = None
-            if source is not None and not self.remembered(name, source):
-                problems = Report()
-                self.remember(
-                    lower(parse_any(source), name, problems, self.library.distro), problems
-                )
+            self._entries[name] = None if source is None else self.lower(name, source)
         return self._entries[name]
-
-    def __getitem__(self, name: ir.TypeName) -> Entry:
-        """Return an interface that `add` or `get` has seen before."""
-        entry = self._entries[name]
-        if entry is None:
-            raise KeyError(name)
-        return entry
 
     def references(self, name: ir.TypeName) -> Iterator[tuple[ir.Field, ir.TypeName]]:
         """Yield the references of an interface to others that exist."""
@@ -182,39 +159,33 @@ class Pool:
             if self._entries.get(target):
                 yield field, target
 
-    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
-        """Return an interface with all that it refers to, `None` for a missing one."""
-        return tuple(interface for interface, _ in self.graph((name,)).values())
-
     def graph(self, names: Iterable[ir.TypeName]) -> Graph:
         """Return interfaces and all that they refer to, `None` for missing ones."""
         graph: Graph = {}
         waiting = list(names)
         while waiting:
             name = waiting.pop()
-            if name in graph:
-                continue
-            entry = self._entries.get(name)
-            targets = tuple(target for _, target in entry.references) if entry else ()
-            graph[name] = (entry.interface if entry else None, targets)
-            waiting += targets
+            if name not in graph:
+                entry = self.get(name)
+                targets = tuple(target for _, target in entry.references) if entry else ()
+                graph[name] = (entry.interface if entry else None, targets)
+                waiting += targets
         return graph
 
-    def is_sound(self, name: ir.TypeName) -> bool:
-        """Return whether an interface and all that it refers to exist and have no errors."""
-        entries = [
-            self._entries.get(interface.name) if interface else None
-            for interface in self.reach(name)
-        ]
-        return all(entry is not None and not entry.errors for entry in entries)
+    def errors(self, name: ir.TypeName) -> list[Diagnostic]:
+        """Return the errors of an interface's text and of its references."""
+        entry = self._entries.get(name)
+        return [*(entry.problems.errors if entry else ()), *self.linked.get(name, ())]
 
-    def crossings(self) -> Iterator[tuple[str, str, Span]]:
-        """Yield each reference of a package to another, except those that ROS 2 adds by itself."""
+    def package_references(self) -> dict[str, dict[str, Span]]:
+        """Return where a package first names each other one; ROS 2 adds others by itself."""
+        packages: dict[str, dict[str, Span]] = {}
         for entry in filter(None, self._entries.values()):
             own = entry.interface.name.package
             for field, target in entry.references:
                 if target.package != own and field.type_span is not None:
-                    yield own, target.package, field.type_span
+                    packages.setdefault(own, {}).setdefault(target.package, field.type_span)
+        return packages
 
     @cached_property
     def describer(self) -> Describer:
@@ -224,17 +195,15 @@ class Pool:
         return Describer({})
 
 
-def _references(interface: ir.Interface) -> Iterator[tuple[ir.Field, ir.TypeName]]:
-    """Yield the fields that hold messages of other files, including derived structures'."""
-    for message in derive.messages(interface):
-        yield from (holder for holder in message.holders if holder[1].kind == "msg")
+def _entry(interface: ir.Interface, problems: Report) -> Entry:
+    holders = (holder for part in derive.messages(interface) for holder in part.holders)
+    references = tuple(holder for holder in holders if holder[1].kind == "msg")
+    return Entry(interface, problems, references)
 
 
 def check_packages(pool: Pool, report: Report) -> None:
     """Report each circle of packages, which no build tool could put into an order."""
-    edges: dict[str, dict[str, Span]] = {}
-    for package, target, span in pool.crossings():
-        edges.setdefault(package, {}).setdefault(target, span)
+    edges = pool.package_references()
     package_circles = circles(
         sorted(edges),
         lambda package: ((at, to) for to, at in edges.get(package, {}).items()),
@@ -293,7 +262,7 @@ class Model:
         self.package = package
         self.own = own
         self.interfaces = interfaces
-        self._pool = pool
+        self._pool = pool or Pool(catalog)
 
     @property
     def kinds(self) -> list[ir.Kind]:
@@ -312,16 +281,13 @@ class Model:
     @cached_property
     def describer(self) -> Describer:
         """Type descriptions and hashes of everything in the model, shared with its pool."""
-        from idlc.model.describe import Describer
-
-        describer = self._pool.describer if self._pool else Describer({})
-        describer.add(self.interfaces)
-        return describer
+        self._pool.describer.add(self.interfaces)
+        return self._pool.describer
 
     @property
     def distro(self) -> Distro:
         """The distribution of ROS 2 that the files were read for."""
-        return self._pool.library.distro if self._pool else DEFAULT
+        return self._pool.library.distro
 
     def only(self, names: Container[ir.TypeName]) -> Model:
         """Return the model with its own interfaces limited to these names."""
@@ -335,43 +301,33 @@ class Model:
 
     def graph(self) -> Graph:
         """Return the own interfaces and all that they refer to, `None` for missing ones."""
-        if self._pool is None:
-            return {interface.name: (interface, ()) for interface in self.own}
         return self._pool.graph(interface.name for interface in self.own)
 
-    def restricted_to(self, interface: ir.Interface) -> Model:
-        """Return the model of one interface and all that it refers to."""
-        needed = {reached.name: reached for reached in self.reach(interface.name) if reached}
+    def restricted_to(self, interface: ir.Interface, broken: Container[str]) -> Model | None:
+        """Return the model of one interface and all that it refers to.
+
+        `None` if one of these is missing, has errors or is in a `broken` file.
+        """
+        needed: dict[ir.TypeName, ir.Interface] = {}
+        for name, (reached, _) in self._pool.graph((interface.name,)).items():
+            if reached is None or self._pool.errors(name) or _is_in(reached, broken):
+                return None
+            needed[name] = reached
         return Model(self.package, (interface,), needed, self._pool)
-
-    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
-        """Return an interface with all that it refers to, `None` for a missing one."""
-        return self._pool.reach(name) if self._pool else (self.interfaces.get(name),)
-
-    def is_sound(self, name: ir.TypeName) -> bool:
-        """Return whether an interface and all that it refers to were linked without errors."""
-        return self._pool is None or self._pool.is_sound(name)
 
     def sound(self, broken: Container[str]) -> Model:
         """Return the model without the interfaces in `broken` files and their users."""
-        users: dict[ir.TypeName, list[ir.TypeName]] = {}
-        for name in self.interfaces:
-            for _, target in self._pool.references(name) if self._pool else ():
-                users.setdefault(target, []).append(name)
-        bad: set[ir.TypeName] = set()
-        interfaces = self.interfaces.values()
-        waiting = [
-            interface.name
-            for interface in interfaces
-            if interface.source and interface.source.path in broken
-        ]
-        while waiting:
-            name = waiting.pop()
-            if name not in bad:
-                bad.add(name)
-                waiting += users.get(name, ())
-        sound = {name: interface for name, interface in self.interfaces.items() if name not in bad}
+        wrong = [name for name, own in self.interfaces.items() if _is_in(own, broken)]
+        unsound = dependents(
+            wrong,
+            ((name, (to for _, to in self._pool.references(name))) for name in self.interfaces),
+        )
+        sound = {name: self.interfaces[name] for name in self.interfaces if name not in unsound}
         return Model(self.package, self.only(sound).own, sound, self._pool)
+
+
+def _is_in(interface: ir.Interface, paths: Container[str]) -> bool:
+    return interface.source is not None and interface.source.path in paths
 
 
 def link(
@@ -395,8 +351,7 @@ def link(
     _load_references(interfaces, pool)
     check_recursion(interfaces, pool)
     for name in interfaces:
-        if errors := pool[name].errors:
-            report.extend(errors)
+        report.extend(pool.errors(name))
     mine = sorted(name for name in interfaces if name.package == package)
     return Model(package, tuple(interfaces[name] for name in mine), interfaces, pool)
 
@@ -406,19 +361,20 @@ def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool
     unknown = _UnknownTypes(interfaces, pool.library)
     queue = list(interfaces)
     while queue:
-        entry = pool[queue.pop()]
-        for field, target in entry.references:
-            if field.type_span is not None and _is_implied_only(target, pool.library):
-                if not entry.linked:
-                    entry.errors.append(unknown.problem(target, field.type_span))
-            elif target in interfaces:
+        name = queue.pop()
+        is_new = name not in pool.linked
+        errors = pool.linked.setdefault(name, [])
+        entry = pool.get(name)
+        for field, target in entry.references if entry else ():
+            is_implied = field.type_span is not None and _is_implied_only(target, pool.library)
+            if target in interfaces and not is_implied:
                 continue
-            elif target_entry := pool.get(target):
-                interfaces[target] = target_entry.interface
+            found = None if is_implied else pool.get(target)
+            if found:
+                interfaces[target] = found.interface
                 queue.append(target)
-            elif field.type_span is not None and not entry.linked:
-                entry.errors.append(unknown.problem(target, field.type_span))
-        entry.linked = True
+            elif is_new and field.type_span is not None:
+                errors.append(unknown.problem(target, field.type_span))
 
 
 def _is_implied_only(target: ir.TypeName, library: Library) -> bool:

@@ -4,78 +4,25 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import takewhile
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Report
+from idlc.diagnostics.report import Edit, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.language import tree
 from idlc.language.escapes import EscapeError, through_idl
 from idlc.language.parse import parse_definition
+from idlc.language.tree import Fault
 from idlc.model import ir, lower_types
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.distros import DEFAULT, Distro
-from idlc.model.lower_types import STRINGS, Fault, as_parsed, lower_type
+from idlc.model.lower_types import STRINGS, as_parsed, lower_type
 from idlc.model.lower_values import Text, default, scalar
 
 if TYPE_CHECKING:
     from idlc.language import idl
-
-
-def after_optional(
-    line: tree.Line, source: Source, distro: Distro, report: Report, *, is_second: bool
-) -> tree.Line:
-    """Return the rest of a line that begins with `@optional`; report problems with it.
-
-    `is_second`: the definition has another one before. After a second one the rest is empty.
-    """
-    rest = line.after_optional or line
-    report.add(_problem(_span(line, source), distro, is_second=is_second))
-    if rest.after_optional is None:
-        return rest
-    report.add(_problem(_span(rest, source), distro, is_second=True))
-    return msgspec.structs.replace(rest, code="")
-
-
-def _span(line: tree.Line, source: Source) -> Span:
-    return Span(source, line.start, line.start + len(tree.OPTIONAL))
-
-
-def _problem(span: Span, distro: Distro, *, is_second: bool) -> Diagnostic:
-    if not distro.reads_optional:
-        diagnostic = codes.OPTIONAL_NEEDS_LYRICAL.at(
-            span,
-            f"ROS 2 {distro.title} does not know `@optional`, which came with Lyrical",
-            hint="leave it out; where it is known (`--distro lyrical`), it has no effect",
-        )
-        return msgspec.structs.replace(diagnostic, edits=(_removal(span),))
-    if is_second:
-        message = "a definition can have `@optional` only once"
-        return codes.REPEATED_OPTIONAL.at(span, message, hint="leave it out here")
-    return codes.OPTIONAL_WITHOUT_EFFECT.at(
-        span,
-        "`@optional` is accepted and has no effect",
-        hint="for a value that may be missing use `T[<=1]`, or a bool field beside it",
-    )
-
-
-def _removal(span: Span) -> Edit:
-    """Return the edit that removes it, with the whitespace after it."""
-    rest = span.source.text[span.end :]
-    blanks = len(rest) - len(rest.lstrip(" \t"))
-    return Edit(Span(span.source, span.start, span.end + blanks), "")
-
-
-Lines: TypeAlias = tuple[tree.Line, ...]
-
-
-def lower_section(
-    file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
-) -> ir.Message:
-    """Return the message that a section's lines define; reports their problems."""
-    return _Section(file, lines, name, report, distro).lower()
 
 
 class _Element(msgspec.Struct, frozen=True):
@@ -91,7 +38,12 @@ class _Section:
     """Lowers one section; holds the state that its steps share."""
 
     def __init__(
-        self, file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
+        self,
+        file: tree.File,
+        lines: tuple[tree.Line, ...],
+        name: ir.TypeName,
+        report: Report,
+        distro: Distro,
     ) -> None:
         self.file = file
         self.lines = lines
@@ -101,22 +53,21 @@ class _Section:
         self.optional = False
 
     def lower(self) -> ir.Message:
-        head = self._head()
-        comment = self._condense([_head_text(line) for line in head], head, has_unit=False)
+        # the comment lines at the very start describe the whole structure
+        head = list(takewhile(lambda line: line.comment and not line.code, self.lines))
+        texts = [line.comment.replace("\t", " ").lstrip("#") for line in head]
+        comment = self._condense(texts, head, has_unit=False)
         fields: list[ir.Field] = []
         constants: list[ir.Constant] = []
         for element in self._elements(len(head)):
-            line, body, lines = element.line, element.body, element.comments
-            texts = [_comment_text(commented) for commented in lines]
+            body, lines = element.body, element.comments
+            # only the comments at the head of a section keep their trailing whitespace
+            texts = [line.comment.replace("\t", " ").rstrip().lstrip("#") for line in lines]
+            about = self._condense(texts, lines, has_unit=isinstance(body, tree.Field))
             if isinstance(body, tree.Field):
-                about = self._condense(texts, lines, has_unit=True)
-                field = self._field(line, body, about)
-                fields.append(msgspec.structs.replace(field, optional=element.optional))
-            else:
-                about = self._condense(texts, lines, has_unit=False)
-                constant = self._constant(line, body, about)
-                if constant is not None:
-                    constants.append(constant)
+                fields.append(self._field(element.line, body, about, optional=element.optional))
+            elif constant := self._constant(element.line, body, about):
+                constants.append(constant)
         return ir.Message(
             name=self.name,
             fields=tuple(fields),
@@ -125,10 +76,6 @@ class _Section:
             unit=comment.unit,
             source=self.file.source,
         )
-
-    def _head(self) -> list[tree.Line]:
-        """Return the comment lines at the very start, which describe the whole structure."""
-        return list(takewhile(lambda line: line.comment and not line.code, self.lines))
 
     def _elements(self, first: int) -> list[_Element]:
         """Return the sound definitions with their comments; report the broken ones."""
@@ -147,11 +94,10 @@ class _Section:
             if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
             body = parse_definition(text)
-            slip = lower_types.find_slip(text, body, self.name.kind)
-            if slip is not None:
+            if slip := lower_types.find_slip(text, body, self.name.kind):
                 self._add(line, 0, slip)
-            elif isinstance(body, tree.Broken):
-                self._broken(line, body)
+            elif isinstance(body, Fault):
+                self._add(line, 0, body, self._edits(line, body))
             else:
                 self._warn_hash(line, text)
                 elements.append(_Element(line, body, pending, self.optional))
@@ -160,59 +106,83 @@ class _Section:
         return elements
 
     def _after_optional(self, line: tree.Line) -> tree.Line:
-        is_second, self.optional = self.optional, True
-        return after_optional(line, self.file.source, self.distro, self.report, is_second=is_second)
+        """Return the rest of a line that begins with `@optional`; empty after a second one."""
+        self._report_optional(line, is_second=self.optional)
+        self.optional = True
+        rest = line.after_optional or line
+        if rest.after_optional is None:
+            return rest
+        self._report_optional(rest, is_second=True)
+        return msgspec.structs.replace(rest, code="")
+
+    def _report_optional(self, line: tree.Line, *, is_second: bool) -> None:
+        end = len(tree.OPTIONAL)
+        edits: tuple[Edit, ...] = ()
+        if not self.distro.reads_optional:
+            code = codes.OPTIONAL_NEEDS_LYRICAL
+            message = (
+                f"ROS 2 {self.distro.title} does not know `@optional`, which came with Lyrical"
+            )
+            hint = "leave it out; where it is known (`--distro lyrical`), it has no effect"
+            blanks = len(line.code) - end - len(line.code[end:].lstrip(" \t"))
+            edits = (Edit(self._span(line, 0, end + blanks), ""),)
+        elif is_second:
+            code = codes.REPEATED_OPTIONAL
+            message, hint = "a definition can have `@optional` only once", "leave it out here"
+        else:
+            code = codes.OPTIONAL_WITHOUT_EFFECT
+            message = "`@optional` is accepted and has no effect"
+            hint = "for a value that may be missing use `T[<=1]`, or a bool field beside it"
+        self._add(line, 0, Fault(code, message, 0, end, hint), edits)
 
     def _condense(self, texts: list[str], lines: list[tree.Line], *, has_unit: bool) -> Comment:
         """Return an element's comment; `has_unit`: rosidl writes its unit somewhere."""
         comment = condense(texts)
         defect = problem(comment if has_unit else msgspec.structs.replace(comment, unit=None))
         if defect is not None:
-            span = self._find(defect.text, lines)
-            self.report.add(defect.code.at(span, defect.message, hint=defect.hint))
+            # the range of the text at fault in the comments, or the first comment
+            line, at = next(
+                ((line, at) for line in lines if (at := line.comment.find(defect.text)) >= 0),
+                (lines[0], 0),
+            )
+            end = at + len(defect.text) if at else len(line.comment)
+            fault = Fault(defect.code, defect.message, at, end, defect.hint)
+            self._add(line, len(line.code), fault)
         return comment
 
-    def _find(self, text: str, lines: list[tree.Line]) -> Span:
-        """Return the range of `text` in the comments of these lines, or the first comment."""
-        line, at = next(
-            ((line, at) for line in lines if (at := line.comment.find(text)) >= 0), (lines[0], 0)
-        )
-        start = line.start + len(line.code) + at
-        return Span(self.file.source, start, start + (len(text) if at else len(line.comment)))
-
-    def _broken(self, line: tree.Line, body: tree.Broken) -> None:
-        span = self.file.span(line, body.piece)
-        diagnostic = body.code.at(span, body.message, hint=body.hint)
-        self.report.add(msgspec.structs.replace(diagnostic, edits=self._edits(line, body, span)))
-
-    def _edits(self, line: tree.Line, body: tree.Broken, span: Span) -> tuple[Edit, ...]:
+    def _edits(self, line: tree.Line, fault: Fault) -> tuple[Edit, ...]:
         """Return the edit that repairs a broken line, if its intention is sure."""
-        if body.code is codes.INDENTED_DEFINITION:
-            return (Edit(span, ""),)
+        if fault.code is codes.INDENTED_DEFINITION:
+            return (Edit(self._span(line, fault.start, fault.end), ""),)
         if not _is_dashes(line) or line.comment:
             return ()
         lines = [other for section in self.file.sections for other in section.lines]
         count = len(self.file.separators) + sum(map(_is_dashes, lines))
         if count != ir.KINDS.index(self.name.kind):
             return ()
-        return (Edit(Span(span.source, line.start, line.start + len(line.code)), "---"),)
+        return (Edit(self._span(line, 0, len(line.code)), "---"),)
 
     def _warn_hash(self, line: tree.Line, text: str) -> None:
         """Warn when a comment begins between two quotes."""
-        opened = [quote for quote in "\"'" if text.count(quote) % 2 and quote in line.comment]
-        if opened:
-            at = line.start + len(line.code)
-            self.report.add(
-                codes.HASH_IN_QUOTES.at(
-                    Span(self.file.source, at, at + 1),
-                    "a comment begins here, although it is inside quotes",
-                    hint="ROS 2 has no way to write `#` in a value; leave it out",
-                )
-            )
+        if any(text.count(quote) % 2 and quote in line.comment for quote in "\"'"):
+            message = "a comment begins here, although it is inside quotes"
+            hint = "ROS 2 has no way to write `#` in a value; leave it out"
+            self._add(line, len(line.code), Fault(codes.HASH_IN_QUOTES, message, 0, 1, hint))
 
-    def _add(self, line: tree.Line, offset: int, fault: Fault) -> None:
-        piece = tree.Piece(" " * max(fault.end - fault.start, 0), offset + fault.start)
-        self.report.add(fault.code.at(self.file.span(line, piece), fault.message, hint=fault.hint))
+    def _span(self, line: tree.Line, start: int, end: int) -> Span:
+        return Span(self.file.source, line.start + start, line.start + max(start, end))
+
+    def _add(
+        self, line: tree.Line, offset: int, fault: Fault | None, edits: tuple[Edit, ...] = ()
+    ) -> None:
+        if fault is not None:
+            span = self._span(line, offset + fault.start, offset + fault.end)
+            self.report.add(fault.code.at(span, fault.message, hint=fault.hint, edits=edits))
+
+    def _refuse(
+        self, line: tree.Line, code: codes.Code, piece: tree.Piece, message: str, hint: str
+    ) -> None:
+        self.report.add(code.at(self.file.span(line, piece), message, hint=hint))
 
     def _add_value(self, line: tree.Line, piece: tree.Piece, fault: Fault) -> None:
         if lower_types.has_comment(piece.text):
@@ -226,18 +196,15 @@ class _Section:
             return ir.Unknown()
         if as_parsed(lowered) != lowered and type_.bound and type_.brackets:
             bound = type_.bound.text
-            self.report.add(
-                codes.WSTRING_SEQUENCE_BOUND.at(
-                    self.file.span(line, type_.brackets),
-                    f"ROS 2 reads this as a sequence of at most {bound} elements",
-                    hint=f"write `[<={bound}]` to say so, or remove the string's bound",
-                )
-            )
+            message = f"ROS 2 reads this as a sequence of at most {bound} elements"
+            hint = f"write `[<={bound}]` to say so, or remove the string's bound"
+            self._refuse(line, codes.WSTRING_SEQUENCE_BOUND, type_.brackets, message, hint)
         return lowered
 
-    def _field(self, line: tree.Line, body: tree.Field, about: Comment) -> ir.Field:
-        wrong = lower_types.field_name(body.name.text, self.file.span(line, body.name))
-        self.report.extend([wrong] if wrong else [])
+    def _field(
+        self, line: tree.Line, body: tree.Field, about: Comment, *, optional: bool
+    ) -> ir.Field:
+        self._add(line, body.name.start, lower_types.field_name(body.name.text))
         type_ = self._type(line, body.type)
         return ir.Field(
             name=body.name.text,
@@ -245,6 +212,7 @@ class _Section:
             default=None if body.default is None else self._default(line, type_, body.default),
             comment=about.lines,
             unit=about.unit,
+            optional=optional,
             name_span=self.file.span(line, body.name),
             type_span=self.file.span(line, body.type.name),
             default_span=None if body.default is None else self.file.span(line, body.default),
@@ -257,13 +225,9 @@ class _Section:
         if isinstance(element, ir.Unknown):
             return None
         if isinstance(element, ir.Ref):
-            self.report.add(
-                codes.DEFAULT_ON_MESSAGE.at(
-                    self.file.span(line, piece),
-                    "a field of a message type cannot have a default value",
-                    hint="give the defaults inside that message",
-                )
-            )
+            message = "a field of a message type cannot have a default value"
+            hint = "give the defaults inside that message"
+            self._refuse(line, codes.DEFAULT_ON_MESSAGE, piece, message, hint)
             return None
         lowered = default(type_, piece.text)
         if isinstance(lowered, Fault):
@@ -272,11 +236,14 @@ class _Section:
         return lowered
 
     def _constant(self, line: tree.Line, body: tree.Constant, about: Comment) -> ir.Constant | None:
-        wrong = lower_types.constant_name(body.name.text, self.file.span(line, body.name))
-        self.report.extend([wrong] if wrong else [])
-        type_ = self._constant_type(line, body.type)
-        if type_ is None:
+        self._add(line, body.name.start, lower_types.constant_name(body.name.text))
+        name = body.type.whole.text
+        if name not in ir.PRIMITIVES and name not in STRINGS:
+            message = f"a constant cannot be of type `{name}`"
+            hint = "use bool, byte, char, an integer, a float, string or wstring"
+            self._refuse(line, codes.CONSTANT_TYPE, body.type.whole, message, hint)
             return None
+        type_ = ir.String(STRINGS[name]) if name in STRINGS else ir.Primitive(name)
         value = scalar(type_, body.value.text)
         if isinstance(value, Fault):
             self._add_value(line, body.value, value)
@@ -291,33 +258,9 @@ class _Section:
             value_span=self.file.span(line, body.value),
         )
 
-    def _constant_type(self, line: tree.Line, type_: tree.Type) -> ir.Primitive | ir.String | None:
-        name = type_.whole.text
-        if name in ir.PRIMITIVES:
-            return ir.Primitive(name)
-        if name in STRINGS:
-            return ir.String(STRINGS[name])
-        self.report.add(
-            codes.CONSTANT_TYPE.at(
-                self.file.span(line, type_.whole),
-                f"a constant cannot be of type `{name}`",
-                hint="use bool, byte, char, an integer, a float, string or wstring",
-            )
-        )
-        return None
-
 
 def _is_dashes(line: tree.Line) -> bool:
     return bool(line.definition) and not line.definition.strip("-")
-
-
-def _head_text(line: tree.Line) -> str:
-    return line.comment.replace("\t", " ").lstrip("#")
-
-
-def _comment_text(line: tree.Line) -> str:
-    # only the comments at the head of a section keep their trailing whitespace
-    return line.comment.replace("\t", " ").rstrip().lstrip("#")
 
 
 SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
@@ -348,7 +291,9 @@ def lower(
     empty = tree.Section(len(file.source.text), ())
     sections = (*file.sections, *([empty] * len(suffixes)))
     parts = [
-        lower_section(file, section.lines, name._replace(name=name.name + suffix), report, distro)
+        _Section(
+            file, section.lines, name._replace(name=name.name + suffix), report, distro
+        ).lower()
         for suffix, section in zip(suffixes, sections, strict=False)
     ]
     return _assembled(name, parts, file.source, report)
@@ -370,23 +315,18 @@ def _assembled(
 def _check_reading(file: tree.File, report: Report) -> None:
     source = file.source
     if source.text.startswith(tree.BYTE_ORDER_MARK):
-        diagnostic = codes.BYTE_ORDER_MARK.at(
-            Span(source, 0, 1),
-            "the file begins with a byte order mark",
-            hint="save it as UTF-8 without a byte order mark",
-        )
-        report.add(msgspec.structs.replace(diagnostic, edits=(Edit(Span(source, 0, 1), ""),)))
+        span = Span(source, 0, 1)
+        message = "the file begins with a byte order mark"
+        hint = "save it as UTF-8 without a byte order mark"
+        report.add(codes.BYTE_ORDER_MARK.at(span, message, hint=hint, edits=(Edit(span, ""),)))
     for section in file.sections:
         for line in section.lines:
-            if line.newline and line.newline not in ("\n", "\r\n", "\r"):
+            if line.newline not in ("\n", "\r\n", "\r"):
                 end = line.start + len(line.code) + len(line.comment)
-                report.add(
-                    codes.UNUSUAL_LINE_END.at(
-                        Span(source, end, end + 1),
-                        f"U+{ord(line.newline):04X} ends a line here",
-                        hint="remove the character, or start a new line",
-                    )
-                )
+                message = f"U+{ord(line.newline):04X} ends a line here"
+                hint = "remove the character, or start a new line"
+                span = Span(source, end, end + 1)
+                report.add(codes.UNUSUAL_LINE_END.at(span, message, hint=hint))
 
 
 def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Report) -> None:
@@ -394,22 +334,17 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
     needed = expected - 1
     if count == needed or _has_near_separator(file, expected):
         return
-    rule = f"a .{kind} file has {_NUMBERS[needed]} `---` line{'s' * (needed > 1)}"
+    message = f"a .{kind} file has {_NUMBERS[needed]} `---` line{'s' * (needed > 1)}"
     if count > needed:
         at = file.separators[needed]
         span = Span(file.source, at, at + 3)
         hint = "remove it" if needed else "put services in .srv and actions in .action files"
-        message = f"{rule}; this is one more" if needed else rule
-        report.add(codes.SEPARATOR_COUNT.at(span, message, hint=hint))
+        message += "; this is one more" * (needed > 0)
     else:
-        end = len(file.source.text)
-        report.add(
-            codes.SEPARATOR_COUNT.at(
-                Span(file.source, end, end),
-                f"{rule}; this file has {_NUMBERS[count] if count else 'none'}",
-                hint="write `---` on a line of its own between the parts",
-            )
-        )
+        span = Span(file.source, len(file.source.text), len(file.source.text))
+        hint = "write `---` on a line of its own between the parts"
+        message += f"; this file has {_NUMBERS[count] if count else 'none'}"
+    report.add(codes.SEPARATOR_COUNT.at(span, message, hint=hint))
 
 
 def _has_near_separator(file: tree.File, expected: int) -> bool:
@@ -440,26 +375,22 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
             if key not in seen or names[constant.name] > 1:
                 kept.append(constant)
             elif constant.name_span is not None:
-                report.add(_moved(constant, constant.name_span))
+                message = (
+                    f"ROS 2 gives `{constant.name}` to the earlier section only, "
+                    "because it is the same there"
+                )
+                hint = "give it another name or comment"
+                code = codes.REPEATED_SECTION_CONSTANT
+                report.add(code.at(constant.name_span, message, hint=hint))
         result.append(msgspec.structs.replace(part, constants=tuple(kept)))
         seen.update(keys)
     return result
 
 
-def _moved(constant: ir.Constant, span: Span) -> Diagnostic:
-    return codes.REPEATED_SECTION_CONSTANT.at(
-        span,
-        f"ROS 2 gives `{constant.name}` to the earlier section only, because it is the same there",
-        hint="give it another name or comment",
-    )
-
-
 def _identity(constant: ir.Constant) -> tuple[object, ...]:
-    idl = "wstring" if constant.type == ir.String(wide=True) else "string"
-    if isinstance(constant.type, ir.Primitive):
-        idl = constant.type.info.idl
-    comment = tuple(_seen_by_parser(line) for line in constant.comment)
-    return idl, constant.name, str(constant.value), comment
+    type_ = constant.type.info.idl if isinstance(constant.type, ir.Primitive) else constant.type
+    comment = tuple(map(_seen_by_parser, constant.comment))
+    return type_, constant.name, str(constant.value), comment
 
 
 def _seen_by_parser(text: str) -> str:

@@ -6,8 +6,6 @@ spelling of a text.
 
 from __future__ import annotations
 
-import ast
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -17,9 +15,9 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.language import idl
 from idlc.language.escapes import inside_literal
-from idlc.language.tree import OPTIONAL, Piece
+from idlc.language.tree import OPTIONAL, Fault, Piece
 from idlc.model import ir, lower_types, lower_values, names
-from idlc.model.lower_types import STRINGS, Fault, as_parsed, positive
+from idlc.model.lower_types import STRINGS, as_parsed, positive
 from idlc.model.lower_values import MAX_ELEMENTS
 
 #: The annotations that ROS 2's adapter writes.
@@ -74,34 +72,28 @@ def scalar(type_: ir.Primitive | ir.String, value: idl.Value) -> ir.Scalar | Fau
 
 def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
     """Return the value of `@default`, or its fault."""
-    if isinstance(type_, (ir.Array, ir.Sequence)):
-        return _elements(type_, value)
-    if isinstance(type_, ir.String):
-        words = text(value)
-        if not value.is_text or not _fits(type_, words):
-            return _wrong(value, type_)
-        return ir.Default(words, words)
-    if value.is_text:
-        return _wrong(value, type_)
-    lowered = lower_values.default(type_, value.pieces[0].text)
-    return lowered.moved(value.whole.start) if isinstance(lowered, Fault) else lowered
-
-
-def _elements(type_: ir.Array | ir.Sequence, value: idl.Value) -> ir.Default | Fault:
-    """Read the text of a Python tuple, as which the defaults of arrays travel."""
     words = text(value)
-    if not value.is_text or words.count(",") > MAX_ELEMENTS:
-        return _wrong(value, type_)
+    if not value.is_text and isinstance(type_, ir.Primitive):
+        lowered = lower_values.default(type_, words)
+        return lowered.moved(value.whole.start) if isinstance(lowered, Fault) else lowered
+    if value.is_text and isinstance(type_, ir.String) and _fits(type_, words):
+        return ir.Default(words, words)
+    if value.is_text and isinstance(type_, (ir.Array, ir.Sequence)):
+        values = _elements(type_, words)
+        if values is not None:
+            wrong = lower_values.wrong_length(type_, len(values), value.whole.text)
+            return wrong.moved(value.whole.start) if wrong else ir.Default(values, words)
+    message = f"this is no value of type `{ir.spell(type_)}`"
+    return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
+
+
+def _elements(type_: ir.Array | ir.Sequence, words: str) -> tuple[ir.Scalar, ...] | None:
+    """Read the text of a Python tuple, as which the defaults of arrays travel."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # unknown escapes
-            values = ast.literal_eval(words)
-    except (ValueError, SyntaxError, MemoryError, RecursionError):
-        return _wrong(value, type_)
-    if not isinstance(values, tuple) or not all(_fits(type_.element, item) for item in values):
-        return _wrong(value, type_)
-    wrong = lower_values.wrong_length(type_, len(values), value.whole.text)
-    return wrong.moved(value.whole.start) if wrong else ir.Default(values, words)
+        values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
+    except ValueError:
+        return None
+    return values if all(_fits(type_.element, value) for value in values or ()) else None
 
 
 def _fits(type_: ir.Element, value: object) -> bool:
@@ -118,13 +110,6 @@ def _fits(type_: ir.Element, value: object) -> bool:
             is_number = isinstance(value, int) and not isinstance(value, bool)
             return is_number and low <= value <= high  # type: ignore[operator]
     return False
-
-
-def _wrong(value: idl.Value, type_: ir.FieldType) -> Fault:
-    from idlc.model.ir import spell
-
-    message = f"this is no value of type `{spell(type_)}`"
-    return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
 
 
 #: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
@@ -158,7 +143,10 @@ class _Lowering:
             word = f"`{self.file.broken.text}`" if self.file.broken.text else "this end of the text"
             self._foreign(self.file.broken, word)
             return [ir.Message(name=name, source=self.file.source) for name in names]
-        self._check_modules(names[0])
+        top, file = names[0], self.file
+        for piece, written in ((file.package, top.package), (file.kind, top.kind)):
+            if piece.text != written:
+                self._foreign(piece, f"module `{piece.text}` for `{top}`")
         constants: dict[str, list[ir.Constant]] = {}
         structures: dict[str, idl.Structure] = {}
         expected = {name.name for name in names}
@@ -178,11 +166,6 @@ class _Lowering:
                 self._foreign(self.file.kind, f"a module without `{name}`")
         return [self._structure(name, structures.get(name.name), constants) for name in names]
 
-    def _check_modules(self, name: ir.TypeName) -> None:
-        for piece, expected in ((self.file.package, name.package), (self.file.kind, name.kind)):
-            if piece.text != expected:
-                self._foreign(piece, f"module `{piece.text}` for `{name}`")
-
     def _foreign(self, piece: Piece, subject: str) -> None:
         self.strange = True
         message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
@@ -200,9 +183,8 @@ class _Lowering:
         constants: dict[str, list[ir.Constant]],
     ) -> ir.Message:
         fields = [self._field(member) for member in structure.members] if structure else []
-        if [(field.name, field.type) for field in fields] == [
-            (ir.DUMMY_FIELD, ir.Primitive("uint8"))
-        ]:
+        dummy = ir.DUMMY_FIELD, ir.Primitive("uint8")
+        if [(field.name, field.type) for field in fields] == [dummy]:
             fields = []
         return ir.Message(
             name=name,
@@ -215,16 +197,20 @@ class _Lowering:
     def _typedef(self, typedef: idl.Typedef) -> None:
         target = self._type(typedef.type)
         type_ = target.type
-        if typedef.size is not None:
-            size = positive(typedef.size, "the array's size")
-            if isinstance(size, Fault):
-                self._fault(size)
-            elif isinstance(type_, (ir.Array, ir.Sequence)):
+        if size := self._positive(typedef.size, "the array's size"):
+            if isinstance(type_, (ir.Array, ir.Sequence)):
                 self._foreign(typedef.name, "an array of arrays")
                 type_ = ir.Unknown()
             else:
                 type_ = ir.Array(type_, size)
         self.typedefs[typedef.name.text] = _Type(type_, target.piece)
+
+    def _positive(self, piece: Piece | None, subject: str) -> int | None:
+        size = None if piece is None else positive(piece, subject)
+        if not isinstance(size, Fault):
+            return size
+        self._fault(size)
+        return None
 
     def _type(self, type_: idl.Element | idl.Sequence) -> _Type:
         if isinstance(type_, idl.Element):
@@ -233,19 +219,13 @@ class _Lowering:
         if isinstance(element, (ir.Array, ir.Sequence)):
             self._foreign(piece, "a sequence of arrays")
             return _Type(ir.Unknown(), piece)
-        bound = None if type_.bound is None else positive(type_.bound, "the array's size")
-        if isinstance(bound, Fault):
-            self._fault(bound)
-            return _Type(ir.Unknown(), piece)
+        bound = self._positive(type_.bound, "the array's size")
         return _Type(as_parsed(ir.Sequence(element, bound)), piece)
 
     def _element(self, element: idl.Element) -> _Type:
         piece = element.name
         if piece.text in STRINGS:
-            bound = None if element.bound is None else positive(element.bound, "the string's bound")
-            if isinstance(bound, Fault):
-                self._fault(bound)
-                return _Type(ir.Unknown(), piece)
+            bound = self._positive(element.bound, "the string's bound")
             return _Type(ir.String(STRINGS[piece.text], bound), piece)
         if element.bound is None:
             if piece.text in _PRIMITIVES:
@@ -260,12 +240,21 @@ class _Lowering:
         self._foreign(piece, f"the type `{piece.text}`")
         return _Type(ir.Unknown(), piece)
 
+    def _check(self, element: idl.Member | idl.IdlConstant) -> None:
+        """Report unknown annotations, and a name that ROS 2 does not allow."""
+        for annotation in element.annotations:
+            if annotation.name.text not in ANNOTATIONS:
+                self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
+        is_field = isinstance(element, idl.Member)
+        fault = (lower_types.field_name if is_field else lower_types.constant_name)(
+            element.name.text
+        )
+        if fault is not None:
+            self._fault(fault.moved(element.name.start))
+
     def _field(self, member: idl.Member) -> ir.Field:
-        self._check_annotations(member.annotations)
+        self._check(member)
         type_, piece = self._type(member.type)
-        span = self.file.span(member.name)
-        wrong = lower_types.field_name(member.name.text, span)
-        self.report.extend([wrong] if wrong else [])
         return ir.Field(
             name=member.name.text,
             type=type_,
@@ -275,14 +264,9 @@ class _Lowering:
             optional=any(
                 f"@{annotation.name.text}" == OPTIONAL for annotation in member.annotations
             ),
-            name_span=span,
+            name_span=self.file.span(member.name),
             type_span=self.file.span(piece),
         )
-
-    def _check_annotations(self, annotations: Sequence[idl.Annotation]) -> None:
-        for annotation in annotations:
-            if annotation.name.text not in ANNOTATIONS:
-                self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
 
     def _default(
         self, type_: ir.FieldType, annotations: Sequence[idl.Annotation]
@@ -301,10 +285,7 @@ class _Lowering:
         return lowered
 
     def _constant(self, constant: idl.IdlConstant) -> ir.Constant | None:
-        self._check_annotations(constant.annotations)
-        span = self.file.span(constant.name)
-        wrong = lower_types.constant_name(constant.name.text, span)
-        self.report.extend([wrong] if wrong else [])
+        self._check(constant)
         type_, piece = self._type(constant.type)
         if not isinstance(type_, (ir.Primitive, ir.String)):
             self._foreign(piece, f"a constant of the type `{piece.text}`")
@@ -318,5 +299,5 @@ class _Lowering:
             type=type_,
             value=value,
             comment=comment(constant.annotations),
-            name_span=span,
+            name_span=self.file.span(constant.name),
         )

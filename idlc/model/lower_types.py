@@ -11,26 +11,10 @@ from itertools import takewhile
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic
-from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import closest
 from idlc.language import tree
+from idlc.language.tree import Fault
 from idlc.model import ir, names
-
-
-class Fault(msgspec.Struct, frozen=True):
-    """A problem of a value; `start` and `end` count from the beginning of its text."""
-
-    code: codes.Code
-    message: str
-    start: int
-    end: int
-    hint: str | None = None
-
-    def moved(self, offset: int) -> Fault:
-        """Return the same fault in a longer text that has `offset` characters before."""
-        return msgspec.structs.replace(self, start=self.start + offset, end=self.end + offset)
-
 
 #: Names of types in other languages, in lower case, and their names in interface files.
 _TYPES = {
@@ -131,19 +115,18 @@ def find_slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
     if is_comment(text):
         message = f"`{text[:2]}` does not begin a comment"
         return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
-    if isinstance(body, tree.Broken):
+    if isinstance(body, Fault):
         return _broken(text, body, kind)
     return _qualified(text, body) or _of_c(text, body) or _other_shape(body)
 
 
-def _broken(text: str, body: tree.Broken, kind: ir.Kind) -> Fault | None:
-    if body.code is codes.MALFORMED_SEPARATOR and kind == "msg":
+def _broken(text: str, fault: Fault, kind: ir.Kind) -> Fault | None:
+    if fault.code is codes.MALFORMED_SEPARATOR and kind == "msg":
         hint = f"a .msg file has no separators; for a line in a comment write `# {text.split()[0]}`"
-        return Fault(body.code, body.message, 0, len(text), hint)
+        return msgspec.structs.replace(fault, hint=hint)
     word = re.match(r"(?:std::)?(\w+)[<(]", text)
-    if body.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
-        piece = body.piece
-        return Fault(body.code, body.message, piece.start, piece.end, type_hint(word[1]))
+    if fault.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
+        return msgspec.structs.replace(fault, hint=type_hint(word[1]))
     return None
 
 
@@ -177,21 +160,17 @@ def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
         listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
         definitions = [f"`{type_} {part.strip()}`" for part in listed if part.strip()]
         hint = f"write each on a line of its own: {', '.join(definitions[:4])}"
-        return _name_fault(name, "a line defines one field", hint)
+        return _fault(codes.INVALID_FIELD_NAME, name, "a line defines one field", hint)
     plain, bracket, size = name.text.partition("[")
     if bracket and size.endswith("]"):
         hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
-        return _name_fault(name, f"`{name.text}` cannot be a field name", hint)
+        message = f"`{name.text}` cannot be a field name"
+        return _fault(codes.INVALID_FIELD_NAME, name, message, hint)
     if type_.endswith(":"):
         hint = f"the type comes first: `{name.text} {type_[:-1]}`"
-        return Fault(
-            codes.INVALID_TYPE_NAME, f"`{type_}` cannot be a type name", 0, len(type_), hint
-        )
+        message = f"`{type_}` cannot be a type name"
+        return _fault(codes.INVALID_TYPE_NAME, body.type.whole, message, hint)
     return None
-
-
-def _name_fault(name: tree.Piece, message: str, hint: str) -> Fault:
-    return Fault(codes.INVALID_FIELD_NAME, message, name.start, name.end, hint)
 
 
 def _constant(body: tree.Constant) -> Fault | None:
@@ -200,40 +179,35 @@ def _constant(body: tree.Constant) -> Fault | None:
         value = "VALUE"
     if not name.text:
         hint = f"write `{type_} NAME={value}`"
-        return Fault(
-            codes.INVALID_CONSTANT_NAME, "a constant has no name", name.start, name.end + 1, hint
-        )
+        code, end = codes.INVALID_CONSTANT_NAME, name.end + 1
+        return Fault(code, "a constant has no name", name.start, end, hint)
     if names.is_field_name(name.text):
         message = f"`{name.text}` cannot be a constant name"
         hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
         if type_ in (*ir.PRIMITIVES, "string", "wstring"):
             hint += f"; a constant is called `{name.text.upper()}`"
-        return Fault(codes.INVALID_CONSTANT_NAME, message, name.start, name.end, hint)
+        return _fault(codes.INVALID_CONSTANT_NAME, name, message, hint)
     return None
 
 
-def field_name(name: str, span: Span) -> Diagnostic | None:
-    """Return the problem with a field's name, or `None`."""
+def field_name(name: str) -> Fault | None:
+    """Return the fault of a field's name, or `None`."""
     if names.is_field_name(name):
         return None
     like = names.field_name_like(name)
-    return codes.INVALID_FIELD_NAME.at(
-        span,
-        f"`{name}` cannot be a field name",
-        hint=f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT,
-    )
+    hint = f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT
+    message = f"`{name}` cannot be a field name"
+    return Fault(codes.INVALID_FIELD_NAME, message, 0, len(name), hint)
 
 
-def constant_name(name: str, span: Span) -> Diagnostic | None:
-    """Return the problem with a constant's name, or `None`."""
+def constant_name(name: str) -> Fault | None:
+    """Return the fault of a constant's name, or `None`."""
     if names.is_constant_name(name):
         return None
     upper = names.field_name_like(name).upper()
-    return codes.INVALID_CONSTANT_NAME.at(
-        span,
-        f"`{name}` cannot be a constant name",
-        hint=f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT,
-    )
+    hint = f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT
+    message = f"`{name}` cannot be a constant name"
+    return Fault(codes.INVALID_CONSTANT_NAME, message, 0, len(name), hint)
 
 
 STRINGS = {"string": False, "wstring": True}
@@ -274,21 +248,18 @@ def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
     if name in ir.PRIMITIVES:
         return ir.Primitive(name)
     if name in ROS1_TYPES:
-        ros2_type = "builtin_interfaces/" + name.capitalize()
-        return _fault(
-            codes.ROS1_TYPE, type_.name, f"`{name}` is a ROS 1 type", f"write `{ros2_type}`"
-        )
+        message = f"`{name}` is a ROS 1 type"
+        hint = f"write `builtin_interfaces/{name.capitalize()}`"
+        return _fault(codes.ROS1_TYPE, type_.name, message, hint)
     return _reference(type_.name, package)
 
 
 def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
     parts = piece.text.split("/")
     if len(parts) > 2:
-        hint = (
-            f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
-            if len(parts) == 3
-            else "write `package/Name`"
-        )
+        hint = "write `package/Name`"
+        if len(parts) == 3:
+            hint = f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
         if len(parts) == 3 and parts[1] in _NO_FIELDS:
             hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
         return _fault(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)

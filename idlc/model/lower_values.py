@@ -14,9 +14,9 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.language.escapes import EscapeError, read_back, through_idl
-from idlc.language.grammar import terminals
+from idlc.language.parse import terminals
+from idlc.language.tree import Fault
 from idlc.model import ir
-from idlc.model.lower_types import Fault
 
 QUOTES = ('"', "'")
 #: Elements that a default may have; each takes about a kilobyte on its way.
@@ -282,23 +282,33 @@ def _element(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault
 
 def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fault:
     """Take the values through the pipeline, where they travel as the text of a Python tuple."""
-    import ast
-    import warnings
-
     literal = repr(values).replace("\\", "\\\\").replace('"', '\\"')
     try:
         annotation = read_back(literal, text)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # unknown escapes, which the text is full of
-            value = ast.literal_eval(annotation)
+        return ir.Default(python_tuple(annotation), annotation)
     except EscapeError as error:
         hint = "write the character as an escape such as `\\u20ac`"
         message = f"ROS 2's tools fail on {error}"
         return Fault(codes.BAD_ESCAPE, message, error.start, error.end, hint)
-    except (ValueError, SyntaxError):
+    except ValueError:
         hint = "only finite numbers can be defaults of an array"
         return _fault(codes.BAD_VALUE, text, "ROS 2's tools cannot read this default", hint)
-    return ir.Default(value, annotation)
+
+
+def python_tuple(text: str) -> tuple[ir.Scalar, ...]:
+    """Return the value of a Python tuple; raise ValueError for a text that is none."""
+    import ast
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # unknown escapes, which the text is full of
+        try:
+            value = ast.literal_eval(text)
+        except (SyntaxError, MemoryError, RecursionError) as error:
+            raise ValueError(text) from error
+    if not isinstance(value, tuple):
+        raise ValueError(text)
+    return value
 
 
 def _too_many(text: str) -> Fault:

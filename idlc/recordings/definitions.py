@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple, TypeAlias
 
 from idlc.diagnostics.source import Source
-from idlc.language.grammar import LINE_ENDS
+from idlc.language.parse import LINE_ENDS
 from idlc.model import ir, names
 from idlc.project.files import MAX_LINES
 from idlc.recordings.containers.container import Schema, Topic

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from idlc import runtime
 from idlc.check.compiler import Compiler, library_for, sources_of
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.generate.target import requested_packages
 from idlc.generate.types import content
 from idlc.model import ir
@@ -233,12 +233,9 @@ def _models_of(
         compiler = Compiler(library)
     if report.had_errors:
         return {}, ()
-    interfaces: dict[str, list[ir.Interface]] = {}
-    for name, interface in sorted(compiler.reached(names).items()):
-        interfaces.setdefault(name.package, []).append(interface)
     every = Report()
-    models = {package: compiler.model(package, own, every) for package, own in interfaces.items()}
-    report.extend(diagnostic for diagnostic in every if diagnostic.severity is Severity.ERROR)
+    models = compiler.models(compiler.reached(names), every)
+    report.extend(every.errors)
     return models, names
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import datetime, timedelta, timezone
 from fractions import Fraction
 from functools import cached_property
@@ -12,18 +12,10 @@ from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 from idlc.recordings.containers.compression import missing
-from idlc.recordings.containers.container import (
-    Container,
-    Db3File,
-    McapFile,
-    Topic,
-    open_pieces,
-    open_recording,
-)
-from idlc.recordings.containers.db3 import Rows
-from idlc.recordings.containers.mcap import Chunk
+from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
+from idlc.recordings.containers.file import CDR, START, unread_reason
 from idlc.recordings.containers.messages import ALWAYS, Messages, Raw, Window, join_messages
-from idlc.recordings.containers.source import CDR, START, RecordingError, unread_reason
+from idlc.recordings.containers.source import RecordingError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -353,7 +345,7 @@ class Part(Selection):
 
     def batches(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
-        with open_pieces(self.place) as file:
+        with closing(open_pieces(self.place)) as file:
             yield from file.messages(self.ids, self.pieces, self.window)
 
 
@@ -361,36 +353,9 @@ def parts_of(
     container: Container, topic: Topic, window: Window, size: int, include: tuple[str, ...] = ()
 ) -> Iterator[Part]:
     """Yield the parts of a topic, each of about `size` bytes of a file."""
-    for file, ids, _ in container.ids_of(topic):
-        if isinstance(file, McapFile):
-            divisions: Iterator[tuple[Any, ...]] = _chunks(file, ids, window, size)
-        else:
-            divisions = _rows(file, size)
-        for pieces in divisions:
+    for file, ids, _ in container.places(topic):
+        for pieces in file.parts(ids, window, size):
             yield Part(topic, file.place, tuple(ids), pieces, window, include)
-
-
-def _chunks(file: McapFile, ids: list[int], window: Window, size: int) -> Iterator[tuple[Any, ...]]:
-    """Yield neighbours of about `size` bytes."""
-    pieces: list[Chunk] = []
-    total = 0
-    for chunk in file.pieces(ids, window):
-        if pieces and total + chunk.size > size:
-            yield tuple(pieces)
-            pieces, total = [], 0
-        pieces.append(chunk)
-        total += chunk.size
-    if pieces:
-        yield tuple(pieces)
-
-
-def _rows(file: Db3File, size: int) -> Iterator[tuple[Any, ...]]:
-    """Yield rows that take about `size` bytes of the file, as if all were of the same size."""
-    for first, last in file.database.rows_of_messages():
-        count = last - first + 1
-        step = max(1, count * size // max(file.database.size, 1))
-        for start in range(first, last + 1, step):
-            yield (Rows(start, min(start + step - 1, last)),)
 
 
 #: A part reads about so many bytes of a recording.

@@ -11,7 +11,7 @@ import msgspec
 
 from idlc.check.compiler import Compiler
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
+from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import did_you_mean, including
 from idlc.language.parse import parse_any
@@ -24,7 +24,8 @@ from idlc.project import inputs
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.source import RecordingError, UnreadTopic, is_local
+from idlc.recordings.containers.file import UnreadTopic
+from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import ContentSizes, oversized
@@ -198,8 +199,7 @@ class LocalTypes:
         interfaces = self._compiler.reached(names)
         report = Report()
         model = self._compiler.model(package, list(interfaces.values()), report)
-        errors = (each for each in report if each.severity is Severity.ERROR)
-        return model.sound({error.where[0] for error in errors})
+        return model.sound({error.where[0] for error in report.errors})
 
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
         """Return the hash of a type that an interface defines; `None` if it is not known."""
@@ -328,18 +328,13 @@ class RecordedTypes:
     @cached_property
     def _compiled(self) -> tuple[dict[str, Model], Report]:
         report = Report()
-        models = {
-            package: self._compiler.model(
-                package, [self.interfaces[name] for name in sorted(names)], report
-            )
-            for package, names in sorted(self.names.items())
-        }
+        models = self._compiler.models(self.interfaces, report)
         if not report.had_errors:
             extents: ContentSizes = {}
             for model in models.values():
                 report.extend(oversized(model, extents))
         errors = Report()
-        errors.extend(diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR)
+        errors.extend(report.errors)
         broken = {diagnostic.where[0] for diagnostic in errors}
         if broken:
             models = {name: model.sound(broken) for name, model in models.items()}
@@ -475,10 +470,7 @@ def _explicit(
     names: Iterable[ir.TypeName], interfaces: Mapping[ir.TypeName, ir.Interface]
 ) -> set[ir.TypeName]:
     """Return interfaces and those they refer to in files, without those that ROS 2 adds."""
-    reached: set[ir.TypeName] = set()
-    waiting = set(names) & interfaces.keys()
-    while waiting:
-        reached |= waiting
-        named = set[ir.TypeName]().union(*(derive.references(interfaces[name]) for name in waiting))
-        waiting = (named & interfaces.keys()) - reached
-    return reached
+    known = interfaces.keys()
+    return derive.closure(
+        known & set(names), lambda name: known & derive.references(interfaces[name])
+    )

@@ -11,7 +11,7 @@ from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.parse import parse, parse_definition
-from idlc.language.tree import Broken, Constant
+from idlc.language.tree import Constant, Fault
 from idlc.model.ir import TypeName
 
 LOOSE = "float64   speed# [m/s]"
@@ -111,7 +111,7 @@ def _definitions(text):
     for section in parse(Source("A.msg", text)).sections:
         for line in section.lines:
             body = parse_definition(line.definition) if line.definition else None
-            if isinstance(body, Broken):
+            if isinstance(body, Fault):
                 found.append(line.definition)
             elif body is not None:
                 value = body.value if isinstance(body, Constant) else body.default

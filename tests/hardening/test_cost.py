@@ -18,7 +18,7 @@ import zstandard
 
 import idlc
 from idlc.cli.main import main
-from idlc.recordings.containers import mcap as mcap_records
+from idlc.recordings.containers import records as mcap_records
 from idlc.recordings.containers.compression import ANY_GROWTH
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.messages import Window

@@ -106,7 +106,7 @@ def test_what_services_and_actions_imply():
         structure.name.name: {field.name: spelled(field.type) for field in structure.fields}
         for name in ("srv/X", "action/A")
         for interface in [model.interfaces[ir.TypeName.parse(f"demo/{name}")]]
-        for structure in (*derive.messages(interface), *derive.pseudo_structures(interface))
+        for structure in derive.structures(interface)
     }
     rows = TEXT.partition("A service `X` and an action `A` imply:")[2].partition("For hashing")[0]
     rows += TEXT.partition("For hashing alone")[2].partition("Your own fields")[0]

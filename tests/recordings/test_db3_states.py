@@ -191,7 +191,7 @@ def test_a_writer_at_work(journal, tmp_path, monkeypatch):
 
 def test_reading_does_not_hold_a_writer_up(tmp_path, monkeypatch):
     """Between two groups of messages, nothing is locked."""
-    monkeypatch.setattr("idlc.recordings.containers.messages.DB3_GROUP", 2000)
+    monkeypatch.setattr("idlc.recordings.containers.db3.GROUP", 2000)
     path = tmp_path / "a.db3"
     with closing(create(path)) as database, idlc.Recording(path) as recording:
         found = []

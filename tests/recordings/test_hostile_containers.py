@@ -16,8 +16,8 @@ import zstandard
 import idlc
 from idlc.recordings.containers.compression import MOST_IN_A_CHUNK
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.mcap import CHUNK_OP, HEAD, MAGIC
 from idlc.recordings.containers.messages import ALWAYS
+from idlc.recordings.containers.records import CHUNK_OP, HEAD, MAGIC
 from idlc.recordings.containers.source import RecordingError
 from tests.support import recordings as made
 

@@ -7,7 +7,7 @@ from struct import pack, unpack_from
 
 import pytest
 
-from idlc.recordings.containers import mcap
+from idlc.recordings.containers import records as mcap
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.messages import Window, join_messages
 from idlc.recordings.containers.source import RecordingError

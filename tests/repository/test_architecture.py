@@ -44,7 +44,7 @@ OFFERED_AT_ONCE = {"runtime", "build"}
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
 #: What of the core reads files of idlc: the grammars, the catalogue.
-READS_ITS_OWN = {"idlc.language.grammar", "idlc.language.idl", "idlc.model.catalog"}
+READS_ITS_OWN = {"idlc.language.parse", "idlc.language.idl", "idlc.model.catalog"}
 #: What prints besides `cli` -> why.
 PRINTS = {
     "idlc.build": "a build that pip or colcon runs has no other way to say why it stops",

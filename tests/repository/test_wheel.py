@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import subprocess
 import sys
 import tarfile
 import zipfile
@@ -89,10 +90,13 @@ class Environment:
         out = self.folder / "out"
         run(self.bin / "idlc", "gen", interfaces, "-o", out / "my_robot_controller", cwd=interfaces)
         run(self.bin / "python", "-c", IMPORT_THE_RESULT, cwd=out)
-        odd = self.folder / "odd" / "Odd.msg"  # which only lark can read
+        odd = self.folder / "odd" / "Odd.msg"  # which lark finds fault with
         odd.parent.mkdir()
-        odd.write_text("string GREETING=gr\u00fc\u00df dich\n", encoding="utf-8")
-        run(self.bin / "idlc", "check", odd, cwd=odd.parent)
+        odd.write_text("int8[][] a\n", encoding="utf-8")
+        done = subprocess.run(
+            [self.bin / "idlc", "check", odd], cwd=odd.parent, capture_output=True, text=True
+        )
+        assert "IDL103" in done.stdout + done.stderr
 
 
 def only(folder: Path, pattern: str) -> Path:

@@ -2,258 +2,69 @@
 
 from __future__ import annotations
 
-from array import array
-from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import suppress
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-import msgspec
+from msgspec.structs import replace
 
-from idlc.recordings.containers import bag
+from idlc.recordings.containers import bag, db3, records
 from idlc.recordings.containers.compression import ZSTD_MAGIC
-from idlc.recordings.containers.db3 import MAGIC as DB3_MAGIC
-from idlc.recordings.containers.db3 import Db3, Rows
-from idlc.recordings.containers.mcap import (
-    INDEX_OFFSET,
-    Chunk,
-    McapFacts,
-    first_messages,
-    read_facts,
-)
-from idlc.recordings.containers.mcap import MAGIC as MCAP_MAGIC
-from idlc.recordings.containers.source import (
+from idlc.recordings.containers.db3 import Db3File
+from idlc.recordings.containers.file import (
     CDR,
-    RecordingError,
+    File,
+    Schema,
+    Topic,
     UnreadTopic,
-    first_bytes,
-    is_local,
-    of_file,
-    source_of,
+    check_count,
     unread_reason,
 )
+from idlc.recordings.containers.mcap import McapFile
+from idlc.recordings.containers.source import RecordingError, first_bytes, is_local, of_file
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
 
-Opened = TypeVar("Opened", bound="File")
+Opened = TypeVar("Opened", bound="File | Container")
 DB3 = ".db3"
-#: The encoding of definitions that are .msg files.
-MSG = "ros2msg"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
 
-class Schema(msgspec.Struct, frozen=True):
-    """A definition as it was recorded; `encoding` is ros2msg or ros2idl for those of ROS 2."""
+class Channel(NamedTuple):
+    """A topic of one file, which is there by its index, and its number in it."""
 
-    name: str
-    encoding: str
-    text: str
-
-    @property
-    def is_blank(self) -> bool:
-        """True if it has no text, as the definition of a message without fields."""
-        return not self.text.strip()
+    file: int
+    number: int
+    topic: Topic
 
 
-class Topic(msgspec.Struct, frozen=True):
-    """The messages recorded under one name, of one type.
-
-    `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
-    the recording has no definition.
-    """
-
-    name: str
-    type: str
-    count: int
-    hash: str | None
-    encoding: str
-    schema: Schema | None
-
-
-class File:
-    """A base of files that are closed by `close`, or by leaving a `with` statement."""
-
-    def close(self) -> None:
-        """Release the file."""
-
-    def __enter__(self) -> Any:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
-class McapFile(File):
-    """One MCAP file, and which channels mean which topic."""
-
-    def __init__(
-        self, place: Any, index: bool = True, check: bool = False, read: bool = True
-    ) -> None:
-        self.place = place
-        self.check = check
-        self.source = source_of(place)
-        self.name = self.source.name
-        with of_file(self.name):
-            self.facts = read_facts(self.source, index, check) if read else McapFacts()
-        self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
-        self.topics: list[tuple[Topic, int]] = list(map(self._topic, self.facts.channels))
-
-    def _topic(self, number: int) -> tuple[Topic, int]:
-        facts = self.facts
-        channel = facts.channels[number]
-        recorded = facts.schemas.get(channel.schema)
-        name = full_name(recorded.name) if recorded else ""
-        schema = _schema(name, recorded.encoding, recorded.text) if recorded else None
-        count = facts.counts.get(number, 0)
-        digest = channel.metadata.get("topic_type_hash") or None
-        return Topic(channel.topic, name, count, digest, channel.encoding, schema), number
-
-    @property
-    def start(self) -> int | None:
-        """The time of the first message."""
-        return self.facts.start
-
-    def first_messages(self) -> Iterator[tuple[int, bytes]]:
-        """Yield channels with how their first messages begin."""
-        return first_messages(self.source, self.facts, self.facts.channels)
-
-    def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
-        """Return the chunks that may hold messages of some channels, with the indexes of these."""
-        from idlc.recordings.containers.messages import may_have
-
-        mine: dict[int, bytes] = {}
-        for channel in channels:
-            entries = self._indexes.get(channel, ())
-            for number, at in zip(entries[::2], entries[1::2], strict=True):
-                mine[number] = mine.get(number, b"") + INDEX_OFFSET.pack(channel, at)
-        chunks = [
-            chunk._replace(indexes=mine.get(number))
-            for number, chunk in enumerate(self.facts.chunks)
-            if number in mine or chunk.indexes is None
-        ]
-        if window != (None, None):
-            chunks = self._checked(chunks, channels)
-        return [chunk for chunk in chunks if may_have(chunk, window)]
-
-    @cached_property
-    def _indexes(self) -> dict[int, array[int]]:
-        """By channel the numbers of chunks, each followed by the offset of its MessageIndex."""
-        indexes: dict[int, array[int]] = defaultdict(lambda: array("Q"))
-        for number, chunk in enumerate(self.facts.chunks):
-            for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
-                indexes[channel].extend((number, at))
-        return indexes
-
-    def _checked(self, chunks: list[Chunk], channels: Collection[int]) -> list[Chunk]:
-        """Return chunks of some channels, without their indexes if these may be incomplete.
-
-        Raises RecordingError if the indexes miss messages, which a window would miss, too. In
-        stores that is not checked, because each index is a request there.
-        """
-        from idlc.recordings.containers.messages import count
-
-        loose, counts = self.facts.loose, self.facts.counts
-        whole = [chunk for chunk in chunks if chunk.compression is not None]
-        if loose is None or not is_local(self.place):
-            return chunks
-        if any(chunk.indexes is None for chunk in whole):
-            return [chunk._replace(indexes=None) for chunk in self.facts.chunks]
-        with of_file(self.name):
-            counted = sum(counts.get(number, 0) - loose.get(number, 0) for number in channels)
-            name = self.facts.channels[next(iter(channels))].topic
-            check_count(name, counted, sum(count(self.source, chunk) for chunk in whole))
-        return chunks
-
-    def messages(
-        self, channels: Collection[int], pieces: Iterable[Chunk], window: Window
-    ) -> Iterator[Messages]:
-        """Yield the messages of some channels in some chunks."""
-        from idlc.recordings.containers.messages import mcap_messages
-
-        return mcap_messages(self.source, pieces, channels, window, self.check)
-
-    def close(self) -> None:
-        """Release the file."""
-        self.source.close()
-
-
-class Db3File(File):
-    """One .db3 file."""
-
-    def __init__(self, path: Path, read: bool = True) -> None:
-        self.place = str(path)
-        self.name = str(path)
-        self.database = Db3(path)
-        self.notes = self.database.notes
-        self.topics: list[tuple[Topic, int]] = []
-        for row in self.database.topics() if read else ():
-            name = full_name(row.type)
-            schema = _schema(name, row.schema_encoding, row.text)
-            topic = Topic(row.name, name, row.messages, row.hash or None, row.encoding, schema)
-            self.topics.append((topic, row.id))
-
-    @property
-    def start(self) -> int | None:
-        """The time of the first message."""
-        return self.database.start()
-
-    def first_messages(self) -> Iterator[tuple[int, bytes]]:
-        """Yield topics with how their first messages begin."""
-        return self.database.first_messages()
-
-    def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
-        """Return the rows that may hold messages of some topics."""
-        return self.database.rows_of_messages()
-
-    def messages(
-        self, topics: Collection[int], pieces: Iterable[Rows], window: Window
-    ) -> Iterator[Messages]:
-        """Yield the messages of some topics in some rows."""
-        from idlc.recordings.containers.messages import db3_messages
-
-        return db3_messages(self.database, pieces, topics, window)
-
-    def close(self) -> None:
-        """Close the file."""
-        self.database.close()
-
-
-class Container(File):
+class Container:
     """An open recording: its topics, and the files that they are in."""
 
-    def __init__(self, name: str, files: list[McapFile | Db3File], notes: Iterable[str]) -> None:
+    def __init__(self, name: str, files: list[File], notes: Iterable[str]) -> None:
         self.name = name
         self.files = files
         self.notes = (*notes, *(note for file in files for note in file.notes))
-        self.topics: tuple[Topic, ...] = tuple(_merged(files))
+        self._channels = dict(_merged(files))
+        self.topics: tuple[Topic, ...] = tuple(self._channels)
 
-    @cached_property
-    def _places(self) -> dict[tuple[str, str, str], list[tuple[int, Topic, int]]]:
-        """By topic, with any definition: the number of the file, its topic and the id in it."""
-        places: dict[tuple[str, str, str], list[tuple[int, Topic, int]]] = {}
-        for index, file in enumerate(self.files):
-            for topic, number in file.topics:
-                places.setdefault(_key(topic), []).append((index, topic, number))
-        return places
-
-    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int], int]]:
-        """Yield each file with messages of a topic, its ids of the topic, and their count."""
-        mine: dict[int, dict[int, int]] = {}
-        for index, in_file, number in self._places.get(_key(topic), ()):
-            if in_file.schema == topic.schema or _is_bare(in_file):
-                mine.setdefault(index, {})[number] = in_file.count
-        for index, counts in mine.items():
-            yield self.files[index], list(counts), sum(counts.values())
+    def places(self, topic: Topic) -> Iterator[tuple[File, list[int], int]]:
+        """Yield each file with messages of a topic, its numbers in the file, and their count."""
+        counts: dict[int, dict[int, int]] = {}
+        mine, bare = self._channels[topic]
+        for file, number, own in sorted([*mine, *bare], key=lambda channel: channel.file):
+            counts.setdefault(file, {})[number] = own.count
+        for file, by_number in counts.items():
+            yield self.files[file], list(by_number), sum(by_number.values())
 
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
         """Yield the messages of a topic, many at a time, in the order of the recording."""
-        for file, ids, counted in self.ids_of(topic):
+        for file, numbers, counted in self.places(topic):
             total = 0
-            for batch in file.messages(ids, file.pieces(ids, window), window):  # type: ignore[arg-type]
+            for batch in file.messages(numbers, file.pieces(numbers, window), window):
                 total += len(batch)
                 yield batch
             if window == (None, None):
@@ -282,6 +93,12 @@ class Container(File):
         for file in self.files:
             file.close()
 
+    def __enter__(self) -> Container:  # noqa: PYI034 # Self came with Python 3.11
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
 
 def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Container:
     """Open an .mcap or .db3 file, or the folder of a bag; raise RecordingError if it is none.
@@ -303,7 +120,7 @@ def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Con
     return Container(str(path), _all_or_none(paths, lambda p: _open_file(p, index, check)), notes)
 
 
-def open_pieces(place: Any) -> McapFile | Db3File:
+def open_pieces(place: Any) -> File:
     """Open a file to read pieces of it that are known: nothing else is read."""
     if is_local(place) and Path(place).suffix == DB3:
         return Db3File(Path(place), read=False)
@@ -312,27 +129,22 @@ def open_pieces(place: Any) -> McapFile | Db3File:
 
 def _all_or_none(places: Iterable[Any], opened: Callable[[Any], Opened]) -> list[Opened]:
     """Return the opened files; close all if one of them fails."""
-    files: list[Opened] = []
-    try:
-        for place in places:
-            files.append(opened(place))  # noqa: PERF401 # files opened before are closed
-    except RecordingError:
-        for file in files:
-            file.close()
-        raise
+    with ExitStack() as stack:
+        files = [stack.enter_context(closing(opened(place))) for place in places]
+        stack.pop_all()
     return files
 
 
-def _open_file(path: Path, index: bool, check: bool) -> McapFile | Db3File:
+def _open_file(path: Path, index: bool, check: bool) -> File:
     """Open one file, by its first bytes."""
     hint: str | None = None
     if path.name == bag.METADATA:
         hint = f"name the folder: `{path.parent}`"
         raise RecordingError(f"`{path}` describes a recording and is none", hint)
     start = first_bytes(path)
-    if start.startswith(DB3_MAGIC):
+    if start.startswith(db3.MAGIC):
         return Db3File(path)
-    if start.startswith(MCAP_MAGIC):
+    if start.startswith(records.MAGIC):
         return McapFile(path, index, check)
     if not start:
         raise RecordingError(f"`{path}` is empty")
@@ -343,54 +155,25 @@ def _open_file(path: Path, index: bool, check: bool) -> McapFile | Db3File:
     raise RecordingError(f"`{path}` is no recording: neither MCAP nor .db3", hint)
 
 
-def full_name(name: str) -> str:
-    """Return a type's name in three parts; pkg/Type is an older spelling of pkg/msg/Type."""
-    package, slash, rest = name.partition("/")
-    return f"{package}/msg/{rest}" if slash and "/" not in rest else name
-
-
-def _schema(name: str, encoding: str, text: str) -> Schema | None:
-    """Return a definition; where a recorder has none, it writes an empty one of no encoding."""
-    schema = Schema(name, encoding, text)
-    return None if schema.is_blank and encoding != MSG else schema
-
-
-def _is_bare(topic: Topic) -> bool:
-    """Return whether a channel has no definition, or an empty one, which others may complete."""
-    return topic.schema is None or topic.schema.is_blank
-
-
-def _key(topic: Topic) -> tuple[str, str, str]:
-    """Return the properties that all channels of a topic share."""
-    return topic.name, topic.type, topic.encoding
-
-
-def check_count(topic: str, counted: int, actual: int) -> None:
-    """Raise RecordingError if the number of messages is not the counted one."""
-    if counted != actual:
-        hint = "--no-index, or Recording(path, index=False), reads without what the file counts"
-        what = f"{counted:,} messages of `{topic}` are counted, and there are {actual:,}"
-        raise RecordingError(what, hint)
-
-
-def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
-    """Yield each topic once: several channels and files may have it."""
-    by_key: dict[tuple[str, str, str], list[Topic]] = {}
-    for file in files:
-        for topic, _ in file.topics:
-            by_key.setdefault(_key(topic), []).append(topic)
-    for same in by_key.values():
-        by_schema: dict[Schema | None, list[Topic]] = {}
-        for topic in same:
-            by_schema.setdefault(None if _is_bare(topic) else topic.schema, []).append(topic)
-        # without a definition, a channel belongs to each of the others
-        bare = _joined(sorted(by_schema.pop(None, []), key=lambda topic: topic.schema is None))
+def _merged(files: list[File]) -> Iterator[tuple[Topic, tuple[list[Channel], list[Channel]]]]:
+    """Yield each topic once, with its channels: several of these and several files may have it."""
+    by_name: dict[tuple[str, str, str], dict[Schema | None, list[Channel]]] = {}
+    for index, file in enumerate(files):
+        for topic, number in file.topics:
+            schema = None if topic.schema is None or topic.schema.is_blank else topic.schema
+            by_schema = by_name.setdefault((topic.name, topic.type, topic.encoding), {})
+            by_schema.setdefault(schema, []).append(Channel(index, number, topic))
+    for by_schema in by_name.values():
+        # without a definition, or with an empty one, a channel belongs to each of the others
+        bare = sorted(by_schema.pop(None, []), key=lambda channel: channel.topic.schema is None)
+        more, other = _counted(bare)
         for mine in by_schema.values() or [[]]:
-            yield _joined([*mine, *bare])[0]
+            count, digest = _counted(mine)
+            topic = (mine or bare)[0].topic
+            yield replace(topic, count=count + more, hash=digest or other), (mine, bare)
 
 
-def _joined(same: list[Topic]) -> list[Topic]:
-    """Return at most one topic for channels: their total, their first definition and hash."""
-    digest = next((topic.hash for topic in same if topic.hash), None)
-    total = sum(topic.count for topic in same)
-    return [msgspec.structs.replace(topic, count=total, hash=digest) for topic in same[:1]]
+def _counted(channels: list[Channel]) -> tuple[int, str | None]:
+    """Return how many messages channels have, and their first hash."""
+    count = sum(channel.topic.count for channel in channels)
+    return count, next((channel.topic.hash for channel in channels if channel.topic.hash), None)

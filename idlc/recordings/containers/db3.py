@@ -1,4 +1,4 @@
-"""The content of a .db3 file of rosbag2, which is an SQLite database.
+"""The .db3 files of rosbag2, which are SQLite databases.
 
 Such a file can come from anybody. It is opened for reading only, nothing that it defines besides
 tables is accepted, and values are taken only of the types that a recorder writes.
@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import shlex
 import sqlite3
-from collections.abc import Generator, Iterator
+from collections.abc import Collection, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
-from idlc.recordings.containers.source import START, RecordingError, first_bytes
+from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
+from idlc.recordings.containers.file import START, File, Topic, full_name, recorded_schema
+from idlc.recordings.containers.source import RecordingError, first_bytes, of_file
+
+if TYPE_CHECKING:
+    from idlc.recordings.containers.messages import Messages, Window
 
 MAGIC = b"SQLite format 3\0"
 #: Hidden columns of these kinds are computed by the file.
@@ -23,19 +28,10 @@ COMPUTED = {2, 3}
 WRITES_A_LOG = 2
 #: Seconds to wait for a writer that has locked the file.
 PATIENCE = 5.0
-
-
-class Db3Topic(NamedTuple):
-    """A row of `topics`, with the definition that goes with it."""
-
-    id: int
-    name: str
-    type: str
-    encoding: str
-    hash: str
-    schema_encoding: str
-    text: str
-    messages: int
+#: Messages are yielded together until they have so many bytes.
+GROUP = 1 << 25
+#: SQLite has no other integers.
+SMALLEST, LARGEST = -(1 << 63), (1 << 63) - 1
 
 
 class Rows(NamedTuple):
@@ -45,19 +41,23 @@ class Rows(NamedTuple):
     last: int
 
 
-class Db3:
-    """An open .db3 file."""
+class Db3File(File):
+    """An open .db3 file; without `read`, nothing is read of its topics."""
 
-    def __init__(self, path: Path) -> None:
-        self.name = str(path)
+    def __init__(self, path: Path, read: bool = True) -> None:
+        self.name = self.place = str(path)
         self._path = path.resolve()
         self._log = self._path.with_name(self._path.name + "-wal")
-        self.size = path.stat().st_size
         # SQLite makes files beside a database that has a log, even to read it
         log = first_bytes(path, 19)[18:] == bytes([WRITES_A_LOG])
         self._lone = log and not self._is_in_use()
         self._state = self._path.stat()
-        with self.errors():
+        self.notes = []
+        if self._lone:
+            why = f"it was written by way of `{self._log.name}`, which is not there"
+            missing = f"{why}: if that was left behind, the last messages are missing"
+            self.notes.append(f"{self._path.name}: {missing}")
+        with self._errors():
             location = f"file:{quote(str(self._path))}?mode=ro{'&immutable=1' * self._lone}"
             self._db = sqlite3.connect(location, PATIENCE, uri=True, check_same_thread=False)
             # truncating a mapped file would kill the process
@@ -66,20 +66,12 @@ class Db3:
             ):
                 self._db.execute(f"PRAGMA {pragma}")
         try:
-            self.columns = self._tables()
+            columns = self._tables()
             self._check_size()
+            self.topics = list(self._topics(columns)) if read else []
         except RecordingError:
             self._db.close()
             raise
-
-    @property
-    def notes(self) -> list[str]:
-        """Notes about anomalies of the file."""
-        if not self._lone:
-            return []
-        name, log = self._path.name, self._log.name
-        why = f"it was written by way of `{log}`, which is not there"
-        return [f"{name}: {why}: if that was left behind, the last messages are missing"]
 
     def close(self) -> None:
         """Close the file."""
@@ -91,7 +83,7 @@ class Db3:
         return _begins(self._log) or _begins(journal)
 
     @contextmanager
-    def errors(self) -> Iterator[None]:
+    def _errors(self) -> Iterator[None]:
         """Turn errors of SQLite into errors about the recording."""
         try:
             yield
@@ -112,11 +104,11 @@ class Db3:
             return RecordingError(f"`{self.name}` {why}", "copy both to a folder of your own")
         return RecordingError(f"`{self.name}` cannot be read: {what}")
 
-    def rows(
+    def _rows(
         self, query: str, values: tuple[Any, ...] = ()
     ) -> Generator[tuple[Any, ...], None, None]:
         """Yield the rows of a query; the file is locked until it is exhausted or closed."""
-        with self.errors(), closing(self._db.execute(query, values)) as cursor:
+        with self._errors(), closing(self._db.execute(query, values)) as cursor:
             yield from cursor
             if self._lone:
                 self._check_unchanged()
@@ -129,14 +121,14 @@ class Db3:
 
     def _check_size(self) -> None:
         """Raise RecordingError if the last page is cut off, which SQLite fills with zeros."""
-        ((page,),) = self.rows("PRAGMA page_size")
+        ((page,),) = self._rows("PRAGMA page_size")
         if rest := self._path.stat().st_size % page:
             raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
 
     def _tables(self) -> dict[str, set[str]]:
         """Return each table's columns; raise RecordingError if there are others than plain ones."""
         tables: dict[str, set[str]] = {}
-        for kind, name, text in self.rows("SELECT type, name, sql FROM sqlite_master"):
+        for kind, name, text in self._rows("SELECT type, name, sql FROM sqlite_master"):
             if kind == "index":
                 continue
             if kind != "table" or str(text).split()[1:2] != ["TABLE"]:
@@ -145,7 +137,7 @@ class Db3:
                     f"`{self.name}` holds a {kind}, `{name}`, as no recording does"
                 )
             quoted = '"' + str(name).replace('"', '""') + '"'
-            columns = list(self.rows(f"PRAGMA table_xinfo({quoted})"))
+            columns = list(self._rows(f"PRAGMA table_xinfo({quoted})"))
             if any(column[6] in COMPUTED for column in columns):
                 raise RecordingError(f"`{self.name}`: columns of `{name}` are computed")
             if "rowid" in {str(column[1]).lower() for column in columns}:
@@ -160,56 +152,36 @@ class Db3:
                 raise RecordingError(f"`{self.name}` is no recording: it has no table of {table}")
         return tables
 
-    def topics(self) -> list[Db3Topic]:
-        """Return the topics, with their definitions where the file has any."""
-        columns = self.columns["topics"]
-        encoding = "serialization_format" if "serialization_format" in columns else "'cdr'"
-        digest = "type_description_hash" if "type_description_hash" in columns else "''"
+    def _topics(self, columns: dict[str, set[str]]) -> Iterator[tuple[Topic, int]]:
+        """Yield the topics, with their definitions where the file has any."""
+        own = columns["topics"]
+        encoding = "serialization_format" if "serialization_format" in own else "'cdr'"
+        digest = "type_description_hash" if "type_description_hash" in own else "''"
         query = f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id"  # noqa: S608 # ours
-        definitions, counts = self._definitions(), self._counts()
-        topics = []
-        for number, *texts in self.rows(query):
+        definitions = self._definitions(columns.get("message_definitions", set()))
+        counts = dict(
+            self._rows("SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id")
+        )
+        for number, *texts in self._rows(query):
             if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
                 raise RecordingError(f"`{self.name}`: a topic has values of other types")
             name, kind, encoding, digest = texts
             # the definition of a service is that of its events, too
             recorded = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
             schema_encoding, text, other = recorded or ("", "", "")
-            definition = (digest or other, schema_encoding, text, counts.get(number, 0))
-            topics.append(Db3Topic(number, name, kind, encoding, *definition))
-        return topics
+            kind, count = full_name(kind), counts.get(number, 0)
+            schema = recorded_schema(kind, schema_encoding, text)
+            yield Topic(name, kind, count, digest or other or None, encoding, schema), number
 
-    def first_messages(self) -> Iterator[tuple[Any, bytes]]:
-        """Yield topics with the start of their first messages; few pages of large ones are read."""
-        query = "SELECT topic_id, MIN(rowid) FROM messages NOT INDEXED GROUP BY topic_id"
-        for topic, row in list(self.rows(query)):
-            for (data,) in self.rows("SELECT data FROM messages WHERE rowid = ?", (row,)):
-                if isinstance(data, bytes):
-                    yield topic, data[:START]
-
-    def rows_of_messages(self) -> list[Rows]:
-        """Return all rows in one piece; empty if there are no messages."""
-        # one query for both would go over all rows
-        query = "SELECT {}(rowid) FROM messages NOT INDEXED"
-        first, last = (next(self.rows(query.format(aggregate)))[0] for aggregate in ("MIN", "MAX"))
-        whole = isinstance(first, int) and isinstance(last, int)
-        return [Rows(first, last)] if whole else []
-
-    def start(self) -> int | None:
-        """Return the time of the first message."""
-        ((time,),) = self.rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
-        return time if isinstance(time, int) else None
-
-    def _definitions(self) -> dict[str, tuple[str, str, str]]:
+    def _definitions(self, columns: set[str]) -> dict[str, tuple[str, str, str]]:
         """Return encoding, text and hash of each type."""
-        columns = self.columns.get("message_definitions", set())
         if not {"topic_type", "encoding", "encoded_message_definition"} <= columns:
             return {}
         digest = "type_description_hash" if "type_description_hash" in columns else "''"
         # the text may be in any encoding, as comments are
         names = f"topic_type, encoding, CAST(encoded_message_definition AS BLOB), {digest}"
         definitions: dict[str, tuple[str, str, str]] = {}
-        for kind, *texts in self.rows(f"SELECT {names} FROM message_definitions ORDER BY rowid"):  # noqa: S608 # ours
+        for kind, *texts in self._rows(f"SELECT {names} FROM message_definitions ORDER BY rowid"):  # noqa: S608 # ours
             encoding, text, other = (
                 str(value, "utf-8", "replace") if isinstance(value, bytes) else str(value or "")
                 for value in texts
@@ -218,10 +190,80 @@ class Db3:
                 definitions[kind] = ("" if encoding == "unknown" else encoding, text, other)
         return definitions
 
-    def _counts(self) -> dict[int, int]:
-        return dict(
-            self.rows("SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id")
+    @property
+    def start(self) -> int | None:
+        """The time of the first message."""
+        ((time,),) = self._rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
+        return time if isinstance(time, int) else None
+
+    def first_messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield topics with the start of their first messages; few pages of large ones are read."""
+        query = "SELECT topic_id, MIN(rowid) FROM messages NOT INDEXED GROUP BY topic_id"
+        for topic, row in list(self._rows(query)):
+            for (data,) in self._rows("SELECT data FROM messages WHERE rowid = ?", (row,)):
+                if isinstance(data, bytes):
+                    yield topic, data[:START]
+
+    def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
+        """Return all rows in one piece; empty if there are no messages."""
+        # one query for both would go over all rows
+        query = "SELECT {}(rowid) FROM messages NOT INDEXED"
+        first, last = (next(self._rows(query.format(name)))[0] for name in ("MIN", "MAX"))
+        whole = isinstance(first, int) and isinstance(last, int)
+        return [Rows(first, last)] if whole else []
+
+    def parts(self, topics: Collection[int], window: Window, size: int) -> Iterator[tuple[Rows]]:
+        """Yield rows that take about `size` bytes, as if all were of the same size."""
+        for first, last in self.pieces(topics, window):
+            step = max(1, (last - first + 1) * size // max(self._state.st_size, 1))
+            for start in range(first, last + 1, step):
+                yield (Rows(start, min(start + step - 1, last)),)
+
+    def messages(
+        self, topics: Collection[int], pieces: Iterable[Rows], window: Window
+    ) -> Iterator[Messages]:
+        """Yield the messages of some topics in some rows."""
+        import numpy as np
+
+        from idlc.recordings.containers.messages import Separate
+
+        room = Room(self._state.st_size)
+        for row, last in pieces:
+            while row <= last:
+                with of_file(self.name):
+                    times, raws, row = self._group(Rows(row, last), topics, window, room)
+                if raws:
+                    yield Separate(np.array(times, np.int64), None, raws)
+
+    def _group(
+        self, rows: Rows, topics: Collection[int], window: Window, room: Room
+    ) -> tuple[list[int], list[Any], int]:
+        """Return times and contents of the first messages, and the row that is next.
+
+        The file is locked only meanwhile, so that a recorder can go on writing.
+        """
+        marks = ", ".join("?" * len(topics))
+        start = SMALLEST if window.start is None else max(window.start, SMALLEST)
+        end = LARGEST if window.end is None else min(window.end - 1, LARGEST)
+        query = (
+            "SELECT rowid, timestamp, data FROM messages NOT INDEXED WHERE rowid BETWEEN ? AND ? "  # noqa: S608
+            f"AND topic_id IN ({marks}) AND (timestamp BETWEEN ? AND ? "
+            "OR typeof(timestamp) <> 'integer') ORDER BY rowid"
         )
+        times: list[int] = []
+        raws: list[bytes] = []
+        size = 0
+        if start <= end:
+            with closing(self._rows(query, (*rows, *topics, start, end))) as messages:
+                for row, time, data in messages:
+                    if not isinstance(time, int) or not isinstance(data, bytes):
+                        raise RecordingError("a message has values of other types")
+                    times.append(time)
+                    raws.append(data if data[:4] != ZSTD_MAGIC else zstd_frame(data, room))
+                    size += len(raws[-1])
+                    if size >= GROUP:
+                        return times, raws, row + 1
+        return times, raws, rows.last + 1
 
 
 def _begins(path: Path) -> bool:

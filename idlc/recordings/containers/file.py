@@ -1,0 +1,142 @@
+"""The interface of a recording's files, which both formats implement, and their topics."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import msgspec
+
+from idlc.recordings.containers.source import RecordingError
+
+if TYPE_CHECKING:
+    from idlc.recordings.containers.messages import Messages, Window
+
+#: How ROS 2 writes messages.
+CDR = "cdr"
+#: The encoding of definitions that are .msg files.
+MSG = "ros2msg"
+
+
+class Schema(msgspec.Struct, frozen=True):
+    """A definition as it was recorded; `encoding` is ros2msg or ros2idl for those of ROS 2."""
+
+    name: str
+    encoding: str
+    text: str
+
+    @property
+    def is_blank(self) -> bool:
+        """True if it has no text, as the definition of a message without fields."""
+        return not self.text.strip()
+
+
+class Topic(msgspec.Struct, frozen=True):
+    """The messages recorded under one name, of one type.
+
+    `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
+    the recording has no definition.
+    """
+
+    name: str
+    type: str
+    count: int
+    hash: str | None
+    encoding: str
+    schema: Schema | None
+
+
+class File(Protocol):
+    """One file of a recording; `place` is what it was opened by.
+
+    `topics` has with each topic the number by which messages name it; of several channels, each is
+    a topic. Pieces of a file are chunks or rows.
+    """
+
+    name: str
+    place: Any
+    notes: list[str]
+    topics: list[tuple[Topic, int]]
+
+    @property
+    def start(self) -> int | None:
+        """The time of the first message."""
+
+    def first_messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield numbers of topics with how their first messages begin."""
+
+    def pieces(self, topics: Collection[int], window: Window) -> list[Any]:
+        """Return the pieces that may hold messages of some topics."""
+
+    def parts(
+        self, topics: Collection[int], window: Window, size: int
+    ) -> Iterator[tuple[Any, ...]]:
+        """Yield the same pieces, divided, together where they take about `size` bytes."""
+
+    def messages(
+        self, topics: Collection[int], pieces: Iterable[Any], window: Window
+    ) -> Iterator[Messages]:
+        """Yield the messages of some topics in some pieces, many at a time."""
+
+    def close(self) -> None:
+        """Release the file."""
+
+
+def full_name(name: str) -> str:
+    """Return a type's name in three parts; pkg/Type is an older spelling of pkg/msg/Type."""
+    package, slash, rest = name.partition("/")
+    return f"{package}/msg/{rest}" if slash and "/" not in rest else name
+
+
+def recorded_schema(name: str, encoding: str, text: str) -> Schema | None:
+    """Return a definition; where a recorder has none, it writes an empty one of no encoding."""
+    schema = Schema(name, encoding, text)
+    return None if schema.is_blank and encoding != MSG else schema
+
+
+def check_count(topic: str, counted: int, actual: int) -> None:
+    """Raise RecordingError if the number of messages is not the counted one."""
+    if counted != actual:
+        hint = "--no-index, or Recording(path, index=False), reads without what the file counts"
+        what = f"{counted:,} messages of `{topic}` are counted, and there are {actual:,}"
+        raise RecordingError(what, hint)
+
+
+#: So many bytes suffice.
+START = 6
+#: By the encapsulation header without its last bit, which is the byte order (RTPS 2.5, 10.2).
+_ENCAPSULATIONS = {
+    b"\x00\x02": "PL_CDR (XCDR1)",
+    b"\x00\x06": "PLAIN_CDR2 (XCDR2)",
+    b"\x00\x08": "DELIMITED_CDR2 (XCDR2)",
+    b"\x00\x0a": "PL_CDR2 (XCDR2)",
+}
+#: Compressions by what they begin with; CDR begins with a zero.
+_COMPRESSIONS = {
+    b"\x04\x22\x4d\x18": "lz4",
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ\x00": "xz",
+}
+
+
+class UnreadTopic(NamedTuple):
+    """Why the messages of a topic cannot be read, and what can be done about it."""
+
+    message: str
+    hint: str
+
+
+def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:
+    """Return why messages that begin so cannot be read, or None if no such reason is known."""
+    kind = _ENCAPSULATIONS.get(bytes((start[0], start[1] & ~1))) if len(start) > 1 else None
+    if kind:
+        what = f"messages of `{topic}` are written as {kind}, and idlc reads only plain CDR"
+        return UnreadTopic(what, "record them from a publisher whose data representation is XCDR1")
+    for magic, name in _COMPRESSIONS.items():
+        if start.startswith(magic):
+            what = (
+                f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
+            )
+            return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")
+    return None
