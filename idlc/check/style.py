@@ -58,6 +58,8 @@ _USUAL = _by_word(
 )
 
 
+#: Last words of names that are no quantities.
+_WITHOUT_UNIT = frozenset("covariance ratio factor scale percentage index count id gain".split())
 #: Words for positions on the earth, which are in degrees, as in sensor_msgs/NavSatFix.
 _ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
 
@@ -65,17 +67,7 @@ _ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
 def expects_unit(name: str) -> str | None:
     """Return the unit that a field of this name should have, `None` if it is no quantity."""
     words = name.split("_")
-    if words[-1] in (
-        "covariance",
-        "ratio",
-        "factor",
-        "scale",
-        "percentage",
-        "index",
-        "count",
-        "id",
-        "gain",
-    ):
+    if words[-1] in _WITHOUT_UNIT:
         return None
     unit = next((QUANTITIES[word] for word in reversed(words) if word in QUANTITIES), None)
     if unit == "m/s" and "angular" in words:

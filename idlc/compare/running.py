@@ -396,25 +396,17 @@ def _questions(
     A node knows a service by the hash of the whole, which only service introspection announces:
     the description of its events holds request and response.
     """
-    events = [
-        endpoint
-        for endpoint in endpoints
-        if endpoint.structure.endswith("_Event") and endpoint.hash
-    ]
+    events: dict[str, list[Endpoint]] = {}
+    for endpoint in endpoints:
+        if endpoint.structure.endswith("_Event") and endpoint.hash:
+            events.setdefault(endpoint.structure, []).append(endpoint)
     for version in chain.from_iterable(versions):
-        key = (version.type, version.hash)
+        key, nodes = (version.type, version.hash), version.nodes
         if key not in models:
-            questions = [Question(node, *key) for node in version.nodes[:ASKED]]
+            questions = [Question(node, *key) for node in nodes[:ASKED]]
             if event := event_of(version.type):
-                mine = (
-                    event_end
-                    for event_end in events
-                    if event_end.structure == event and event_end.node in version.nodes
-                )
-                questions = [
-                    Question(event_end.node, event_end.structure, event_end.hash)
-                    for event_end in mine
-                ]
+                ends = [end for end in events.get(event, ()) if end.node in nodes]
+                questions = [Question(end.node, event, end.hash) for end in ends]
             yield key, questions
 
 
