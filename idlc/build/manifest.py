@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from idlc.model.names import why_not_package
 from idlc.project.lock import Runtime
 from idlc.project.package_xml import Statement, declared_name, read_statements
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import SETTINGS_FILE
+from idlc.project.settings import SETTINGS_FILE, toml
 from idlc.version import RUNTIME
 
 #: The packages on PyPI that every generated package needs. The packages of ROS 2 that it imports
@@ -109,23 +108,14 @@ def _urls(statements: Iterable[Statement]) -> dict[str, str]:
     return urls
 
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-
 def complete_table(declared: dict[str, Any], report: Report) -> dict[str, Any]:
     """Return the table with what package.xml declares in place of what is absent or dynamic.
 
     Without a table all of it is taken. With one, as the standard demands, only the fields that
     `dynamic` names are taken.
     """
-    document = (
-        tomllib.loads(Path(SETTINGS_FILE).read_text(encoding="utf-8"))
-        if Path(SETTINGS_FILE).is_file()
-        else {}
-    )
+    path = Path(SETTINGS_FILE)
+    document = toml(path.read_text(encoding="utf-8")) if path.is_file() else {}
     if "project" not in document:
         return declared
     table = document["project"]

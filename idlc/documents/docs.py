@@ -218,7 +218,7 @@ def _listed(folder: Path) -> dict[str, frozenset[str]]:
         listed = json.loads(record) if isinstance(record, bytes) else {}
     except (ValueError, RecursionError):
         listed = {}
-    return owned_files(folder, listed if isinstance(listed, dict) else {})
+    return owned_files(listed if isinstance(listed, dict) else {})
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:

@@ -414,7 +414,7 @@ class Target:
             for path, text in files.items()
         }
         outputs = self.lock.outputs if self.lock else {}
-        owned = write.owned_files(self.path / self.home, outputs)
+        owned = write.owned_files(outputs)
         force, record = check or self._output.force, self.home + FILE
         return plan(self.path, self.name, content, owned, self.report, record=record, force=force)
 

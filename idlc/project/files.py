@@ -94,6 +94,14 @@ def is_folder(path: Path) -> bool:
     return os.path.isdir(path)  # noqa: PTH112 - Path.is_dir() raises
 
 
+def entries(folder: Path) -> list[Path]:
+    """Return what is in a folder, sorted; nothing if it cannot be listed."""
+    try:
+        return [folder / name for name in sorted(os.listdir(folder))]  # noqa: PTH208 - compares fast
+    except (OSError, ValueError):
+        return []
+
+
 def reason(error: OSError | ValueError) -> str:
     """Return the operating system's message, without number and path."""
     if isinstance(error, OSError) and error.strerror:

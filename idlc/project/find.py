@@ -17,7 +17,7 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import closest
-from idlc.project.files import is_file, is_folder, kind_of, unreadable
+from idlc.project.files import entries, is_file, is_folder, kind_of, unreadable
 from idlc.project.root import MANIFEST
 
 if TYPE_CHECKING:
@@ -258,11 +258,8 @@ def root_of(folder: str) -> Path:
 
 
 def _similar(path: Path, root: Root) -> str | None:
-    try:
-        names = sorted(entry.name for entry in Path(root.path(path.parent)).iterdir())
-    except (OSError, ValueError):
-        return None
-    close = closest(path.name, names)
+    names = (entry.name for entry in entries(Path(root.path(path.parent))))
+    close = closest(path.name, [*names])
     return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
 
 
@@ -285,17 +282,17 @@ def walk(
             status = os.stat(place := root.path(current))  # noqa: PTH116 - no Path is needed
             if folders is not None:
                 folders[root.absolute(current)] = status
-            entries = sorted(os.scandir(place), key=lambda entry: entry.name)
+            inside = sorted(os.scandir(place), key=lambda entry: entry.name)
         except OSError as error:
             report.add(unreadable(current.as_posix(), error))
             continue
         identity = (status.st_dev, status.st_ino)
         if (identity in visited and status.st_ino) or (
-            current != folder and any(entry.name in CLOSING for entry in entries)
+            current != folder and any(entry.name in CLOSING for entry in inside)
         ):
             continue
         visited.add(identity)
-        for entry in entries:
+        for entry in inside:
             if _is_folder(entry):
                 if not entry.name.startswith(".") and entry.name not in SKIPPED:
                     waiting.append(current / entry.name)

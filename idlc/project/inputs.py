@@ -238,14 +238,6 @@ def packages_below(root: Root) -> Mapping[str, Sequence[Path]]:
     return _packages((".",), root)
 
 
-def names(root: Root) -> list[str]:
-    """Return the names of the files and folders in the base."""
-    try:
-        return sorted(path.name for path in root.base.iterdir())
-    except OSError:
-        return []
-
-
 def _packages(paths: Sequence[str], root: Root) -> dict[str, tuple[Path, ...]]:
     """Return folders by package; problems of files are reported when they are compiled."""
     ignored = Report()

@@ -16,7 +16,7 @@ from idlc.diagnostics.text import closest, did_you_mean, including
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
 from idlc.project import inputs, prefixes
-from idlc.project.files import is_file, is_folder
+from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
 from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import installed
@@ -85,10 +85,7 @@ class Prefix:
 
     def packages(self) -> Iterable[str]:
         """Return the names of installed packages that have interfaces."""
-        try:
-            names = [path.name for path in self._share.iterdir() if _has_interfaces(path)]
-        except OSError:
-            return []
+        names = (path.name for path in entries(self._share) if _has_interfaces(path))
         return [name for name in names if any(self.roots(name))]
 
 
@@ -255,10 +252,7 @@ class Library:
 
     def _files(self, folder: Path) -> list[Path]:
         new = [path for path in self._root.unsaved_below(folder) if path.parent == folder]
-        try:
-            return new + [path for path in folder.iterdir() if is_file(path)]
-        except OSError:
-            return new
+        return new + [path for path in entries(folder) if is_file(path)]
 
 
 _DIVIDER = re.compile(r"/|\.|::")
@@ -389,7 +383,8 @@ def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
     """Return the hint with the closest name to a type's or package's."""
     if len(parts) == 1:
         named = {interface.name: str(interface) for interface in _all(library)}
-        near = closest(parts[0], [*inputs.names(root), *named, *library.packages()])
+        files = (path.name for path in entries(root.base))
+        near = closest(parts[0], [*files, *named, *library.packages()])
         return f"did you mean `{named.get(near, near)}`?" if near else None
     package = closest(parts[0], library.packages()) or ""
     named = {interface.name: str(interface) for interface in library.interfaces(package)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +13,7 @@ from xml.parsers import expat
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Edit, Report, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.project.edits import Edited, Outcome, Refused
 from idlc.project.files import read_bytes
@@ -24,11 +25,15 @@ if TYPE_CHECKING:
 
 
 class Statement(msgspec.Struct, frozen=True):
-    """An element directly below <package>, or below its <export>; `span` is its start tag."""
+    """An element directly below <package>, or below its <export>.
+
+    `span` is its start tag, `end` the offset at which the element ends.
+    """
 
     tag: str
     text: str
     span: Span
+    end: int
     attributes: Mapping[str, str] = {}
 
 
@@ -217,12 +222,15 @@ def statements(source: Source) -> tuple[Statement, ...]:
 
 
 def _placed(elements: Iterable[Element], source: Source, data: bytes) -> Iterator[Statement]:
-    at = characters = 0
+    offsets = sorted({at for element in elements for at in (element.start, element.end)})
+    characters = {0: 0}
+    for before, at in zip([0, *offsets], offsets, strict=False):
+        characters[at] = characters[before] + len(data[before:at].decode("utf-8"))
     for element in elements:
-        characters += len(data[at : element.start].decode("utf-8"))
-        at = element.start
-        span = Span(source, characters, characters + len(element.tag) + 2)
-        yield Statement(element.tag, element.text, span, element.attributes)
+        start = characters[element.start]
+        span = Span(source, start, start + len(element.tag) + 2)
+        end = characters[element.end]
+        yield Statement(element.tag, element.text, span, end, element.attributes)
 
 
 def declared_name(path: Path, root: Root, report: Report) -> str | None:
@@ -277,6 +285,7 @@ def read_statements(path: Path, name: str, root: Root, report: Report) -> tuple[
     return () if source is None else statements(source)
 
 
+_BLANK_LINE = re.compile(r"[^\S\n]*\n[^\S\n]*\n")
 #: Tags that make a package available when a node runs.
 AT_RUN_TIME = frozenset({"depend", "exec_depend", "run_depend"})
 AT_TEST_TIME = AT_RUN_TIME | {"test_depend"}
@@ -296,13 +305,17 @@ def add_dependencies(
     `depends` are needed to build and run, `executes` to run, `tests` for testing; `group` declares
     that the package has interfaces.
     """
-    data = text.encode("utf-8")
-    manifest = _manifest(data)
-    own = set(manifest.texts("name")) if manifest else set()
-    if manifest is None or not own:
-        line = " ".join(_depend(name, "depend") for name in depends)
-        why = "it has no `<name>`" if manifest else "this is not a well-formed package.xml"
-        return Refused(why, line, "within `<package>`")
+    try:
+        manifest = read(text.encode("utf-8"), "utf-8")
+    except NotXmlError:
+        manifest = Manifest("", ())
+    own = set(manifest.texts("name"))
+    if not own:
+        lines = " ".join(f"<depend>{name}</depend>" for name in depends)
+        why = "it has no `<name>`"
+        if not manifest.children:
+            why = "this is not a well-formed package.xml"
+        return Refused(why, lines, "within `<package>`")
     running = own.union(manifest.texts(*AT_RUN_TIME))
     testing = own.union(manifest.texts(*AT_TEST_TIME))
     tag = "run_depend" if manifest.format == "1" else "depend"
@@ -315,46 +328,34 @@ def add_dependencies(
         present = manifest.texts("member_of_group")
         new += [("member_of_group", GROUP)] if GROUP not in present else []
     for kind, name in new:
-        data = _with(data, kind, name)
-    return Edited(data.decode("utf-8"))
+        source = Source("package.xml", text)
+        text = apply(text, addition(source, statements(source), kind, name))[0]
+    return Edited(text)
 
 
-def _manifest(data: bytes) -> Manifest | None:
-    """Parse a package.xml; `None` if it is not well-formed or another document."""
-    try:
-        manifest = read(data, "utf-8")
-    except NotXmlError:
-        return None
-    return manifest if manifest.children else None
+def addition(
+    manifest: Source, statements: Iterable[Statement], tag: str, name: str
+) -> tuple[Edit, ...]:
+    """Return the edits that add an element, on a line of its own after its like.
 
+    An edit before it separates it from the head where blank lines separate groups of elements.
+    """
+    from html import escape  # with its thousands of names, of which few runs need three
 
-def _depend(name: str, tag: str) -> str:
-    from xml.sax.saxutils import escape
-
-    return f"<{tag}>{escape(name)}</{tag}>"
-
-
-def _with(data: bytes, tag: str, name: str) -> bytes:
-    """Return the file with an element, on a line of its own after its like."""
-    elements = read(data, "utf-8").children
-    same = [element for element in elements if element.tag == tag]
-    before = same or [e for e in elements if RANK.get(e.tag, 99) < RANK[tag]]
-    after = max(before, key=lambda element: element.end)
-    line_start = data.rfind(b"\n", 0, after.start) + 1
-    margin = data[line_start : after.start]
-    if margin.strip():
-        margin = b"  "
-    ending = b"\r\n" if b"\r\n" in data else b"\n"
-    gap = b"" if same or after.tag in DEPENDENCIES else ending
-    at = _line_end(data, after.end)
-    return data[:at] + ending + gap + margin + _depend(name, tag).encode() + data[at:]
-
-
-def _line_end(data: bytes, at: int) -> int:
-    """Return the end of a line that has nothing but a comment after `at`; `at` otherwise."""
-    end = data.find(b"\n", at)
-    end = len(data) if end < 0 else end
-    rest = data[at:end].strip()
-    if rest and not (rest.startswith(b"<!--") and rest.endswith(b"-->") and rest.count(b"<") == 1):
-        return at
-    return end - 1 if data[:end].endswith(b"\r") else end
+    text = manifest.text
+    ranked = [statement for statement in statements if RANK.get(statement.tag, 99) <= RANK[tag]]
+    same = [statement for statement in ranked if statement.tag == tag]
+    if not ranked:
+        return ()
+    after = max(same or ranked, key=lambda statement: statement.end)
+    margin = text[text.rfind("\n", 0, after.span.start) + 1 : after.span.start]
+    margin = "  " if margin.strip() else margin
+    ending = "\r\n" if "\r\n" in text else "\n"
+    # a comment on the line belongs to the element before it
+    line = text[after.end :].partition("\n")[0].removesuffix("\r")
+    is_comment = re.fullmatch(r"<!--[^<]*-->", line.strip()) is not None
+    at = after.end + len(line) if is_comment or not line.strip() else after.end
+    place = Span(manifest, at, at)
+    element = Edit(place, f"{ending}{margin}<{tag}>{escape(name, quote=False)}</{tag}>")
+    is_end = not same and after.tag not in DEPENDENCIES and _BLANK_LINE.match(text, at)
+    return (Edit(place, ending), element) if is_end else (element,)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import distros
 from idlc.model.names import is_package_name
-from idlc.project.files import is_file, is_folder, read_bytes
+from idlc.project.files import entries, is_file, is_folder, read_bytes
 from idlc.project.package_xml import declared_version
 from idlc.project.root import Root
 
@@ -148,11 +148,7 @@ def prefixes(folder: Path) -> list[Path]:
     """Return the prefixes that a folder is or holds: colcon makes one for each package."""
     if is_folder(folder / INDEX):
         return [folder]
-    try:
-        inner = sorted(folder.iterdir())
-    except OSError:
-        return []
-    return [path for path in inner if is_folder(path / INDEX)]
+    return [path for path in entries(folder) if is_folder(path / INDEX)]
 
 
 def installed_packages(prefix: Path, root: Root) -> Iterator[InstalledPackage]:
@@ -185,8 +181,4 @@ def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
 
 def _registered(prefix: Path, kind: str) -> list[str]:
     """Return the packages that have an entry of a kind in a prefix's index."""
-    try:
-        names = sorted(path.name for path in (prefix / INDEX / kind).iterdir())
-    except OSError:
-        return []
-    return [name for name in names if is_package_name(name)]
+    return [path.name for path in entries(prefix / INDEX / kind) if is_package_name(path.name)]

@@ -133,10 +133,6 @@ def _nearest_manifest(folder: Path) -> Path | None:
 
 
 def _locks(folder: Path) -> Iterator[lock.Lock]:
-    try:
-        packages = [entry for entry in folder.iterdir() if is_file(entry / lock.FILE)]
-    except OSError:
-        return
-    for package in packages:
+    for package in files.entries(folder):
         if (record := lock.load_lock(package, "", Report())) is not None:
             yield record

@@ -197,17 +197,9 @@ def _read(path: Path, root: Root, report: Report) -> Config:
     source = decode(data, name, report)
     if source is None:
         return Config(root)
-    if _has_costly_keys(source):
-        whole = Span(source, 0, len(source.text))
-        report.add(codes.BAD_CONFIG.at(whole, "a line has too many dots"))
-        return Config(root)
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
     try:
-        document: dict[str, Any] = tomllib.loads(source.text)
-    except tomllib.TOMLDecodeError as error:
+        document = toml(source.text)
+    except ValueError as error:
         report.add(_broken(source, str(error)))
         return Config(root)
     tool = document.get("tool", {})
@@ -215,13 +207,26 @@ def _read(path: Path, root: Root, report: Report) -> Config:
     return _checked(table, source, path.parent, root, report)
 
 
-def _has_costly_keys(source: Source) -> bool:
-    """Return whether reading a file as TOML might take long: quadratic in the parts of a key."""
-    return sum(line.count(".") ** 2 for line in source.text.splitlines()) > _COSTLY
+def toml(text: str) -> dict[str, Any]:
+    """Return a TOML document; raises ValueError for one that is not valid, or would take long."""
+    # reading takes time by the square of the parts of a key
+    if sum(line.count(".") ** 2 for line in text.splitlines()) > _COSTLY:
+        raise ValueError("a line has too many dots")
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        document: dict[str, Any] = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("this is nested too deeply") from None
+    return document
 
 
 def _broken(source: Source, message: str) -> Diagnostic:
     text, _, place = message.partition(" (at ")
+    if not place:
+        return codes.BAD_CONFIG.at(Span(source, 0, len(source.text)), message)
     numbers = [int(number) for number in re.findall(r"\d+", place)]
     if len(numbers) == 2 and numbers[0] <= len(source.line_starts):
         start = source.line_starts[numbers[0] - 1] + numbers[1] - 1

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import enum
 import itertools
-import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -18,8 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 from idlc.diagnostics import codes
 from idlc.diagnostics import report as diagnostics
 from idlc.project.atomic import create, exclusive, make_folder, move_over, uninterrupted
-from idlc.project.files import reason
-from idlc.project.lock import FILE, Obstacle, Tree, digest, is_same, may_be_own
+from idlc.project.files import entries, reason
+from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic, Edit, Report
@@ -30,8 +29,7 @@ YIELDING = frozenset({"__init__.py", "py.typed"})
 DIFF_LINES = 40
 #: Refused files that are shown with a diff; the others are only named.
 DIFFS = 10
-#: The folder of drafts, beside the record; where the system has no locks, it is one. Earlier
-#: versions of idlc put the number of their process at its end.
+#: The folder of drafts, beside the record; where the system has no locks, it is one.
 STAGE = ".idlc-stage-new"
 
 #: Paths below a folder, each with the digests of a file that idlc wrote there.
@@ -187,34 +185,20 @@ def _lines(data: bytes) -> list[str]:
     return data.decode("utf-8", errors="replace").splitlines()
 
 
-def owned_files(folder: Path, outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
-    """Return the files that a record in `folder` lists, each with the digests that it may have.
+def owned_files(outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
+    """Return the files that a record lists, each with the digests that it may have.
 
     The record of an interrupted run has two for a file.
     """
-    owned: dict[str, frozenset[str]] = {}
-    for listed in (outputs, *_journals(folder)):
-        for path, digests in listed.items():
-            if may_be_own(path) and isinstance(digests, str):
-                owned[path] = owned.get(path, frozenset()).union(digests.split())
-    return owned
-
-
-def _journals(folder: Path) -> Iterator[dict[str, str]]:
-    """Yield what killed runs of idlc 0.1.0 and before wrote beside their drafts."""
-    for stage in _stages(folder):
-        with contextlib.suppress(OSError, ValueError, RecursionError):
-            journal = json.loads((stage / FILE).read_bytes())
-            listed = journal.get("outputs", journal) if isinstance(journal, dict) else {}
-            yield listed if isinstance(listed, dict) else {}
+    return {
+        path: frozenset(digests.split())
+        for path, digests in outputs.items()
+        if may_be_own(path) and isinstance(digests, str)
+    }
 
 
 def _stages(folder: Path) -> list[Path]:
-    try:
-        names = os.listdir(folder)  # noqa: PTH208 - half of the time
-        return [folder / name for name in names if name.startswith(STAGE.removesuffix("new"))]
-    except OSError:
-        return []
+    return [path for path in entries(folder) if path.name.startswith(STAGE.removesuffix("new"))]
 
 
 def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -> bool:

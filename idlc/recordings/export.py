@@ -12,6 +12,7 @@ from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -26,140 +27,77 @@ from idlc.recordings.recording import RecordedTopic, Recording, UnknownTopicErro
 from idlc.recordings.types import BORROWED, NAMED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pyarrow as pa
 
 
-def storable(schema: pa.Schema) -> pa.Schema:
-    """Return a schema as Parquet can hold it, which has no structs without fields.
+def converted(batch: pa.RecordBatch, convert: Callable[[pa.Array], pa.Array]) -> pa.RecordBatch:
+    """Return a batch with each column converted."""
+    import pyarrow as pa
+
+    columns = list(map(convert, batch.columns))
+    pairs = zip(batch.schema, columns, strict=True)
+    schema = pa.schema([field.with_type(column.type) for field, column in pairs])
+    return pa.RecordBatch.from_arrays(columns, schema=schema.with_metadata(batch.schema.metadata))
+
+
+def no_rows(schema: pa.Schema) -> pa.RecordBatch:
+    """Return a batch without rows, whose conversion has the schema of all that are converted."""
+    import pyarrow as pa
+
+    return pa.RecordBatch.from_arrays([pa.nulls(0, type_) for type_ in schema.types], schema=schema)
+
+
+def filled(column: pa.Array) -> pa.Array:
+    """Return a column, of which nothing is null, as Parquet can hold it: no struct without fields.
 
     They get the field that ROS 2 adds for C++, for the same reason.
     """
-    return _with_types(schema, lambda kind: _converted(kind, _filled_type))
-
-
-def stored(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
-    """Return a batch with the schema that is storable."""
-    import pyarrow as pa
-
-    if batch.schema == schema:
-        return batch
-    pairs = zip(batch.columns, schema, strict=True)
-    columns = [_filled(column, field.type) for column, field in pairs]
-    return pa.RecordBatch.from_arrays(columns, schema=schema)
-
-
-def _with_types(schema: pa.Schema, convert: Any) -> pa.Schema:
-    import pyarrow as pa
-
-    fields = [field.with_type(convert(field.type)) for field in schema]
-    return pa.schema(fields, schema.metadata)
-
-
-def _converted(kind: pa.DataType, convert: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
-    """Return a type with each type in it converted, inner ones first, and then itself."""
     import pyarrow as pa
     from pyarrow import types
 
+    kind = column.type
     if types.is_struct(kind):
-        kind = pa.struct([field.with_type(_converted(field.type, convert)) for field in kind])
-    elif types.is_large_list(kind):
-        kind = pa.large_list(_converted(kind.value_type, convert))
-    elif types.is_fixed_size_list(kind):
-        kind = pa.list_(_converted(kind.value_type, convert), kind.list_size)
-    return convert(kind)
-
-
-def _filled_type(kind: pa.DataType) -> pa.DataType:
-    """Return a struct that has fields."""
-    import pyarrow as pa
-
-    empty = pa.types.is_struct(kind) and not kind.num_fields
-    return pa.struct([pa.field(DUMMY_FIELD, pa.uint8())]) if empty else kind
-
-
-def _filled(column: pa.Array, kind: pa.DataType) -> pa.Array:
-    """Return a column, of which nothing is null, with the zeros that its new fields hold."""
-    import pyarrow as pa
-    from pyarrow import types
-
-    if column.type == kind:
-        return column
-    if types.is_struct(kind):
-        pairs = zip(column.flatten(), kind, strict=False)
-        columns = [_filled(child, field.type) for child, field in pairs]
+        names = [field.name for field in kind] or [DUMMY_FIELD]
         zeros = pa.array(bytes(len(column)), pa.uint8())
-        return pa.StructArray.from_arrays(columns or [zeros], fields=list(kind))
+        return pa.StructArray.from_arrays(list(map(filled, column.flatten())) or [zeros], names)
     if types.is_fixed_size_list(kind):
-        return pa.FixedSizeListArray.from_arrays(
-            _filled(column.flatten(), kind.value_type), kind.list_size
-        )
-    return pa.LargeListArray.from_arrays(column.offsets, _filled(column.values, kind.value_type))
+        return pa.FixedSizeListArray.from_arrays(filled(column.flatten()), kind.list_size)
+    if types.is_large_list(kind):
+        return pa.LargeListArray.from_arrays(column.offsets, filled(column.values))
+    return column
 
 
-def textual(schema: pa.Schema) -> pa.Schema:
-    """Return a schema of numbers, times and texts: lists are JSON, bytes are in base64."""
-    return _with_types(schema, _text_type)
-
-
-def as_text(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
-    """Return a batch with the schema that is textual."""
-    import pyarrow as pa
-
-    pairs = zip(batch.columns, schema, strict=True)
-    columns = [_as_text(column, field.type) for column, field in pairs]
-    return pa.RecordBatch.from_arrays(columns, schema=schema)
-
-
-def _text_type(kind: pa.DataType) -> pa.DataType:
-    """Return the type of a column in a file format without lists."""
+def plain(column: pa.Array) -> pa.Array:
+    """Return a column of numbers, times or texts: lists are JSON, bytes are in base64."""
     import pyarrow as pa
     from pyarrow import types
 
+    kind = column.type
     if types.is_duration(kind):
-        return pa.int64()
-    if types.is_nested(kind) or _is_bytes(kind):
-        return pa.string()
-    return _text_type(kind.value_type) if types.is_dictionary(kind) else kind
+        return column.cast(pa.int64())
+    if types.is_large_binary(kind) or types.is_fixed_size_binary(kind):
+        return pa.array(map(_base64, column.to_pylist()), pa.string())
+    if types.is_nested(kind):
+        values = column.cast(_timeless(kind)).to_pylist()
+        dumps = partial(json.dumps, default=_base64, ensure_ascii=False)
+        return pa.array(map(dumps, values), pa.string())
+    return column
 
 
-def _is_bytes(kind: pa.DataType) -> bool:
-    from pyarrow import types
-
-    return bool(types.is_large_binary(kind) or types.is_fixed_size_binary(kind))
-
-
-def _as_text(column: pa.Array, kind: pa.DataType) -> pa.Array:
+def _timeless(kind: pa.DataType) -> pa.DataType:
+    """Return a type with times as texts: those of Python have no nanoseconds."""
     import pyarrow as pa
     from pyarrow import types
 
-    if column.type == kind:
-        return column
-    if _is_bytes(column.type):
-        return pa.array([_base64(value) for value in column.to_pylist()], kind)
-    if types.is_nested(column.type):
-        values = _timeless(column).to_pylist()
-        return pa.array(
-            [json.dumps(value, default=_base64, ensure_ascii=False) for value in values], kind
-        )
-    return column.cast(kind)
-
-
-def _timeless(column: pa.Array) -> pa.Array:
-    """Return a column with times as texts: those of Python have no nanoseconds."""
-    return column.cast(_converted(column.type, _timeless_type))
-
-
-def _timeless_type(kind: pa.DataType) -> pa.DataType:
-    import pyarrow as pa
-    from pyarrow import types
-
+    if types.is_struct(kind):
+        return pa.struct([field.with_type(_timeless(field.type)) for field in kind])
+    if types.is_large_list(kind):
+        return pa.large_list(_timeless(kind.value_type))
+    if types.is_fixed_size_list(kind):
+        return pa.list_(_timeless(kind.value_type), kind.list_size)
     if types.is_timestamp(kind):
         return pa.string()
-    if types.is_duration(kind):
-        return pa.int64()
-    return kind
+    return pa.int64() if types.is_duration(kind) else kind
 
 
 def _base64(data: bytes) -> str:
@@ -211,10 +149,12 @@ def _parquet(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) ->
     import pyarrow as pa
     from pyarrow import parquet
 
-    kept = storable(schema)
+    kept = converted(no_rows(schema), filled).schema
+    if kept != schema:
+        batches = (converted(batch, filled) for batch in batches)
     with parquet.ParquetWriter(file, kept) as writer:
         for group in _groups(batches):
-            table = pa.Table.from_batches([stored(batch, kept) for batch in group], kept)
+            table = pa.Table.from_batches(group, kept)
             writer.write_table(table, row_group_size=ROWS * 2)
 
 
@@ -245,25 +185,9 @@ def _arrow(
 def _csv(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
     from pyarrow import csv
 
-    plain = textual(schema)
-    with csv.CSVWriter(file, plain) as writer:
+    with csv.CSVWriter(file, converted(no_rows(schema), plain).schema) as writer:
         for batch in batches:
-            writer.write_batch(as_text(batch, plain))
-
-
-def style_of(path: str) -> str | None:
-    """Return the format that a name means."""
-    return STYLES.get(Path(path).suffix.lower())
-
-
-def is_folder(path: str) -> bool:
-    """Return whether a path means a folder, which may have to be made."""
-    return path.endswith("/") or Path(path).is_dir()
-
-
-def exists(path: str) -> bool:
-    """Return whether a path exists, also as a broken link."""
-    return os.path.lexists(path)
+            writer.write_batch(converted(batch, plain))
 
 
 #: The placeholder in OUT for the name of a topic.
@@ -388,7 +312,7 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
         return ()
     paths = [] if options.force else [job.path for job in jobs if job.path != STDOUT]
-    taken = [path for path in paths if exists(path)]
+    taken = [path for path in paths if os.path.lexists(path)]
     for path in taken:
         report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint="--force replaces it"))
     return () if taken else jobs
@@ -397,12 +321,12 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     """Return where a topic goes: to a file in a folder if there are several, or OUT is one."""
     out, name = options.out, _file_name(topic.topic.name)
-    suffix = style_of(out)
+    suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
         return Job(topic, out, options.style or "arrow")
     if MARK in out:
         return Job(topic, out.replace(MARK, name), options.style or suffix or "")
-    if is_folder(out) or (many and not suffix):
+    if out.endswith("/") or Path(out).is_dir() or (many and not suffix):
         style = options.style or "parquet"
         return Job(topic, f"{out.rstrip('/')}/{name}.{style}", style)
     return Job(topic, out, options.style or suffix or "")
@@ -442,28 +366,16 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFi
         reader = job.topic.to_reader(**reading)
     except ValueError as error:
         raise UnknownFieldError(str(error), name) from None
-    counted = _RowCounter(reader, name, job.topic.topic.count, progress)
-    if job.path == STDOUT:
-        write(counted.batches(), reader.schema, sys.stdout.buffer, job.style)
-    else:
-        with whole_file(job.path) as file:
-            write(counted.batches(), reader.schema, file, job.style)
-    return WrittenFile(name, job.path, counted.rows)
+    rows = 0
 
-
-class _RowCounter:
-    """Counts rows while they pass, and reports progress."""
-
-    def __init__(self, reader: Any, topic: str, total: int, progress: Progress) -> None:
-        self._reader = reader
-        self._topic = topic
-        self._total = total
-        self._progress = progress
-        self.rows = 0
-
-    def batches(self) -> Iterator[pa.RecordBatch]:
-        """Yield the batches of a reader."""
-        for batch in self._reader:
-            self.rows += batch.num_rows
-            self._progress(self._topic, self.rows, self._total)
+    def counted() -> Iterator[pa.RecordBatch]:
+        nonlocal rows
+        for batch in reader:
+            rows += batch.num_rows
+            progress(name, rows, job.topic.topic.count)
             yield batch
+
+    stdout = nullcontext(sys.stdout.buffer)
+    with stdout if job.path == STDOUT else whole_file(job.path) as file:
+        write(counted(), reader.schema, file, job.style)
+    return WrittenFile(name, job.path, rows)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
@@ -270,6 +269,7 @@ class RecordedTypes:
         self.topics = tuple(_typed(version.topics, texts, local, report))
         self._compiler = Compiler(self.library)
         self.interfaces = self._compiler.reached(typed.interface for typed in self.topics)
+        self.models, self.errors = self._compile()
         report.extend(self._substitutions())
 
     @property
@@ -309,24 +309,17 @@ class RecordedTypes:
             )
 
     def names_of(self, topic: DefinedTopic) -> set[ir.TypeName]:
-        """Return the interfaces that a topic's type is made of."""
+        """Return the interfaces that a topic's type is made of, without those that ROS 2 adds."""
         name = topic.interface
         if name not in self._names:
-            self._names[name] = _explicit([name], self.interfaces)
+            known = self.interfaces.keys()
+            self._names[name] = derive.closure(
+                {name} & known, lambda each: known & derive.references(self.interfaces[each])
+            )
         return self._names[name]
 
-    @property
-    def models(self) -> dict[str, Model]:
-        """The model of each package, without faulty interfaces."""
-        return self._compiled[0]
-
-    @property
-    def errors(self) -> Report:
-        """The errors in the definitions."""
-        return self._compiled[1]
-
-    @cached_property
-    def _compiled(self) -> tuple[dict[str, Model], Report]:
+    def _compile(self) -> tuple[dict[str, Model], Report]:
+        """Return the model of each package, without faulty interfaces, and the errors in these."""
         report = Report()
         models = self._compiler.models(self.interfaces, report)
         if not report.had_errors:
@@ -385,16 +378,13 @@ class RecordedTypes:
         """Return whether no recorded hash contradicts the local `broken` definitions."""
         typed = {id(typed.recorded): typed for typed in self.topics}
         for wanted in topics:
-            typed_topic = typed.get(id(wanted))
-            if typed_topic is None and wanted.interface in broken:
-                return False
-            if (
-                typed_topic is None
-                or not wanted.topic.hash
-                or broken.isdisjoint(self.names_of(typed_topic))
-            ):
-                continue
-            if self.hash(typed_topic) != wanted.topic.hash:
+            topic, digest = typed.get(id(wanted)), wanted.topic.hash
+            if topic is None:
+                fits = wanted.interface not in broken
+            else:
+                unaffected = not digest or broken.isdisjoint(self.names_of(topic))
+                fits = unaffected or digest == self.hash(topic)
+            if not fits:
                 return False
         return True
 
@@ -464,13 +454,3 @@ def _why_not_local(topic: RecordedDefinition, local: LocalTypes) -> str:
     if topic.topic.hash and topic.topic.hash != local.hash(topic.name, topic.interface):
         return f"there is no definition of `{topic.interface}`, and the one known here is another"
     return ""
-
-
-def _explicit(
-    names: Iterable[ir.TypeName], interfaces: Mapping[ir.TypeName, ir.Interface]
-) -> set[ir.TypeName]:
-    """Return interfaces and those they refer to in files, without those that ROS 2 adds."""
-    known = interfaces.keys()
-    return derive.closure(
-        known & set(names), lambda name: known & derive.references(interfaces[name])
-    )

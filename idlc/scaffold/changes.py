@@ -17,7 +17,7 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.project.edits import Edited, Outcome
-from idlc.project.files import decode, read_bytes
+from idlc.project.files import decode, entries, read_bytes
 from idlc.project.library import Library
 from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
@@ -63,10 +63,7 @@ class Project:
 
     def names(self, folder: str) -> list[str]:
         """Return the names of the files in one of its folders, sorted."""
-        try:
-            return sorted(path.name for path in (self.path / folder).iterdir() if path.is_file())
-        except OSError:
-            return []
+        return [path.name for path in entries(self.path / folder) if path.is_file()]
 
     def plan(
         self, added: Mapping[str, str], edited: Mapping[str, str] | None = None

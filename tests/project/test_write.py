@@ -33,7 +33,7 @@ def tree(folder: Path) -> dict[str, str]:
 def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False) -> bool:
     known = load_lock(out, "out", report)
     content = {path: text.encode() for path, text in files.items()}
-    owned = write.owned_files(out, known.outputs if known else {})
+    owned = write.owned_files(known.outputs if known else {})
     planned = plan(out, "out", content, owned, report, record="idlc.lock", force=force)
     return planned is not None and write.apply(planned, "out", report, recorded)
 
@@ -263,28 +263,6 @@ def test_an_undone_file_has_the_mode_that_it_had(out, monkeypatch):
         Faulty(patch, "replace", {3}, OSError(errno.EIO, "I/O error"))
         assert not put(out, NEW, Report())
     assert (out / "_idlc/a.py").stat().st_mode & 0o777 == 0o755
-
-
-def test_what_an_older_idlc_left_of_an_interrupted_run_is_understood(out):
-    """It kept the new digests in a folder of its drafts, named by its process."""
-    stage = out / ".idlc-stage-4194305"
-    stage.mkdir()
-    (stage / "0").write_text("2\n", encoding="utf-8")
-    (stage / "idlc.lock").write_bytes(
-        recorded({path: lock.digest(text.encode()) for path, text in NEW.items()})
-    )
-    (out / "msg/__init__.py").write_text(NEW["msg/__init__.py"], encoding="utf-8")
-    assert put(out, NEWER, Report())
-    assert generated(out) == NEWER
-
-
-@pytest.mark.parametrize("journal", ["[" * 100_000, "5", '{"outputs": 5}', '{"outputs": {"a": 5}}'])
-def test_a_damaged_journal_of_an_older_idlc_is_swept(journal, out):
-    stage = out / ".idlc-stage-4194305"
-    stage.mkdir()
-    (stage / "idlc.lock").write_text(journal, encoding="utf-8")
-    assert put(out, NEW, Report())
-    assert generated(out) == NEW
 
 
 def test_where_nothing_can_be_locked_a_run_goes_on_alone(out, monkeypatch):

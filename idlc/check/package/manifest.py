@@ -12,7 +12,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
 from idlc.model.link import Model, own_fields, own_sections
-from idlc.project.package_xml import DEPENDENCIES, RANK, Facts
+from idlc.project.package_xml import Facts, addition
 from idlc.version import RUNTIME
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
@@ -60,8 +60,7 @@ def _declaration_of(
             line = f"<{statement.tag}>{package}</{statement.tag}>"
             hint = f"write `{line}` in place of `{name}`, which is not known here"
             return hint, (Label(statement.span, "misspelt?"),), ()
-    line = f"<depend>{package}</depend>"
-    return f"add `{line}`", (), _additions(facts, line)
+    return f"add `<depend>{package}</depend>`", (), _additions(facts, ("depend", package))
 
 
 def _may_use(facts: Facts) -> set[str]:
@@ -75,7 +74,8 @@ def dependency(facts: Facts, package: str) -> Edit | None:
     """Return the edit that declares a package; `None` if it is declared, or cannot be."""
     if package in _may_use(facts):
         return None
-    return _addition(facts, f"<depend>{package}</depend>")
+    edits = _additions(facts, ("depend", package))
+    return Edit(edits[0].span, "".join(edit.text for edit in edits)) if edits else None
 
 
 def declaration(facts: Facts, package: str) -> Span | None:
@@ -109,12 +109,11 @@ def _has_gaps(model: Model) -> bool:
 def interface_group(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """A package whose interfaces CMake generates is a member of the group of such packages."""
     if facts.generates and model.own and _GROUP not in facts.declared("member_of_group"):
-        line = f"<member_of_group>{_GROUP}</member_of_group>"
         yield codes.NOT_IN_INTERFACE_GROUP.at(
             facts.place,
             "CMake stops at a package with interfaces that is in no interface group",
-            hint=f"add `{line}`",
-            edits=_additions(facts, line),
+            hint=f"add `<member_of_group>{_GROUP}</member_of_group>`",
+            edits=_additions(facts, ("member_of_group", _GROUP)),
         )
 
 
@@ -122,21 +121,21 @@ def generators(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """A package whose interfaces CMake generates declares the generators and their runtime."""
     if not (facts.generates and model.own):
         return
-    missing = {
-        packages[0]: f"<{tag}>{packages[0]}</{tag}>"
+    missing = [
+        (tag, packages[0])
         for packages, tag, others in (
             (_GENERATORS, "buildtool_depend", ("buildtool_depend", "build_depend", "depend")),
             (_RUNTIME, "exec_depend", ("exec_depend", "depend")),
         )
         if facts.declared(*others).keys().isdisjoint(packages)
-    }
+    ]
     if missing:
-        needed = " and ".join(f"`{package}`" for package in missing)
+        needed = " and ".join(f"`{package}`" for _, package in missing)
         yield codes.NO_INTERFACE_GENERATORS.at(
             facts.place,
             f"a package with interfaces needs {needed}",
-            hint="add " + " and ".join(f"`{line}`" for line in missing.values()),
-            edits=_additions(facts, *missing.values()),
+            hint="add " + " and ".join(f"`<{tag}>{name}</{tag}>`" for tag, name in missing),
+            edits=_additions(facts, *missing),
         )
 
 
@@ -173,42 +172,18 @@ def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
             if package in facts.available and package not in declared:
                 declared.add(package)
                 tag = "depend" if package in used else "exec_depend"
-                line = f"<{tag}>{package}</{tag}>"
                 yield codes.UNDECLARED_IMPORT.at(
                     span_of(source, node),
                     f"`{facts.manifest.path}` does not declare `{package}`",
-                    hint=f"add `{line}`",
-                    edits=_additions(facts, line),
+                    hint=f"add `<{tag}>{package}</{tag}>`",
+                    edits=_additions(facts, (tag, package)),
                 )
 
 
-def _additions(facts: Facts, *lines: str) -> tuple[Edit, ...]:
-    """Return the edits that add lines to package.xml, each after similar ones."""
-    return tuple(edit for line in lines if (edit := _addition(facts, line)))
-
-
-def _addition(facts: Facts, line: str) -> Edit | None:
-    """Return the edit that adds a line, at its place in the schema's order."""
-    text = facts.manifest.text
-    rank = RANK[line[1 : line.index(">")]]
-    ranked = [statement for statement in facts.statements if statement.tag in RANK]
-    before = [statement for statement in ranked if RANK[statement.tag] <= rank]
-    same = [statement for statement in before if RANK[statement.tag] == rank]
-    after = next((statement for statement in ranked if RANK[statement.tag] > rank), None)
-    first = not same and after and not any(statement.tag in DEPENDENCIES for statement in before)
-    place = after if first or not before else (same or before)[-1]
-    if place is None:
-        return None
-    start = place.span.start
-    indent = text[text.rfind("\n", 0, start) + 1 : start]
-    pattern = rf"</{place.tag}\s*>([ \t]*<!--[^\n]*-->(?=[ \t]*\r?\n))?"
-    end = re.compile(pattern).search(text, start)
-    if indent.strip() or end is None:
-        return None
-    line_end = "\r\n" if "\r\n" in text else "\n"
-    if place is after:
-        return Edit(Span(facts.manifest, start, start), f"{line}{line_end}{indent}")
-    return Edit(Span(facts.manifest, end.end(), end.end()), f"{line_end}{indent}{line}")
+def _additions(facts: Facts, *elements: tuple[str, str]) -> tuple[Edit, ...]:
+    """Return the edits that add elements to package.xml, each after similar ones."""
+    edits = (addition(facts.manifest, facts.statements, tag, text) for tag, text in elements)
+    return tuple(edit for added in edits for edit in added)
 
 
 _COMMAND = re.compile(r'\b([A-Za-z_]\w*)[ \t]*\(([^()"]*(?:"[^"]*"[^()"]*)*)\)')

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from configparser import Error as ConfigError
 from configparser import RawConfigParser
@@ -17,14 +16,13 @@ from typing import Any, NamedTuple
 
 from idlc.check.package.setup_py import Setup, name_of_call
 from idlc.diagnostics.source import Source, Span
+from idlc.project.settings import toml
 
 _SEARCH = ("where", "include", "exclude")
 _FINDERS = ("find_packages", "find_namespace_packages")
 #: Characters of the longest setup.cfg or pyproject.toml that is read.
 _MOST = 100_000
 _MOST_ROOTS = 20
-#: Dots in a line of pyproject.toml: reading a key takes time by the square of its parts.
-_MOST_DOTS = 200
 #: Arguments with which other code may choose the packages.
 _HOOKS = frozenset({"distclass", "pbr", "py_modules", "setup_requires"})
 #: Folders that setuptools ignores in its own search.
@@ -218,21 +216,17 @@ def _words(parser: RawConfigParser, section: str, option: str) -> tuple[str, ...
 def _of_toml(source: Source | None) -> PackagingConfig | None:
     if source is None or "setuptools" not in source.text:
         return PackagingConfig()
-    if len(source.text) > _MOST or any(line.count(".") > _MOST_DOTS for line in source.lines):
+    if len(source.text) > _MOST:
         return None
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
     try:
-        table = tomllib.loads(source.text).get("tool", {}).get("setuptools", {})
+        table = toml(source.text).get("tool", {}).get("setuptools", {})
         roots = _texts(table.get("package-dir", {}))
         packages = table.get("packages")
         finder = packages.get("find", {}) if isinstance(packages, dict) else {}
         where = _all_texts(finder.get("where", ["."]))
         include, exclude = (_all_texts(finder.get(key, [])) for key in ("include", "exclude"))
         names = _all_texts([] if isinstance(packages, dict) else packages or [])
-    except (ValueError, RecursionError, AttributeError, TypeError):
+    except (ValueError, AttributeError, TypeError):
         return None
     if roots is None or len(where) != 1:
         return None

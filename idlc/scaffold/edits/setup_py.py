@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import re
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
@@ -23,6 +22,7 @@ from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.project.edits import Edited, Outcome, Refused, Script, already_taken, split
+from idlc.project.settings import toml
 
 SECTION = "options.entry_points"
 KEY = "console_scripts"
@@ -236,11 +236,6 @@ def _in_literal(setup: Setup, value: ast.Constant, edit: Callable[[str], Outcome
     return (Edit(Span(setup.source, start + literal.start(2), end - 3), new.text),)
 
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 PYPROJECT = "pyproject.toml"
 SETUP_CFG = "setup.cfg"
 SETUP_PY = "setup.py"
@@ -274,8 +269,8 @@ def _declares_scripts(text: str) -> bool:
 
 def _table(text: str, name: str) -> dict[str, Any] | Refused:
     try:
-        table = tomllib.loads(text).get(name, {})
-    except tomllib.TOMLDecodeError:
+        table = toml(text).get(name, {})
+    except ValueError:
         return Refused("this is not valid TOML", "", f"to [{TABLE}]")
     return table if isinstance(table, dict) else {}
 
