@@ -105,25 +105,20 @@ def _differences(
     """Yield the differences between a library and the installed interfaces."""
     messages = [message for own in model.own for message in derive.messages(own)]
     missing = [
-        str(message.name)
+        f"`{message.name}`"
         for message in messages
         # older distributions have no events
         if symbol(identifier, message.name) not in library.symbols
         and (library.stamp is not None or not message.name.name.endswith("_Event"))
     ]
     if missing:
-        names = first_few((f"`{name}`" for name in missing), 3)
-        yield f"lacks {names}"
+        yield f"lacks {first_few(missing, 3)}"
     if library.stamp is None:
         return
-    stale = [
-        str(message.name)
-        for message in messages
-        if hash_bytes(model.describer.hash(str(message.name))) not in data
-    ]
+    hashes = {str(message.name): model.describer.hash(str(message.name)) for message in messages}
+    stale = [f"`{name}`" for name, hash_ in hashes.items() if hash_bytes(hash_) not in data]
     if stale:
-        names = first_few((f"`{name}`" for name in stale), 3)
-        yield f"is out of date: {names} changed since"
+        yield f"is out of date: {first_few(stale, 3)} changed since"
     local = distribution((package.prefix, *ament_prefixes()))
     layout = LAYOUTS.get(local.name)
     if layout is not None and library.stamp != identity_stamp(layout):

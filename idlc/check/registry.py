@@ -13,6 +13,7 @@ from idlc.model.link import Model, dependents
 from idlc.project.package_xml import Facts
 
 Rule: TypeAlias = Callable[[Model], Iterable[Diagnostic]]
+PackageRule: TypeAlias = "Callable[[Facts, Model], Iterable[Diagnostic]]"
 Findings: TypeAlias = dict[ir.TypeName, tuple[Diagnostic, ...]]
 
 
@@ -100,19 +101,24 @@ def _findings(
 
 def check_package(facts: Facts, model: Model, report: Report) -> None:
     """Report all warnings about the package of a model's interfaces; the caller selects."""
-    from idlc.check.package import installation, manifest
+    from idlc.check.package import manifest
 
-    rules = (
+    rules: list[PackageRule] = [
         manifest.declared_dependencies,
         manifest.used_dependencies,
         manifest.interface_group,
         manifest.generators,
         manifest.declared_imports,
         manifest.listed_dependencies,
-        installation.installed,
-        installation.resource_marker,
-        installation.entry_points,
-        installation.names,
-        installation.current_output,
-    )
+    ]
+    if facts.setup_py or facts.setup_cfg or facts.outputs:  # what CMake builds needs no ast
+        from idlc.check.package import installation
+
+        rules += [
+            installation.installed,
+            installation.resource_marker,
+            installation.entry_points,
+            installation.names,
+            installation.current_output,
+        ]
     report.extend(chain.from_iterable(rule(facts, model) for rule in rules))

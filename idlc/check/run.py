@@ -8,9 +8,9 @@ import msgspec
 
 from idlc.check.compiler import Compiler, library_for, stage
 from idlc.check.package.facts import facts
-from idlc.check.registry import IncrementalFindings
-from idlc.check.select import Selection
-from idlc.diagnostics.report import Diagnostic, Report
+from idlc.check.registry import IncrementalFindings, advise, check_package
+from idlc.check.select import Selection, switched_off, without_ignored
+from idlc.diagnostics.report import Diagnostic, Report, merge, without_overruled
 from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
@@ -95,7 +95,6 @@ def keep_layout(name: str, old: str, new: str) -> str:
         from idlc.check.package.setup_edits import wrap_lines
 
         return wrap_lines(old, new)
-    from idlc.diagnostics.source import Source
     from idlc.language.format import format_file
     from idlc.language.parse import parse
 
@@ -132,12 +131,6 @@ def checkers(
     }
 
 
-def _findings() -> IncrementalFindings:
-    from idlc.check.registry import IncrementalFindings
-
-    return IncrementalFindings()
-
-
 class Checker:
     """Checks packages for one distribution, repeatedly as some of their texts change.
 
@@ -151,14 +144,12 @@ class Checker:
         self.library = library_for(packages, scope, Report())
         self._lowered: link.Memory = {}
         # dependencies between interfaces are only worth remembering for a next run
-        self._checked = _findings() if again else None
-        self._advised = _findings() if again else None
+        self._checked = IncrementalFindings() if again else None
+        self._advised = IncrementalFindings() if again else None
         self._facts: dict[str, Facts | None] = {}
 
     def check(self, packages: Sequence[inputs.Inputs], report: Report) -> list[Model]:
         """Report problems, selected or not; return packages' models, limited to checked files."""
-        from idlc.check.registry import advise, check_package
-
         self.library.report_to(report)
         models = []
         compiler = Compiler(self.library, self._lowered, self._checked)
@@ -191,28 +182,15 @@ def check_all(
     models = {
         distro: checker.check(packages, reports[distro]) for distro, checker in checkers.items()
     }
-    texts = {
-        interface.source.path: interface.source
-        for some in models.values()
-        for model in some
-        for interface in model.own
-        if interface.source
-    }
-    sources = list(texts.values())
-    if len(reports) == 1:
-        (everything,) = reports.values()
-        return _selected(everything, sources, selection), models
-    from idlc.diagnostics.report import merge, without_overruled
-
-    return list(without_overruled(_selected(merge(reports), sources, selection))), models
-
-
-def _selected(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:
-    from idlc.check.select import switched_off, without_ignored
-
-    selected = [problem for problem in report if selection.wants(problem)]
-    return [
+    own = (
+        interface.source for some in models.values() for model in some for interface in model.own
+    )
+    sources = {source.path: source for source in own if source}.values()
+    together = merge(reports) if len(reports) > 1 else next(iter(reports.values()))
+    selected = [problem for problem in together if selection.wants(problem)]
+    problems = [
         problem
         for problem in without_ignored(selected, sources)
         if selection.wants(problem) and not switched_off(problem, selection)
     ]
+    return list(without_overruled(problems)), models

@@ -75,12 +75,12 @@ REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
 
 
 class Remark(msgspec.Struct, frozen=True):
-    """One code that a remark names; `lines` are the lines it applies to, `None` for the file."""
+    """One code that a remark names; `line` is the one it applies to, `None` for the file."""
 
     code: str
     reason: str
     span: Span
-    lines: frozenset[int] | None
+    line: int | None
     edit: Edit | None
 
     def silences(self, diagnostic: Diagnostic) -> bool:
@@ -88,11 +88,10 @@ class Remark(msgspec.Struct, frozen=True):
         if diagnostic.code != self.code or diagnostic.severity is Severity.ERROR or not self.reason:
             return False
         if diagnostic.span is None:
-            return self.lines is None and diagnostic.path == self.span.source.path
+            return self.line is None and diagnostic.path == self.span.source.path
         if diagnostic.span.source.path != self.span.source.path:
             return False
-        line, _ = diagnostic.span.source.position(diagnostic.span.start)
-        return self.lines is None or line in self.lines
+        return self.line in (None, diagnostic.span.corners[0])
 
 
 def without_ignored(
@@ -125,8 +124,8 @@ def _unused(remark: Remark) -> Diagnostic:
         message = f"`{remark.code}` is an error, which cannot be ignored"
     else:
         message = f"there is no `{remark.code}` here to ignore"
-    diagnostic = codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark")
-    return msgspec.structs.replace(diagnostic, edits=(remark.edit,)) if remark.edit else diagnostic
+    edits = (remark.edit,) if remark.edit else ()
+    return codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark", edits=edits)
 
 
 def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
@@ -155,8 +154,7 @@ def _remarks(source: Source) -> Iterator[Remark]:
             else:
                 yield from in_line
             if line.definition:
-                lines = frozenset({line_number})
-                yield from (msgspec.structs.replace(remark, lines=lines) for remark in waiting)
+                yield from (msgspec.structs.replace(remark, line=line_number) for remark in waiting)
                 waiting = []
         yield from waiting
 
@@ -171,10 +169,9 @@ def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Ite
     edit = _removal(source, line, match) if len(names) == 1 else None
     for name, at in names:
         span = Span(source, at, at + len(name))
-        lines = None if in_head else frozenset({number})
         named = codes.find(name)
         code = named.id if named else name
-        yield Remark(code, match.group(2).strip(), span, lines, edit)
+        yield Remark(code, match.group(2).strip(), span, None if in_head else number, edit)
 
 
 def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | None:

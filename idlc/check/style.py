@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 
 from idlc.diagnostics import codes
@@ -17,84 +17,49 @@ from idlc.model.link import Model, own_fields, own_sections
 # the lengths are bounded, or a long comment without an end would take for ever
 REMARK = re.compile(r"idlc:\s{0,20}ignore\[[^\]]{0,200}\]")
 
+
+def _by_word(units: Mapping[str, str]) -> dict[str, str]:
+    return {word: unit for unit, words in units.items() for word in words.split()}
+
+
 #: Words of a field's name that ask for a unit, and the unit.
-QUANTITIES = {
-    "acceleration": "m/s^2",
-    "altitude": "m",
-    "angle": "rad",
-    "current": "A",
-    "depth": "m",
-    "distance": "m",
-    "duration": "s",
-    "energy": "J",
-    "force": "N",
-    "frequency": "Hz",
-    "height": "m",
-    "humidity": "%",
-    "length": "m",
-    "mass": "kg",
-    "pitch": "rad",
-    "power": "W",
-    "pressure": "Pa",
-    "radius": "m",
-    "roll": "rad",
-    "speed": "m/s",
-    "temperature": "degC",
-    "timeout": "s",
-    "torque": "N m",
-    "velocity": "m/s",
-    "voltage": "V",
-    "weight": "kg",
-    "width": "m",
-    "yaw": "rad",
-}
+QUANTITIES = _by_word(
+    {
+        "m": "altitude depth distance height length radius width",
+        "rad": "angle pitch roll yaw",
+        "s": "duration timeout",
+        "m/s": "speed velocity",
+        "m/s^2": "acceleration",
+        "kg": "mass weight",
+        "N": "force",
+        "N m": "torque",
+        "Pa": "pressure",
+        "J": "energy",
+        "W": "power",
+        "A": "current",
+        "V": "voltage",
+        "Hz": "frequency",
+        "degC": "temperature",
+        "%": "humidity",
+    }
+)
 
 #: Unusual units, and their replacements in REP 103.
-_USUAL = {
-    "bar": "Pa",
-    "cm": "m",
-    "deg": "rad",
-    "degree": "rad",
-    "degrees": "rad",
-    "deg/s": "rad/s",
-    "feet": "m",
-    "foot": "m",
-    "ft": "m",
-    "g": "kg",
-    "gram": "kg",
-    "grams": "kg",
-    "h": "s",
-    "hour": "s",
-    "hours": "s",
-    "inch": "m",
-    "inches": "m",
-    "km": "m",
-    "km/h": "m/s",
-    "kmh": "m/s",
-    "knots": "m/s",
-    "kph": "m/s",
-    "mbar": "Pa",
-    "mile": "m",
-    "miles": "m",
-    "millimeter": "m",
-    "millimeters": "m",
-    "min": "s",
-    "minutes": "s",
-    "mm": "m",
-    "mm/s": "m/s",
-    "mph": "m/s",
-    "ms": "s",
-    "msec": "s",
-    "ns": "s",
-    "psi": "Pa",
-    "rpm": "rad/s",
-    "us": "s",
-    "°": "rad",
-    "°/s": "rad/s",
-    "µs": "s",
-}
+_USUAL = _by_word(
+    {
+        "m": "cm feet foot ft inch inches km mile miles millimeter millimeters mm",
+        "rad": "deg degree degrees °",
+        "s": "h hour hours min minutes ms msec ns us µs",
+        "m/s": "km/h kmh knots kph mm/s mph",
+        "rad/s": "deg/s rpm °/s",
+        "kg": "g gram grams",
+        "Pa": "bar mbar psi",
+    }
+)
 
 
+#: Last words of names that are no quantities.
+_WITHOUT_UNIT = frozenset("covariance ratio factor scale percentage index count id gain".split())
 #: Words for positions on the earth, which are in degrees, as in sensor_msgs/NavSatFix.
 _ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
 
@@ -102,17 +67,7 @@ _ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
 def expects_unit(name: str) -> str | None:
     """Return the unit that a field of this name should have, `None` if it is no quantity."""
     words = name.split("_")
-    if words[-1] in (
-        "covariance",
-        "ratio",
-        "factor",
-        "scale",
-        "percentage",
-        "index",
-        "count",
-        "id",
-        "gain",
-    ):
+    if words[-1] in _WITHOUT_UNIT:
         return None
     unit = next((QUANTITIES[word] for word in reversed(words) if word in QUANTITIES), None)
     if unit == "m/s" and "angular" in words:

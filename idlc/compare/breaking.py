@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import msgspec
 
@@ -23,10 +22,9 @@ from idlc.compare.packages import (
     compare_hashes,
     part_to_raise,
     raised,
-    without_allowed,
 )
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
@@ -41,6 +39,8 @@ from idlc.project.settings import Config, Scope
 from idlc.wire.layout import ContentSizes, oversized
 
 GIT = "git:"
+#: The inputs of packages.
+Packages: TypeAlias = Sequence[Inputs]
 _CHECK_OUT = "`git sparse-checkout disable` checks out all files"
 
 
@@ -139,17 +139,24 @@ def judge(
 def not_allowed(
     changes: Sequence[Change], options: BreakingOptions, report: Report, *, is_all: bool = False
 ) -> tuple[Change, ...]:
-    """Return the changes without an allowance; see `judge`."""
-    problems = Report()
-    left = without_allowed(changes, options.allowed, options.today, options.allowed_in, problems)
-    unused = codes.UNUSED_ALLOWANCE.id
-    report.extend(problem for problem in problems if is_all or problem.code != unused)
-    return left
+    """Return the changes without an allowance; reports ended ones, and unused ones if `is_all`."""
+    allowed: set[int] = set()
+    for entry in options.allowed:
+        covered = [at for at, change in enumerate(changes) if entry.covers(change)]
+        if not covered and is_all:
+            message = f"no change needs the allowance for `{entry.at}`"
+            hint = "remove the entry"
+            report.add(codes.UNUSED_ALLOWANCE.of(options.allowed_in, message, hint=hint))
+        elif covered and entry.until.isoformat() < options.today:
+            message = f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})"
+            hint = "take the change back, or decide again and set a new day"
+            report.add(codes.EXPIRED_ALLOWANCE.of(options.allowed_in, message, hint=hint))
+        else:
+            allowed.update(covered)
+    return tuple(change for at, change in enumerate(changes) if at not in allowed)
 
 
-def _against(
-    options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
-) -> Comparison | None:
+def _against(options: BreakingOptions, packages: Packages, report: Report) -> Comparison | None:
     if is_distro(options.against):
         return compare_with_distro(options.against, packages, options.scope, report)
     if options.against.startswith(GIT):
@@ -182,10 +189,18 @@ class Side(NamedTuple):
     broken: frozenset[ir.TypeName]
     error: str
 
+    @property
+    def interfaces(self) -> list[ir.Interface]:
+        """The interfaces of all packages."""
+        return [own for model in self.models.values() for own in model.own]
 
-def read_baseline(
-    options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
-) -> Side | None:
+    @property
+    def names(self) -> frozenset[ir.TypeName]:
+        """The names of all interfaces, broken ones included."""
+        return self.broken.union(own.name for own in self.interfaces)
+
+
+def read_baseline(options: BreakingOptions, packages: Packages, report: Report) -> Side | None:
     """Return the packages as they are in a folder or git revision; `None` after errors."""
     if not options.against.startswith(GIT):
         return _before(options, packages, None, report)
@@ -195,10 +210,7 @@ def read_baseline(
 
 
 def _compare(
-    options: BreakingOptions,
-    packages: tuple[inputs.Inputs, ...],
-    revision: Revision | None,
-    report: Report,
+    options: BreakingOptions, packages: Packages, revision: Revision | None, report: Report
 ) -> Comparison | None:
     before = _before(options, packages, revision, report)
     problems = Report()
@@ -206,75 +218,49 @@ def _compare(
     report.extend(problems.errors)
     if before is None or any(problem.code in codes.USAGE for problem in report):
         return None
-    earlier_names = {
-        interface.name for model in before.models.values() for interface in model.own
-    } | before.broken
-    others = _of_others(packages, earlier_names, revision) if revision else frozenset()
-    submodules = tuple(revision.unknown(options.paths)) if revision else ()
-    skipped = _skipped(before, after, revision) if revision else frozenset()
+    others, submodules, skipped = set[ir.TypeName](), set[str](), set[ir.TypeName]()
+    if revision:
+        earlier, present = before.names, after.names
+        others = {
+            name
+            for package in packages
+            for file in (entry.file for entry in package.files)
+            if (name := ir.TypeName(package.package, file.kind, file.name)) not in earlier
+            and not revision.holds(file.path)
+        }
+        submodules = {*revision.unknown(options.paths)}
+        skipped = {
+            own.name
+            for own in before.interfaces
+            if own.name not in present and own.source and revision.is_skipped(own.source.path)
+        }
     out = before.broken | after.broken | others | skipped
-    old, new = (_without(side.models, out) for side in (before, after))
+    old, new = (
+        {
+            package: model.only({interface.name for interface in model.own} - out)
+            for package, model in side.models.items()
+        }
+        for side in (before, after)
+    )
     with stage("compare", options.against):
         whole = combine(
             compare(*(side.get(package) or Model(package, (), {}) for side in (old, new)))
             for package in {**old, **new}
         )
     elsewhere = {*map(str, others), *submodules}
-    report.extend(
-        _not_compared(names, reason, options, hint)
-        for names, reason, hint in (
-            (before.broken, f"there are errors in {options.against}", before.error),
-            (elsewhere, "other git repositories hold their history", None),
-            (skipped, "this sparse checkout leaves them out", _CHECK_OUT),
-        )
-        if names
-    )
+    for names, reason, hint in (
+        (map(str, before.broken), f"there are errors in {options.against}", before.error),
+        (elsewhere, "other git repositories hold their history", None),
+        (map(str, skipped), "this sparse checkout leaves them out", _CHECK_OUT),
+    ):
+        if listed := first_few(sorted(f"`{name}`" for name in names), 5):
+            message = f"not compared: {listed}; {reason}"
+            report.add(codes.NOT_COMPARED.of(options.paths[0], message, hint=hint))
     return whole._replace(left_out=tuple(sorted({*map(str, out), *elsewhere})))
 
 
-def _not_compared(
-    names: Iterable[object], reason: str, options: BreakingOptions, hint: str | None
-) -> Diagnostic:
-    listed = first_few(sorted(f"`{name}`" for name in names), 5)
-    return codes.NOT_COMPARED.of(options.paths[0], f"not compared: {listed}; {reason}", hint=hint)
-
-
-def _of_others(
-    packages: Sequence[inputs.Inputs], earlier_names: AbstractSet[ir.TypeName], revision: Revision
-) -> frozenset[ir.TypeName]:
-    """Return the interfaces that a revision lacks because they are in other repositories."""
-    return frozenset(
-        name
-        for package in packages
-        for file in (entry.file for entry in package.files)
-        if (name := ir.TypeName(package.package, file.kind, file.name)) not in earlier_names
-        and not revision.holds(file.path)
-    )
-
-
-def _skipped(before: Side, after: Side, revision: Revision) -> frozenset[ir.TypeName]:
-    """Return the interfaces that are missing because git did not check out their files."""
-    present = {own.name for model in after.models.values() for own in model.own} | after.broken
-    return frozenset(
-        own.name
-        for model in before.models.values()
-        for own in model.own
-        if own.name not in present and own.source and revision.is_skipped(own.source.path)
-    )
-
-
-def _without(models: Mapping[str, Model], names: AbstractSet[ir.TypeName]) -> dict[str, Model]:
-    return {
-        package: model.only({interface.name for interface in model.own} - names)
-        for package, model in models.items()
-    }
-
-
 def _before(
-    options: BreakingOptions,
-    packages: tuple[inputs.Inputs, ...],
-    revision: Revision | None,
-    report: Report,
+    options: BreakingOptions, packages: Packages, revision: Revision | None, report: Report
 ) -> Side | None:
     scope = options.scope
     if revision is None:
@@ -297,10 +283,7 @@ def _before(
 
 
 def _side(
-    packages: Sequence[inputs.Inputs],
-    files: Mapping[Path, Sequence[InterfaceFile]],
-    scope: Scope,
-    report: Report,
+    packages: Packages, files: Mapping[Path, Sequence[InterfaceFile]], scope: Scope, report: Report
 ) -> Side:
     """Compile one version; `files` are all files by package, including unread ones."""
     compiled = {
@@ -330,12 +313,12 @@ def _side(
 
 
 def _named_alike(
-    old: tuple[inputs.Inputs, ...],
-    new: tuple[inputs.Inputs, ...],
+    old: Packages,
+    new: Packages,
     files: tuple[InterfaceFile, ...],
     scope: Scope,
     report: Report,
-) -> tuple[inputs.Inputs, ...]:
+) -> Packages:
     """Give two single packages one name, unless both are named by a package.xml."""
     if len(old) != 1 or len(new) != 1 or old[0].package == new[0].package:
         return old
@@ -346,9 +329,7 @@ def _named_alike(
     return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
 
-def error_free_models(
-    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
-) -> dict[str, Model]:
+def error_free_models(packages: Packages, scope: Scope, report: Report) -> dict[str, Model]:
     """Return the packages' models; reports errors only, warnings are reported by `check`."""
     problems = Report()
     models = {model.package: model for _, model in models_of(packages, scope, problems)}
@@ -361,7 +342,7 @@ def error_free_models(
 
 
 def _compare_with_lock(
-    options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
+    options: BreakingOptions, packages: Packages, report: Report
 ) -> Comparison | None:
     folder = options.against.removesuffix(lock.FILE).rstrip("/") or "."
     record = load_lock(options.scope.root.absolute(folder), folder, report)
@@ -384,7 +365,7 @@ def _compare_with_lock(
         return comparison._replace(differs=comparison.differs or not same)
 
 
-def _version(packages: tuple[inputs.Inputs, ...], root: Root, report: Report) -> str | None:
+def _version(packages: Packages, root: Root, report: Report) -> str | None:
     """Return the version in the package.xml if there is one package only."""
     if len(packages) != 1 or not packages[0].folders:
         return None
@@ -414,7 +395,7 @@ class Baseline:
         self.commit: str | None = None
         self._side: Side | None = None
 
-    def side(self, packages: Sequence[Inputs]) -> Side:
+    def side(self, packages: Packages) -> Side:
         """Return the packages as they were then, or the error if that cannot be read."""
         if self.has_moved() or self._side is None:
             report = Report()

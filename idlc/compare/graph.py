@@ -152,22 +152,19 @@ def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
             types.setdefault(interface_of(endpoint.structure), []).append(endpoint)
     for (entity, name), types in sorted(places.items()):
         if len(types) > 1:
-            shown = one_line(name)
             yield Change(
                 codes.SEVERAL_TYPES,
                 name,
-                f"{entity} `{shown}` has ends of {len(types)} types",
+                f"{entity} `{one_line(name)}` has ends of {len(types)} types",
                 frozenset({"hash"}),
                 path=name,
                 hint="endpoints of different types never meet; rename one of them",
-                detail="\n".join(_uses(types)),
+                detail="\n".join(
+                    line
+                    for type_, users in sorted(types.items())
+                    for line in (f"{one_line(type_)}:", *activities(users))
+                ),
             )
-
-
-def _uses(types: Mapping[str, list[Endpoint]]) -> Iterator[str]:
-    for name, endpoints in sorted(types.items()):
-        yield f"{one_line(name)}:"
-        yield from activities(endpoints)
 
 
 def activities(endpoints: Iterable[Endpoint]) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -195,54 +195,6 @@ def raised(version: str, part: Literal["major", "minor", "patch"]) -> str | None
     return f"{major + 1}.0.0"
 
 
-class Allowance(NamedTuple):
-    """One entry of the allow-list.
-
-    `at` is a type or an element of one (`pkg/msg/Name.field`), `*` and `?` stand for any text;
-    a type covers its elements. `until` is the last day on which it holds, as YYYY-MM-DD. Without
-    a `code` it holds for all.
-    """
-
-    at: str
-    reason: str
-    until: str
-    code: str | None = None
-
-    def covers(self, change: Change) -> bool:
-        """Return whether the entry allows a change, or the one that it follows from."""
-        if self.code not in (None, change.code.id):
-            return False
-        names = [change.subject, change.subject.partition(".")[0], change.cause]
-        return any(fnmatchcase(name, self.at) for name in names if name)
-
-
-def without_allowed(
-    changes: Sequence[Change],
-    allowances: Iterable[Allowance],
-    today: str,
-    path: str,
-    report: Report,
-) -> tuple[Change, ...]:
-    """Return the changes without an allowance.
-
-    Reports entries that have expired, or that no change needs; `path` is the file that
-    holds them, `today` a day as YYYY-MM-DD.
-    """
-    allowed: set[int] = set()
-    for entry in allowances:
-        covered = [at for at, change in enumerate(changes) if entry.covers(change)]
-        if not covered:
-            message = f"no change needs the allowance for `{entry.at}`"
-            report.add(codes.UNUSED_ALLOWANCE.of(path, message, hint="remove the entry"))
-        elif entry.until < today:
-            message = f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})"
-            hint = "take the change back, or decide again and set a new day"
-            report.add(codes.EXPIRED_ALLOWANCE.of(path, message, hint=hint))
-        else:
-            allowed.update(covered)
-    return tuple(change for at, change in enumerate(changes) if at not in allowed)
-
-
 class BreakingSettings(msgspec.Struct, frozen=True):
     """`[tool.idlc.breaking]`."""
 
@@ -254,8 +206,13 @@ def _words(description: str) -> Meta:
     return Meta(pattern=r"\S", title="a string that is not blank", description=description)
 
 
-class AllowSettings(msgspec.Struct, frozen=True):
-    """An entry of `[[tool.idlc.breaking.allow]]`."""
+class Allowance(msgspec.Struct, frozen=True):
+    """An entry of `[[tool.idlc.breaking.allow]]`.
+
+    `at` is a type or an element of one (`pkg/msg/Name.field`), `*` and `?` stand for any text;
+    a type covers its elements. `until` is the last day on which it holds. Without a `code` it
+    holds for all.
+    """
 
     at: Annotated[str, _words("the type or field that it is about")]
     reason: Annotated[str, _words("why the change is made nevertheless")]
@@ -264,6 +221,13 @@ class AllowSettings(msgspec.Struct, frozen=True):
         Meta(title="a day, as in 2030-12-31", description="its last day, as in 2030-12-31"),
     ]
     code: Text = ""
+
+    def covers(self, change: Change) -> bool:
+        """Return whether the entry allows a change, or the one that it follows from."""
+        if self.code not in ("", change.code.id):
+            return False
+        names = [change.subject, change.subject.partition(".")[0], change.cause]
+        return any(fnmatchcase(name, self.at) for name in names if name)
 
 
 def against(config: Config, report: Report) -> str | None:
@@ -290,13 +254,9 @@ def _allowance(
     name = "tool.idlc.breaking.allow"
     place = TableLocation(config.source, name, f"{which} in [[{name}]]", number)
     day = {"until": until.date()} if isinstance(until, datetime.datetime) else {}
-    settings = read_table({**entry, **day}, AllowSettings, place, report)
-    if settings is None:
-        return None
-    if settings.code and not (settings.code in CODES and settings.code.startswith("IDL5")):
-        message = f"{place.shown} has `{settings.code}`, which is no code of a breaking change"
+    allowance = read_table({**entry, **day}, Allowance, place, report)
+    if allowance and allowance.code not in ("", *(code for code in CODES if code[:4] == "IDL5")):
+        message = f"{place.shown} has `{allowance.code}`, which is no code of a breaking change"
         place.wrong("code", message, report)
         return None
-    return Allowance(
-        settings.at, settings.reason, settings.until.isoformat(), settings.code or None
-    )
+    return allowance

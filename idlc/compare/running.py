@@ -17,22 +17,22 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 
 from idlc.check.compiler import Compiler, stage
-from idlc.compare import graph
 from idlc.compare.breaking import BreakingOptions, error_free_models, judge
-from idlc.compare.changes import Change
 from idlc.compare.graph import (
     Endpoint,
     Entity,
     LocalType,
+    Reported,
     Role,
     Version,
     event_of,
     interface_of,
     several_types,
     several_versions,
+    version_changes,
 )
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
 from idlc.model.from_description import DescriptionError, reported_model
@@ -303,7 +303,12 @@ def compare_with_graph(
     with join_graph(report) as graph:
         endpoints = graph.endpoints(patience) if graph else ()
         if graph is None or not endpoints:
-            report.extend([_empty(patience)] if graph else [])
+            hint = (
+                "compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION with "
+                "those of the nodes, or give it more time with --timeout"
+            )
+            message = f"no node was found within {patience:g} seconds"
+            report.extend([codes.EMPTY_GRAPH.of("graph", message, hint=hint)] if graph else [])
             return None
         models, local = _local_versions(local_models, endpoints, options.scope)
         versions = list(several_versions(endpoints, local))
@@ -311,7 +316,10 @@ def compare_with_graph(
         answers = graph.ask(chain.from_iterable(questions.values()), patience)
     with stage("compare", "graph"):
         problems = _add_described(questions, answers, models)
-        changes = [*several_types(endpoints), *_changes(versions, models, problems)]
+        seen: Reported = set()
+        changes = list(several_types(endpoints))
+        for several in versions:
+            changes += version_changes(several, models, problems, seen)
     judged = judge(changes, options, report)
     silent = sum(not endpoint.hash for endpoint in endpoints)
     return GraphVerdict(
@@ -325,15 +333,6 @@ def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
         entity for entity, _ in {(endpoint.entity, endpoint.name) for endpoint in endpoints}
     )
     return {"node": len(nodes)} | {entity: entities[entity] for entity in get_args(Entity)}
-
-
-def _empty(patience: float) -> Diagnostic:
-    return codes.EMPTY_GRAPH.of(
-        "graph",
-        f"no node was found within {patience:g} seconds",
-        hint="compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION with "
-        "those of the nodes, or give it more time with --timeout",
-    )
 
 
 def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) -> list[Model]:
@@ -397,25 +396,17 @@ def _questions(
     A node knows a service by the hash of the whole, which only service introspection announces:
     the description of its events holds request and response.
     """
-    events = [
-        endpoint
-        for endpoint in endpoints
-        if endpoint.structure.endswith("_Event") and endpoint.hash
-    ]
+    events: dict[str, list[Endpoint]] = {}
+    for endpoint in endpoints:
+        if endpoint.structure.endswith("_Event") and endpoint.hash:
+            events.setdefault(endpoint.structure, []).append(endpoint)
     for version in chain.from_iterable(versions):
-        key = (version.type, version.hash)
+        key, nodes = (version.type, version.hash), version.nodes
         if key not in models:
-            questions = [Question(node, *key) for node in version.nodes[:ASKED]]
+            questions = [Question(node, *key) for node in nodes[:ASKED]]
             if event := event_of(version.type):
-                mine = (
-                    event_end
-                    for event_end in events
-                    if event_end.structure == event and event_end.node in version.nodes
-                )
-                questions = [
-                    Question(event_end.node, event_end.structure, event_end.hash)
-                    for event_end in mine
-                ]
+                ends = [end for end in events.get(event, ()) if end.node in nodes]
+                questions = [Question(end.node, event, end.hash) for end in ends]
             yield key, questions
 
 
@@ -446,11 +437,3 @@ def _add_described(
         for key in questions
         if key not in models
     }
-
-
-def _changes(
-    types: Iterable[Sequence[Version]], models: Mapping[Key, Model], problems: Mapping[Key, str]
-) -> Iterator[Change]:
-    seen: graph.Reported = set()
-    for versions in types:
-        yield from graph.version_changes(versions, models, problems, seen)

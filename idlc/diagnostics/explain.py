@@ -69,14 +69,10 @@ unit write `ignore(IDL405)`, because ROS 2 takes text in square brackets for the
 
 def document() -> str:
     """Return the document."""
-    return "\n".join(_parts())
-
-
-def _parts() -> Iterator[str]:
-    yield _HEAD
+    parts = [_HEAD]
     for heading, codes in _by_heading():
-        yield f"## {heading}\n"
-        yield from map(_section, codes)
+        parts += [f"## {heading}\n", *map(_section, codes)]
+    return "\n".join(parts)
 
 
 def overview() -> Iterator[str]:
@@ -90,13 +86,9 @@ def overview() -> Iterator[str]:
 
 
 def _by_heading() -> Iterator[tuple[str, Iterator[Code]]]:
-    codes = sorted(CODES.values(), key=attrgetter("id"))
-    return groupby(codes, _heading)
-
-
-def _heading(code: Code) -> str:
     starts = [*_HEADINGS]
-    return _HEADINGS[starts[bisect(starts, int(code.id[3:])) - 1]]
+    codes = sorted(CODES.values(), key=attrgetter("id"))
+    return groupby(codes, lambda code: _HEADINGS[starts[bisect(starts, int(code.id[3:])) - 1]])
 
 
 def _section(code: Code) -> str:

@@ -36,23 +36,16 @@ def github(diagnostics: Iterable[Diagnostic], _: Run) -> str:
 
 
 def _command(diagnostic: Diagnostic) -> str:
-    slug = CODES[diagnostic.code].slug if diagnostic.code in CODES else ""
+    slug = CODES[diagnostic.code].slug
     facts = {
         "file": diagnostic.file,
         **_region(diagnostic),
-        "title": f"{diagnostic.code} {slug}".strip(),
+        "title": f"{diagnostic.code} {slug}",
     }
     listed = ",".join(
         f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
     )
-    parts = (
-        diagnostic.message,
-        diagnostic.breaks,
-        diagnostic.holds_for,
-        diagnostic.hint,
-        diagnostic.within,
-    )
-    text = "\n".join(one_line(part) for part in parts if part)
+    text = "\n".join(map(one_line, diagnostic.sentences()))
     return f"::{diagnostic.severity.name.lower()} {listed}::{_escaped(text)}\n"
 
 
@@ -64,8 +57,7 @@ def notice(title: str, text: str) -> str:
 def _region(diagnostic: Diagnostic) -> dict[str, int]:
     if diagnostic.span is None or diagnostic.within:
         return {}
-    line, column = diagnostic.span.source.position(diagnostic.span.start)
-    end_line, end_column = diagnostic.span.source.position(diagnostic.span.end)
+    line, column, end_line, end_column = diagnostic.span.corners
     # GitHub shows columns only for places within one line
     if end_line != line:
         return {"line": line, "endLine": end_line}
@@ -87,20 +79,11 @@ def gitlab(diagnostics: Iterable[Diagnostic], _: Run) -> str:
 
 
 def _issue(diagnostic: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
-    line = (
-        diagnostic.span.source.position(diagnostic.span.start)[0]
-        if diagnostic.span and not diagnostic.within
-        else 1
-    )
+    line = diagnostic.span.corners[0] if diagnostic.span and not diagnostic.within else 1
     return {
         "type": "issue",
         "check_name": diagnostic.code,
-        "description": "; ".join(
-            filter(
-                None,
-                (diagnostic.message, diagnostic.breaks, diagnostic.holds_for, diagnostic.within),
-            )
-        ),
+        "description": "; ".join(diagnostic.sentences(hint=False)),
         "severity": "major" if diagnostic.severity is Severity.ERROR else "minor",
         "fingerprint": fingerprint(diagnostic, seen),
         "location": {"path": diagnostic.file or ".", "lines": {"begin": line}},
@@ -127,49 +110,31 @@ def junit(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     build whose exit status is 0.
     """
     reported = list(diagnostics)
-    failed = sum(run.strict or diagnostic.severity is Severity.ERROR for diagnostic in reported)
-    clean = [
-        file for file in run.files if file not in {diagnostic.where[0] for diagnostic in reported}
-    ]
+    failed = [run.strict or diagnostic.severity is Severity.ERROR for diagnostic in reported]
+    dirty = {diagnostic.where[0] for diagnostic in reported}
+    clean = [file for file in run.files if file not in dirty]
     head = (
         f'<testsuite name="idlc" tests="{len(reported) + len(clean)}" '
-        f'failures="{failed}" errors="0" skipped="0">'
+        f'failures="{sum(failed)}" errors="0" skipped="0">'
     )
-    cases = [
-        _case(diagnostic, failed=run.strict or diagnostic.severity is Severity.ERROR)
-        for diagnostic in reported
-    ]
+    cases = list(map(_case, reported, failed))
     cases += [f'  <testcase classname="idlc" name={_quoted(file)}/>' for file in clean]
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""]
     # ASCII reads the same in whichever encoding it is written
     return "\n".join(lines).encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
-def _case(diagnostic: Diagnostic, *, failed: bool) -> str:
-    path, line = diagnostic.where[0], ""
-    if diagnostic.span:
-        line = ":{}:{}".format(*diagnostic.span.source.position(diagnostic.span.start))
-    slug = CODES[diagnostic.code].slug if diagnostic.code in CODES else ""
-    lines = (
-        f"{path}{line}: {diagnostic.message}",
-        *filter(
-            None,
-            (
-                diagnostic.breaks,
-                diagnostic.holds_for,
-                diagnostic.hint and f"hint: {diagnostic.hint}",
-            ),
-        ),
-    )
-    text = "\n".join(map(one_line, lines))
-    name = f"{diagnostic.code} {slug}{line}"
+def _case(diagnostic: Diagnostic, failed: bool) -> str:
+    path = diagnostic.where[0]
+    line = ":{}:{}".format(*diagnostic.span.corners) if diagnostic.span else ""
+    hint = f"hint: {diagnostic.hint}" if diagnostic.hint else ""
+    parts = (f"{path}{line}: {diagnostic.message}", diagnostic.breaks, diagnostic.holds_for, hint)
+    text = "\n".join(one_line(part) for part in parts if part)
+    name = f"{diagnostic.code} {CODES[diagnostic.code].slug}{line}"
     kind = diagnostic.severity.name.lower()
-    tag = (
-        f"failure type={_quoted(kind)} message={_quoted(diagnostic.message)}"
-        if failed
-        else "system-out"
-    )
-    text = text if failed else f"{kind}: {text}"
+    tag = f"failure type={_quoted(kind)} message={_quoted(diagnostic.message)}"
+    if not failed:
+        tag, text = "system-out", f"{kind}: {text}"
     return (
         f"  <testcase classname={_quoted(path or 'idlc')} name={_quoted(name)}>\n"
         f"    <{tag}>{escape(_legal(text))}</{tag.split()[0]}>\n"
@@ -211,43 +176,24 @@ def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
 
 
 def _rule(code: str) -> dict[str, object]:
-    kind = CODES.get(code)
-    if kind is None:
-        return {"id": code}
+    kind = CODES[code]
     text = page(code) or ""
-    first = text.split("\n\n")[1] if text.count("\n\n") else kind.slug
-    plain = " ".join(first.replace("`", "").split())
+    plain = " ".join(text.split("\n\n")[1].replace("`", "").split())
     return {
         "id": code,
         "name": "".join(word.capitalize() for word in re.split(r"\W", kind.slug)),
         "shortDescription": {"text": plain},
-        "help": {"text": plain, "markdown": text or plain},
-        "defaultConfiguration": {"level": _level(kind.severity)},
+        "help": {"text": plain, "markdown": text},
+        "defaultConfiguration": {"level": kind.severity.name.lower()},
     }
 
 
-def _level(severity: Severity) -> str:
-    return "error" if severity is Severity.ERROR else "warning"
-
-
 def _result(diagnostic: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
-    text = "; ".join(
-        filter(
-            None,
-            (
-                diagnostic.message,
-                diagnostic.breaks,
-                diagnostic.holds_for,
-                diagnostic.hint,
-                diagnostic.within,
-            ),
-        )
-    )
     result: dict[str, object] = {
         "ruleId": diagnostic.code,
         "ruleIndex": rule,
-        "level": _level(diagnostic.severity),
-        "message": {"text": text},
+        "level": diagnostic.severity.name.lower(),
+        "message": {"text": "; ".join(diagnostic.sentences())},
         "partialFingerprints": {"idlc/v1": fingerprint(diagnostic, seen)},
     }
     if diagnostic.file:
@@ -278,9 +224,9 @@ def _artifact(path: str) -> dict[str, str]:
 
 
 def _physical_region(span: Span) -> dict[str, int]:
-    line, column = span.source.position(span.start)
-    end_line, end_column = span.source.position(span.end)
-    return {"startLine": line, "startColumn": column, "endLine": end_line, "endColumn": end_column}
+    return dict(
+        zip(("startLine", "startColumn", "endLine", "endColumn"), span.corners, strict=True)
+    )
 
 
 def _change(edit: Edit) -> dict[str, object]:

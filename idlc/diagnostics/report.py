@@ -84,6 +84,12 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
         """The distributions with the problem, in words; empty if all have it."""
         return f"for: {', '.join(self.distros)}" if self.distros else ""
 
+    def sentences(self, *, hint: bool = True) -> list[str]:
+        """Return the texts that services show, the message first."""
+        advice = self.hint if hint else ""
+        parts = (self.message, self.breaks, self.holds_for, advice, self.within)
+        return [part for part in parts if part]
+
     @property
     def identity(self) -> tuple[str, str, int, int, str]:
         """The code and location, which are equal in two reports of the same problem."""
@@ -117,12 +123,8 @@ class Report:
 
     def __iter__(self) -> Iterator[Diagnostic]:
         """Yield problems by file, offset and code."""
-        return iter(
-            sorted(
-                self._diagnostics.values(),
-                key=lambda diagnostic: (diagnostic.where, diagnostic.code),
-            )
-        )
+        problems = self._diagnostics.values()
+        return iter(sorted(problems, key=lambda problem: (problem.where, problem.code)))
 
     def __len__(self) -> int:
         return len(self._diagnostics)
@@ -155,17 +157,14 @@ def merge(runs: Mapping[str, Report]) -> Report:
 
     A problem that is not in every run names the distributions that have it.
     """
-    first: dict[object, Diagnostic] = {}
-    names: dict[object, list[str]] = {}
+    everywhere: dict[object, list[tuple[str, Diagnostic]]] = {}
     together = Report()
     for name, report in runs.items():
         for diagnostic in report:
-            first.setdefault(diagnostic.identity, diagnostic)
-            names.setdefault(diagnostic.identity, []).append(name)
-    for identity, diagnostic in first.items():
-        everywhere = len(names[identity]) == len(runs)
-        distros = () if everywhere else tuple(names[identity])
-        together.add(msgspec.structs.replace(diagnostic, distros=distros))
+            everywhere.setdefault(diagnostic.identity, []).append((name, diagnostic))
+    for reported in everywhere.values():
+        distros = tuple(name for name, _ in reported) if len(reported) < len(runs) else ()
+        together.add(msgspec.structs.replace(reported[0][1], distros=distros))
     return together
 
 
@@ -179,13 +178,10 @@ def without_overruled(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]
             yield diagnostic
 
 
-def _line(diagnostic: Diagnostic) -> Iterable[tuple[str, int]]:
+def _line(diagnostic: Diagnostic) -> set[tuple[str, int]]:
     """Return the file and line of a problem, if it has one."""
-    if diagnostic.span is None:
-        return ()
-    return (
-        (diagnostic.span.source.path, diagnostic.span.source.position(diagnostic.span.start)[0]),
-    )
+    span = diagnostic.span
+    return {(span.source.path, span.corners[0])} if span else set()
 
 
 def apply(text: str, edits: Iterable[Edit]) -> tuple[str, int]:

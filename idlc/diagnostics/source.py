@@ -73,6 +73,11 @@ class Span(NamedTuple):
         """The characters covered."""
         return self.source.text[self.start : self.end]
 
+    @property
+    def corners(self) -> tuple[int, int, int, int]:
+        """The line and column of the first character, and of the one after the last."""
+        return (*self.source.position(self.start), *self.source.position(self.end))
+
     def at(self, start: int, end: int) -> Span:
         """Return the part from `start` to `end`, counted from this span's start."""
         return Span(self.source, self.start + start, self.start + end)

@@ -8,12 +8,13 @@ a file reaches the terminal as itself.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
 
 import msgspec
 
 from idlc.diagnostics.codes import CODES
-from idlc.diagnostics.report import Diagnostic, Label, Severity
+from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import display_width, one_line, visible
 
@@ -35,14 +36,15 @@ _STYLES = {
 }
 
 
-class _Paint:
-    """Puts ANSI styles around text, or does not."""
+def _coloured(style: str, text: str) -> str:
+    return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if text else ""
 
-    def __init__(self, colour: bool) -> None:
-        self._colour = colour
 
-    def __call__(self, style: str, text: str) -> str:
-        return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if self._colour and text else text
+def _plain(_: str, text: str) -> str:
+    return text
+
+
+Paint: TypeAlias = Callable[[str, str], str]
 
 
 class _Mark(msgspec.Struct, frozen=True):
@@ -63,7 +65,7 @@ def text(
 
     Ends with a count of those beyond `limit`.
     """
-    paint = _Paint(colour)
+    paint = _coloured if colour else _plain
     diagnostics = list(diagnostics)
     if len(diagnostics) > limit:  # no error is left out for a warning
         diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
@@ -82,7 +84,7 @@ def text(
         yield f"… and {len(diagnostics) - limit} more; fix the first ones and run again\n"
 
 
-def _line(diagnostic: Diagnostic, paint: _Paint) -> str:
+def _line(diagnostic: Diagnostic, paint: Paint) -> str:
     """Return a problem on one line."""
     place = one_line(diagnostic.path)
     if diagnostic.span:
@@ -97,10 +99,10 @@ def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
     counts = Counter(diagnostic.code for diagnostic in diagnostics)
     width = max(map(len, map(str, counts.values())), default=0)
     for code, number in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
-        yield f"{number:>{width}}  {code} {CODES[code].slug if code in CODES else ''}\n"
+        yield f"{number:>{width}}  {code} {CODES[code].slug}\n"
 
 
-def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
+def _block(diagnostic: Diagnostic, paint: Paint) -> Iterator[str]:
     level = diagnostic.severity.name.lower()
     head = paint(level, f"{level}[{diagnostic.code}]")
     yield f"{head}{paint('bold', ': ' + one_line(_shortened(diagnostic.message)))}"
@@ -115,15 +117,14 @@ def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
         yield bar
         lines = map(_shortened, diagnostic.detail.split("\n"))
         yield from (f"{bar} {visible(line)}".rstrip() for line in lines)
-    if diagnostic.levels:
-        sign = paint("frame", "=")
-        yield f"{margin} {sign} {paint('hint', 'breaks')}: {', '.join(diagnostic.levels)}"
-    if diagnostic.distros:
-        sign = paint("frame", "=")
-        yield f"{margin} {sign} {paint('hint', 'for')}: {', '.join(diagnostic.distros)}"
-    if diagnostic.hint:
-        hint = one_line(_shortened(diagnostic.hint))
-        yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {hint}"
+    facts = {
+        "breaks": ", ".join(diagnostic.levels),
+        "for": ", ".join(diagnostic.distros),
+        "hint": one_line(_shortened(diagnostic.hint or "")),
+    }
+    for label, fact in facts.items():
+        if fact:
+            yield f"{margin} {paint('frame', '=')} {paint('hint', label)}: {fact}"
 
 
 def _shortened(text: str) -> str:
@@ -146,7 +147,7 @@ def _mark(span: Span, sign: str, label: str) -> _Mark:
     return _Mark(span.source, line, start, max(end, start), sign, label)
 
 
-def _snippets(marks: list[_Mark], margin: str, paint: _Paint) -> Iterator[str]:
+def _snippets(marks: list[_Mark], margin: str, paint: Paint) -> Iterator[str]:
     """Yield the lines of a problem, file by file, the file of the first mark first."""
     bar = paint("frame", "|")
     sources = list(dict.fromkeys(mark.source for mark in marks))
@@ -214,11 +215,10 @@ def json_lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
 
 
 def _facts(diagnostic: Diagnostic) -> dict[str, object]:
-    code = CODES.get(diagnostic.code)
     return {
         "type": "diagnostic",
         "code": diagnostic.code,
-        "slug": code.slug if code else "",
+        "slug": CODES[diagnostic.code].slug,
         "severity": diagnostic.severity.name.lower(),
         "message": diagnostic.message,
         **_range(diagnostic.span, diagnostic.path),
@@ -226,23 +226,13 @@ def _facts(diagnostic: Diagnostic) -> dict[str, object]:
         "detail": diagnostic.detail or None,
         **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
         **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
-        "labels": [_label(label) for label in diagnostic.labels],
+        "labels": [
+            {"message": label.text, **_range(label.span, "")} for label in diagnostic.labels
+        ],
     }
-
-
-def _label(label: Label) -> dict[str, object]:
-    return {"message": label.text, **_range(label.span, "")}
 
 
 def _range(span: Span | None, path: str) -> dict[str, object]:
-    if span is None:
-        return {"path": path, "line": None, "column": None, "end_line": None, "end_column": None}
-    line, column = span.source.position(span.start)
-    end_line, end_column = span.source.position(span.end)
-    return {
-        "path": span.source.path,
-        "line": line,
-        "column": column,
-        "end_line": end_line,
-        "end_column": end_column,
-    }
+    corners = span.corners if span else (None,) * 4
+    places = zip(("line", "column", "end_line", "end_column"), corners, strict=True)
+    return {"path": span.source.path if span else path, **dict(places)}

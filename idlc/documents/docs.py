@@ -6,8 +6,9 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from idlc.check.compiler import sound_models, stage
 from idlc.diagnostics.report import Report
@@ -37,7 +38,7 @@ class About(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """An interface in the list of its package."""
+    """An interface in the list of its package, or a package among several."""
 
     page: str
     words: Sequence[str]
@@ -46,8 +47,8 @@ class Entry(NamedTuple):
     about: str
 
 
-class PackagePage(NamedTuple):
-    """The page of a package; `described`: some interface has a description."""
+class Listing(NamedTuple):
+    """The page of a package, or of several; `described`: some entry has a description."""
 
     title: str
     root: str
@@ -58,57 +59,44 @@ class PackagePage(NamedTuple):
     entries: Sequence[Entry]
 
 
-class PackageRow(NamedTuple):
-    """A package in the list of packages."""
-
-    page: str
-    words: Sequence[str]
-    facts: str
-    about: str
-
-
-class Front(NamedTuple):
-    """The title page of several packages."""
-
-    title: str
-    root: str
-    rows: Sequence[PackageRow]
-
-
-def homes(names: Sequence[str]) -> dict[str, str]:
-    """Return the page of each package; a single package has the title page."""
-    return {name: f"{name}/index.html" if len(names) > 1 else "index.html" for name in names}
-
-
-def package_page(
+def _package_page(
     name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
-) -> PackagePage:
-    """Return the page of a package, which is `home`."""
-    entries = [_entry(interface, pages) for interface in interfaces]
-    return PackagePage(
+) -> Listing:
+    entries = [
+        Entry(
+            pages[interface.name],
+            words(interface.name.name),
+            interface.name.kind,
+            KINDS[interface.name.kind],
+            first_line(interface),
+        )
+        for interface in interfaces
+    ]
+    facts = {
+        "version": about.version,
+        "maintained by": ", ".join(about.maintainers),
+        "licence": ", ".join(about.licenses),
+    }
+    shown = [f"{label} {fact}" for label, fact in facts.items() if fact]
+    return Listing(
         title=name,
         root="../" * home.count("/"),
         words=words(name),
         description=blocks(about.description.split("\n")),
-        facts=" · ".join([*_facts(about), counted(interfaces)]),
+        facts=" · ".join([*shown, counted(interfaces)]),
         described=any(entry.about for entry in entries),
         entries=entries,
     )
 
 
-def front(
-    packages: Mapping[str, Sequence[ir.Interface]],
-    pages: Mapping[str, str],
-    about: Mapping[str, About],
-) -> Front:
-    """Return the title page of packages, whose own pages are `pages`."""
-    rows = []
+def _title_page(packages: Packages, home: Mapping[str, str], about: Abouts) -> Listing:
+    entries = []
     for name, interfaces in packages.items():
         own = about.get(name, About())
         version = [f"version {own.version}"] if own.version else []
         facts = " · ".join([*version, counted(interfaces)])
-        rows.append(PackageRow(pages[name], words(name), facts, own.description))
-    return Front("Interfaces", "", rows)
+        entries.append(Entry(home[name], words(name), "", facts, own.description))
+    return Listing("Interfaces", "", (), (), "", True, entries)
 
 
 def counted(interfaces: Sequence[ir.Interface]) -> str:
@@ -121,21 +109,6 @@ def counted(interfaces: Sequence[ir.Interface]) -> str:
     )
 
 
-def _entry(interface: ir.Interface, pages: Pages) -> Entry:
-    name = interface.name
-    about = first_line(interface)
-    return Entry(pages[name], words(name.name), name.kind, KINDS[name.kind], about)
-
-
-def _facts(about: About) -> list[str]:
-    listed = (
-        ("version", (about.version,)),
-        ("maintained by", about.maintainers),
-        ("licence", about.licenses),
-    )
-    return [f"{label} {', '.join(values)}" for label, values in listed if any(values)]
-
-
 def first_line(interface: ir.Interface) -> str:
     """Return the first line of an interface's description."""
     lines = (line for part in derive.sections(interface) for line in part.comment)
@@ -143,61 +116,45 @@ def first_line(interface: ir.Interface) -> str:
 
 
 #: The interfaces by package.
-Packages = Mapping[str, Sequence[ir.Interface]]
+Packages: TypeAlias = Mapping[str, Sequence[ir.Interface]]
+#: The facts about packages by name.
+Abouts: TypeAlias = Mapping[str, About]
 
 
-def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedFile, ...]:
-    """Return the pages of all packages and of the interfaces that they use, with a search.
-
-    `about` has the facts about packages by name.
-    """
+def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
+    """Yield the pages of all packages and of the interfaces that they use, with a search."""
     sources: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
     for model in models:
         for name, interface in model.interfaces.items():
             if interface.source is not None and (name not in sources or interface in model.own):
                 sources[name] = (interface, model)
-    own = {interface.name for model in models for interface in model.own}
-    pages = {name: _path(name) for name in sorted(sources)}
-    users = _users(interface for interface, _ in sources.values())
-    shown = [sources[name][0] for name in sorted(own)]
+    own = sorted({interface.name for model in models for interface in model.own})
+    pages = {name: f"{name.package}/{name.kind}-{name.name}.html" for name in sorted(sources)}
     packages = {
-        name: tuple(group)
-        for name, group in groupby(shown, lambda interface: interface.name.package)
+        package: tuple(sources[name][0] for name in names)
+        for package, names in groupby(own, attrgetter("package"))
     }
-    home = homes([*packages])
-    owners = {
-        name: Home(address, about.get(name, About()).version) for name, address in home.items()
-    }
+    # a single package has the title page
+    home = {name: f"{name}/index.html" if len(packages) > 1 else "index.html" for name in packages}
+    template = html().get_template("documents/package.html.jinja")
+    for package, interfaces in packages.items():
+        facts = about.get(package, About())
+        shown = _package_page(package, home[package], facts, interfaces, pages)
+        yield RenderedFile(home[package], template.render(page=shown))
+    if len(packages) > 1:
+        template = html().get_template("documents/index.html.jinja")
+        shown = _title_page(packages, home, about)
+        yield RenderedFile("index.html", template.render(page=shown))
+    yield RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n")
+    for path in ("search.js", "style.css"):
+        yield RenderedFile(path, verbatim(f"documents/{path}"))
     template = html().get_template("documents/interface.html.jinja")
-    files = []
+    users = _users(interface for interface, _ in sources.values())
+    owners = {name: Home(home[name], about.get(name, About()).version) for name in home}
     for name, (interface, model) in sorted(sources.items()):
         owner = owners.get(name.package, Home())
-        shown_page = page(interface, model, users.get(name, set()), pages, owner)
-        files.append(RenderedFile(pages[name], template.render(page=shown_page)))
-    return (
-        *_lists(packages, home, pages, about),
-        RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n"),
-        RenderedFile("search.js", verbatim("documents/search.js")),
-        RenderedFile("style.css", verbatim("documents/style.css")),
-        *files,
-    )
-
-
-def _lists(
-    packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
-) -> Iterator[RenderedFile]:
-    """Yield the page of each package, and for several packages the title page."""
-    template = html().get_template("documents/package.html.jinja")
-    for name, interfaces in packages.items():
-        text = package_page(name, home[name], about.get(name, About()), interfaces, pages)
-        yield RenderedFile(home[name], template.render(page=text))
-    if len(packages) > 1:
-        title = html().get_template("documents/index.html.jinja")
-        yield RenderedFile("index.html", title.render(page=front(packages, home, about)))
-
-
-def _path(name: ir.TypeName) -> str:
-    return f"{name.package}/{name.kind}-{name.name}.html"
+        text = template.render(page=page(interface, model, users.get(name, set()), pages, owner))
+        yield RenderedFile(pages[name], text)
 
 
 def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeName]]:
@@ -208,9 +165,7 @@ def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeN
     return users
 
 
-def _index(
-    packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
-) -> str:
+def _index(packages: Packages, home: Mapping[str, str], pages: Pages, about: Abouts) -> str:
     """Return the search index: names, pages, descriptions and the items of each, as JSON."""
     entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []
     for package, interfaces in packages.items():

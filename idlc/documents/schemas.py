@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 
 from idlc.generate.idl import file_text
 from idlc.model import derive, ir
@@ -56,22 +56,22 @@ def _field(field: ir.Field) -> Json:
     }
 
 
-def _used(parts: tuple[ir.Message, ...], model: Model) -> Iterator[ir.TypeName]:
-    """Yield the names of all messages that structures hold, each once, in the order of use."""
-    seen: set[ir.TypeName] = set()
-    waiting = list(reversed(parts))
-    while waiting:
-        for target in waiting.pop().references:
-            if target not in seen:
-                seen.add(target)
-                yield target
-                waiting.insert(0, model.messages[target])
+def _used(parts: Iterable[ir.Message], model: Model) -> list[ir.TypeName]:
+    """Return the names of all messages that structures hold, each once, in the order of use."""
+    queue = list(parts)
+    used: dict[ir.TypeName, None] = {}
+    for message in queue:
+        for target in message.references:
+            if target not in used:
+                used[target] = None
+                queue.append(model.messages[target])
+    return list(used)
 
 
 def json_schema(interface: ir.Interface, model: Model) -> Json:
     """Return the JSON Schema of the result of `to_dict()`; a service has one for each part."""
     parts = derive.sections(interface)
-    used = list(_used(parts, model))
+    used = _used(parts, model)
     definitions = {str(name): _object(model.messages[name]) for name in used}
     head: Json = {"$schema": DIALECT, "title": str(interface.name)}
     if len(parts) == 1:
@@ -138,11 +138,9 @@ def _value(type_: ir.FieldType) -> Json:
 
 def mcap(interface: ir.Interface, model: Model) -> str:
     """Return a message's MCAP schema of encoding `ros2msg`: its text and nested messages' texts."""
-    used = [model.interfaces[name] for name in _used(derive.sections(interface), model)]
-    heads = [f"{MCAP_LINE}\nMSG: {message.name.package}/{message.name.name}\n" for message in used]
-    texts = [_ended(file_text(part)) for part in (interface, *used)]
-    return "".join(head + text for head, text in zip(("", *heads), texts, strict=True))
-
-
-def _ended(text: str) -> str:
-    return text if not text or text.endswith("\n") else text + "\n"
+    text = file_text(interface)
+    for name in _used(derive.sections(interface), model):
+        line_end = "" if not text or text.endswith("\n") else "\n"
+        text += f"{line_end}{MCAP_LINE}\nMSG: {name.package}/{name.name}\n"
+        text += file_text(model.interfaces[name])
+    return text if not text or text.endswith("\n") else f"{text}\n"

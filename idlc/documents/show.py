@@ -13,7 +13,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
-from idlc.model.distros import Distro, later
+from idlc.model.distros import later
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
     """Return type hash and full name of each type in paths and names, derived types included."""
     named_hashes: list[tuple[str, str]] = []
-    scope = _with_hashes(scope)
-    if not _has_hashes(scope.distro, report):
+    scope = _with_hashes(scope, report)
+    if not scope.distro.has_hashes:
         return named_hashes
     for model, names in requested_models(targets, scope, report):
         with stage("describe", model.package):
@@ -43,8 +43,8 @@ def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[s
 
 def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | None:
     """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
-    scope = _with_hashes(scope)
-    if not _has_hashes(scope.distro, report):
+    scope = _with_hashes(scope, report)
+    if not scope.distro.has_hashes:
         return None
     models = list(requested_models((target,), scope, report))
     if report.had_errors or not models:
@@ -60,20 +60,16 @@ def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | N
         return model.describer.installed(tops[0])
 
 
-def _with_hashes(scope: Scope) -> Scope:
-    """Return a scope for the first of its distributions with type hashes, if there is one."""
+def _with_hashes(scope: Scope, report: Report) -> Scope:
+    """Return a scope for the first of its distributions with type hashes; report IDL624 if none."""
     able = tuple(distro for distro in scope.distros if distro.has_hashes)
-    return msgspec.structs.replace(scope, distros=able or scope.distros)
-
-
-def _has_hashes(distro: Distro, report: Report) -> bool:
-    """Return whether a distribution has type hashes and descriptions; report IDL624 otherwise."""
-    if not distro.has_hashes:
-        first = next(other for other in later(distro) if other.has_hashes)
-        message = f"ROS 2 {distro.title} has no type hashes and no type descriptions"
+    scope = msgspec.structs.replace(scope, distros=able or scope.distros)
+    if not scope.distro.has_hashes:
+        first = next(other for other in later(scope.distro) if other.has_hashes)
+        message = f"ROS 2 {scope.distro.title} has no type hashes and no type descriptions"
         hint = f"they came with {first.title}; say for which distribution, as in `--distro jazzy`"
         report.add(codes.NO_TYPE_HASHES.of("", message, hint=hint))
-    return distro.has_hashes
+    return scope
 
 
 def requested_models(
@@ -217,47 +213,33 @@ def outline(interface: ir.Interface, model: Model) -> Iterator[str]:
         yield from (f"# {line}".rstrip() for line in section.comment)
         if section.comment and (section.constants or section.fields):
             yield ""
-        rows = [*_constants(section), *_fields(section, model, 0)]
+        rows = list(_rows(section, model, ""))
         widths = [len(code) for code, _ in rows if len(code) <= WIDEST]
         column = max(widths, default=0) + GAP
         for code, comment in rows:
-            yield from _commented(code, comment, column)
+            before = f"{code.ljust(column - GAP)}{' ' * GAP}"
+            for line in comment:
+                yield f"{before}# {line}".rstrip()
+                before = " " * column
+            if not comment:
+                yield code
 
 
-def _constants(message: ir.Message) -> Iterator[tuple[str, tuple[str, ...]]]:
+def _rows(message: ir.Message, model: Model, margin: str) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield each line of code with its comment; nested structures are below, indented."""
     for constant in message.constants:
-        yield (
-            f"{spell(constant.type)} {constant.name}={spell_value(constant.value)}",
-            constant.comment,
-        )
-
-
-def _fields(message: ir.Message, model: Model, depth: int) -> Iterator[tuple[str, tuple[str, ...]]]:
+        value = spell_value(constant.value)
+        yield f"{margin}{spell(constant.type)} {constant.name}={value}", constant.comment
     for field in message.fields:
         default = f" {spell_value(field.default.value)}" if field.default else ""
         unit = f" [{field.unit}]" if field.unit else ""
         *before, last = field.comment or ("",)
         comment = tuple(line for line in (*before, f"{last}{unit}".strip()) if line)
         optional = f"{OPTIONAL} " if field.optional else ""
-        yield f"{INDENT * depth}{optional}{spell(field.type)} {field.name}{default}", comment
+        yield f"{margin}{optional}{spell(field.type)} {field.name}{default}", comment
         element = ir.element_of(field.type)
         if isinstance(element, ir.Ref):
-            nested = model.messages[element.target]
-            constants = (
-                (f"{INDENT * (depth + 1)}{code}", about) for code, about in _constants(nested)
-            )
-            yield from constants
-            yield from _fields(nested, model, depth + 1)
-
-
-def _commented(code: str, comment: tuple[str, ...], column: int) -> Iterator[str]:
-    """Yield a line of code with its comment after it, later comment lines below."""
-    if not comment:
-        yield code
-        return
-    first, *rest = comment
-    yield f"{code.ljust(column - GAP)}{' ' * GAP}# {first}".rstrip()
-    yield from (f"{' ' * column}# {line}".rstrip() for line in rest)
+            yield from _rows(model.messages[element.target], model, margin + INDENT)
 
 
 def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
@@ -291,13 +273,7 @@ def shown(interface: ir.Interface, model: Model, style: str) -> str:
             return json.dumps(schemas.json_schema(interface, model), indent=2) + "\n"
         case "mcap":
             return schemas.mcap(interface, model)
-    return "".join(_lines(interface, model, outline(interface, model)))
-
-
-def _lines(interface: ir.Interface, model: Model, outline: Iterator[str]) -> Iterator[str]:
-    """Yield an outline below the interface's name and hash."""
-    yield f"# {interface.name}\n"
-    if model.distro.has_hashes:
-        yield f"# {model.describer.hash(str(interface.name))}\n"
-    yield "\n"
-    yield from (f"{line}\n" for line in outline)
+    has_hashes = model.distro.has_hashes
+    head = [f"# {model.describer.hash(str(interface.name))}"] if has_hashes else []
+    lines = (f"# {interface.name}", *head, "", *outline(interface, model))
+    return "".join(f"{line}\n" for line in lines)

@@ -271,39 +271,32 @@ def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
 
 
 def _section(title: str, message: ir.Message, before: str, pages: Pages) -> Section:
-    constants = [
-        Row(
-            before + constant.name,
-            words(constant.name),
-            None,
-            [spell(constant.type)],
-            "",
-            spell_value(constant.value),
-            blocks(constant.comment),
-        )
-        for constant in message.constants
-    ]
-    fields = [_field(field, message.name.package, before, pages) for field in message.fields]
-    empty = not (constants or fields)
-    return Section(title, blocks(message.comment), _table(constants), _table(fields), empty)
+    package = message.name.package
+    constants, fields = (
+        _table([_row(element, package, before, pages) for element in elements])
+        for elements in (message.constants, message.fields)
+    )
+    empty = not (message.constants or message.fields)
+    return Section(title, blocks(message.comment), constants, fields, empty)
 
 
-def _field(field: ir.Field, package: str, before: str, pages: Pages) -> Row:
-    element = ir.element_of(field.type)
-    written = spell(field.type, package)
+def _row(element: ir.Field | ir.Constant, package: str, before: str, pages: Pages) -> Row:
+    type_ = ir.element_of(element.type)
+    written = spell(element.type, package)
     link, rest = None, words(written)
-    if isinstance(element, ir.Ref):
-        text = spell(element, package)
-        link, rest = _link(element.target, text, pages), [written.removeprefix(text)]
-    value = spell_value(field.default.value) if field.default else ""
+    if isinstance(type_, ir.Ref):
+        text = spell(type_, package)
+        link, rest = _link(type_.target, text, pages), [written.removeprefix(text)]
+    is_field = isinstance(element, ir.Field)
+    value = element.default if isinstance(element, ir.Field) else element
     return Row(
-        before + field.name,
-        words(field.name),
+        before + element.name,
+        words(element.name),
         link,
         rest,
-        field.unit or "",
-        value,
-        blocks(field.comment),
+        (element.unit or "") if is_field else "",
+        spell_value(value.value) if value else "",
+        blocks(element.comment),
     )
 
 

@@ -145,7 +145,7 @@ def test_the_defaults_of_settings():
 def test_the_keys_of_an_allowance():
     keys = re.findall(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \|$", SETTINGS, re.MULTILINE)
     assert keys == ["at", "reason", "until", "code"]
-    assert set(keys) == set(Allowance._fields)
+    assert set(keys) == set(Allowance.__struct_fields__)
 
 
 def test_the_variables_of_the_environment():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 
@@ -9,12 +10,11 @@ from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.project import lock
-from idlc.project.files import entries
-from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
+from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import Facts, GeneratedOutput, statements
-from idlc.project.root import Root
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
 #: Python packages of ROS 2 that have no interfaces.
@@ -40,7 +40,13 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         return None
     folder = path.parent
     files = list(_files(folder))
-    locks = _locks(files)
+    locks = {
+        file: record
+        for file in files
+        if file.name == lock.FILE and (record := load_lock(file.parent, "", Report()))
+    }
+    interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
+    checked = {entry.file.path.resolve() for entry in package.files}
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
     modules = dict(_modules(folder, files, generated, root))
@@ -54,9 +60,13 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         setup_cfg=_optional(folder / "setup.cfg", root),
         pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
-        generates=cmake is not None and _generates(cmake),
+        generates=any(
+            # other interfaces are for tests of the package's own
+            command.name == GENERATE and "SKIP_INSTALL" not in command.words
+            for command in (calls(cmake) if cmake else ())
+        ),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=_whole(package, files, scope.exclude),
+        whole=bool(checked) and checked.issuperset(file.resolve() for file in interfaces),
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
             GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
@@ -107,45 +117,19 @@ def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
     return is_package
 
 
-def _locks(files: Iterable[Path]) -> dict[Path, lock.Lock]:
-    """Return the readable lock files by path."""
-    lock_files = [file for file in files if file.name == lock.FILE]
-    loaded = ((file, load_lock(file.parent, "", Report())) for file in lock_files)
-    return {file: lock for file, lock in loaded if lock}
-
-
-def _whole(package: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
-    """Return whether a package has no other interface files."""
-    existing = {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)}
-    return bool(package.files) and existing <= {
-        entry.file.path.resolve() for entry in package.files
-    }
-
-
-def _generates(cmake: Source) -> bool:
-    """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
-    return any(
-        command.name == GENERATE and "SKIP_INSTALL" not in command.words for command in calls(cmake)
-    )
-
-
 def _files(folder: Path) -> Iterator[Path]:
     """Yield every file below a package's folder that may be a source, other packages' excluded."""
-    waiting = [folder]
-    while waiting:
-        current = waiting.pop()
-        inside = entries(current)
-        if current != folder and any(
-            entry.name in CLOSING or entry.name == "package.xml" for entry in inside
-        ):
+    for place, folders, names in os.walk(folder):
+        current = Path(place)
+        closing = any(name in CLOSING or name == MANIFEST for name in (*folders, *names))
+        open_ones = [name for name in folders if name[0] != "." and name not in SKIPPED]
+        folders[:] = sorted(open_ones, reverse=True)
+        if current != folder and closing:
+            folders.clear()
             continue
-        for entry in inside:
-            if entry.name.startswith(".") or entry.name in SKIPPED:
-                continue
-            if entry.is_dir() and not entry.is_symlink():
-                waiting.append(entry)
-            elif entry.is_file():
-                yield entry
+        for name in sorted(names):
+            if name[0] != "." and name not in SKIPPED and (file := current / name).is_file():
+                yield file
 
 
 def _modules(

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
-import msgspec
-
+from idlc.check.package.python_packages import Layout, layout
+from idlc.check.package.setup_edits import (
+    append_elements,
+    argument,
+    imported,
+    quote_of,
+    unusable_entry,
+)
+from idlc.check.package.setup_py import DataFiles, Setup, defines, range_of, span_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
 from idlc.diagnostics.source import Source, Span
@@ -17,20 +25,25 @@ from idlc.model.link import Model
 from idlc.project.lock import Runtime
 from idlc.project.package_xml import Facts
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from idlc.check.package.python_packages import Layout
-    from idlc.check.package.setup_py import DataFiles, Setup
-
 _INDEX = "share/ament_index/resource_index"
 
 
 @lru_cache(maxsize=16)
 def _read(source: Source) -> Setup:
-    from idlc.check.package.setup_py import Setup  # packages without a setup.py need no ast
-
     return Setup(source)
+
+
+class _Package(NamedTuple):
+    """A package that a setup.py installs; `kinds` are those of its interfaces.
+
+    `folders` are its folders by dotted name, and whether each has an `__init__.py`.
+    """
+
+    setup: Setup
+    name: str
+    kinds: Sequence[str]
+    folders: Mapping[str, bool]
+    runtime: Runtime = "carried"
 
 
 def _built_by_setup(facts: Facts) -> Setup | None:
@@ -53,22 +66,19 @@ def check_setup(
     by dotted name, and whether each has an `__init__.py`. `others` are setup.cfg and
     pyproject.toml; without these, only the arguments of setup() are judged.
     """
-    from idlc.check.package.python_packages import layout
-    from idlc.check.package.setup_edits import unusable_entry
-
     report = Report()
     read = _read(setup)
-    report.extend(_missing_interfaces(read, package, keys))
+    kinds = sorted({key.split("/")[0] for key in keys})
+    mine = _Package(read, package, kinds, folders, runtime)
+    report.extend(_missing_interfaces(mine, keys))
     report.extend(unusable_entry(read, package))
     view = layout(read, *(others or (None, None)), folders)
     if view and (others or "packages" in read.arguments):
-        report.extend(_missing_packages(read, view, package, keys, folders, runtime))
+        report.extend(_missing_packages(mine, view))
     return report
 
 
 def _layout(facts: Facts, setup: Setup) -> Layout | None:
-    from idlc.check.package.python_packages import layout
-
     return layout(setup, facts.setup_cfg, facts.pyproject, facts.folders)
 
 
@@ -81,18 +91,16 @@ def installed(facts: Facts, model: Model) -> Iterator[Diagnostic]:
         others = (facts.setup_cfg, facts.pyproject)
         yield from check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
     elif setup is not None and (view := _layout(facts, setup)):
-        yield from _absent_folders(setup, view, facts.name, (), facts.folders)
+        yield from _absent_folders(_Package(setup, facts.name, (), facts.folders), view)
 
 
-def _missing_interfaces(
-    setup: Setup, package: str, keys: Mapping[str, str]
-) -> Iterator[Diagnostic]:
+def _missing_interfaces(package: _Package, keys: Mapping[str, str]) -> Iterator[Diagnostic]:
     """Yield the problem with interface files that `ros2 interface show` will not find."""
+    setup, share = package.setup, f"share/{package.name}"
     entries = setup.data_files
     if entries is None:
         return
-    share = f"share/{package}"
-    missing = [kind for kind in _kinds(keys) if _lacks(entries, f"{share}/{kind}", keys, kind)]
+    missing = [kind for kind in package.kinds if _lacks(entries, f"{share}/{kind}", keys, kind)]
     index = _lacks(entries, f"{_INDEX}/rosidl_interfaces", ())
     if not missing and not index:
         return
@@ -107,11 +115,8 @@ def _missing_interfaces(
     ]
     if index:
         lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
-    problem = codes.INTERFACES_NOT_INSTALLED.at(
-        setup.place("data_files"),
-        f"{enumerated(subjects)} {'are' if missing else 'is'} not among the `data_files`",
-    )
-    yield _with_data_files(problem, setup, lines, uses_glob=True)
+    message = f"{enumerated(subjects)} {'are' if missing else 'is'} not among the `data_files`"
+    yield _data_files_problem(codes.INTERFACES_NOT_INSTALLED, message, setup, lines, uses_glob=True)
 
 
 def _pattern(key: str, file: str) -> str:
@@ -124,26 +129,21 @@ def _pattern(key: str, file: str) -> str:
 
 def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind: str = "") -> bool:
     """Return whether entries certainly do not install files into a folder of the prefix."""
-    matching = [
-        entry for entry in entries if entry.folder is None or entry.folder.rstrip("/") == folder
+    names = [
+        pattern.rpartition("/")[2]
+        for entry in entries
+        if entry.folder is None or entry.folder.rstrip("/") == folder
+        for pattern in (("*",) if entry.files is None else entry.files)  # computed files may be any
     ]
-    patterns = [pattern for entry in matching for pattern in _files(entry)]
     needed = [key.rpartition("/")[2] for key in keys if key.startswith(f"{kind}/")] or [""]
-    names = [pattern.rpartition("/")[2] for pattern in patterns]
     # only the file's name is compared, because patterns for all files of a kind are usual
     return not all(any(not file or fnmatchcase(file, name) for name in names) for file in needed)
 
 
-def _files(entry: DataFiles) -> tuple[str, ...]:
-    return ("*",) if entry.files is None else entry.files  # computed files may be any
-
-
-def _with_data_files(
-    problem: Diagnostic, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
+def _data_files_problem(
+    code: codes.Code, message: str, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
 ) -> Diagnostic:
     """Return a problem with the hint and the edits that add entries to `data_files`."""
-    from idlc.check.package.setup_edits import append_elements, argument, imported
-
     glob, imports = imported(setup, "glob", "glob") if uses_glob else ("glob", ())
     new = [line.replace("glob(", f"{glob}(") for line in lines]
     listed = setup.list_of("data_files")
@@ -154,33 +154,29 @@ def _with_data_files(
         edits = argument(setup, f"data_files=[{', '.join(new)}]")
     text = enumerated([f"`{line}`" for line in new])
     also = ", with `from glob import glob`" if imports else ""
-    hint = f"add {text}{also}" + ("; --fix does" if edits else "")
-    return msgspec.structs.replace(problem, hint=hint, edits=(*imports, *edits) if edits else ())
+    return code.at(
+        setup.place("data_files"),
+        message,
+        hint=f"add {text}{also}" + ("; --fix does" if edits else ""),
+        edits=(*imports, *edits) if edits else (),
+    )
 
 
-def _missing_packages(
-    setup: Setup,
-    view: Layout,
-    package: str,
-    keys: Iterable[str],
-    folders: Mapping[str, bool],
-    runtime: Runtime,
-) -> Iterator[Diagnostic]:
+def _missing_packages(package: _Package, view: Layout) -> Iterator[Diagnostic]:
     """Yield the problem with generated packages that setuptools leaves out."""
-    if view.installed is None or any(root.startswith(f"{package}.") for root in view.roots):
+    name = package.name
+    if view.installed is None or any(root.startswith(f"{name}.") for root in view.roots):
         return
-    support = f"{package}._idlc"
-    needed = [package, *(f"{package}.{kind}" for kind in _kinds(keys))]
-    needed += [support] if runtime == "carried" else []
-    existing = view.packages(folders)
-    generated = [support]
-    if f"{package}._vendor" in existing:
-        generated += [f"{package}._vendor", f"{package}.vendor"]
-    inside = tuple(f"{name}." for name in generated)
-    needed += [*generated[1:], *sorted(name for name in existing if name.startswith(inside))]
+    support = f"{name}._idlc"
+    needed = [name, *(f"{name}.{kind}" for kind in package.kinds)]
+    needed += [support] if package.runtime == "carried" else []
+    existing = view.packages(package.folders)
+    vendored = [f"{name}._vendor", f"{name}.vendor"] if f"{name}._vendor" in existing else []
+    inside = tuple(f"{generated}." for generated in (support, *vendored))
+    needed += [*vendored, *sorted(other for other in existing if other.startswith(inside))]
     missing = [name for name in needed if not view.installed.covers(name, view.folder(name))]
     if not missing:
-        yield from _absent_folders(setup, view, package, keys, folders)
+        yield from _absent_folders(package, view)
         return
     listed = enumerated([f"`{name}`" for name in missing])
     reason = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
@@ -188,48 +184,37 @@ def _missing_packages(
         reason = (
             "nothing names the `packages`, and setuptools does not choose among several folders"
         )
-    problem = codes.CLASSES_NOT_INSTALLED.at(
-        view.installed.place, f"{reason}: the classes of the interfaces are not installed"
-    )
-    yield _with_packages(problem, setup, view, package, folders)
+    message = f"{reason}: the classes of the interfaces are not installed"
+    yield _packages_problem(view.installed.place, message, package, view)
 
 
-def _absent_folders(
-    setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
-) -> Iterator[Diagnostic]:
+def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
     """Yield the problem with packages that are listed and have no folder."""
-    from idlc.check.package.setup_py import span_of
-
+    setup = package.setup
     if not setup.whole:
         return
-    support = f"{package}._idlc"
-    kinds = _kinds(keys)
-    generated = {f"{package}.{kind}" for kind in kinds} | ({package} if kinds else set())
-    existing = view.packages(folders)
+    support = f"{package.name}._idlc"
+    generated = {package.name, *(f"{package.name}.{kind}" for kind in package.kinds)}
+    existing = view.packages(package.folders)
     for item in setup.items(setup.arguments.get("packages")):
         name = setup.text(item.node) if item.is_element else None
-        if not name or name in generated or name.replace("/", ".") in existing:
+        if not name or name.replace("/", ".") in existing:
             continue
-        if kinds and support not in existing and f"{name}.".startswith(f"{support}."):
-            continue  # the build creates it
-        problem = codes.CLASSES_NOT_INSTALLED.at(
-            span_of(setup.source, item.node),
-            f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`",
+        is_made = name in generated or (
+            support not in existing and f"{name}.".startswith(f"{support}.")
         )
-        yield _with_packages(problem, setup, view, package, folders)
+        if not (package.kinds and is_made):  # or the build creates it
+            message = f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`"
+            yield _packages_problem(span_of(setup.source, item.node), message, package, view)
 
 
-def _with_packages(
-    problem: Diagnostic, setup: Setup, view: Layout, package: str, folders: Mapping[str, bool]
-) -> Diagnostic:
+def _packages_problem(place: Span, message: str, package: _Package, view: Layout) -> Diagnostic:
     """Return a problem with the edits that let setuptools find the `packages`."""
-    from idlc.check.package.setup_edits import append_elements, argument, imported, quote_of
-    from idlc.check.package.setup_py import range_of
-
+    setup, code = package.setup, codes.CLASSES_NOT_INSTALLED
     root = view.roots.get("", "")
     where = f"'{root}', " if root not in ("", ".") else ""
-    if problem.span and problem.span.source is not setup.source:
-        return msgspec.structs.replace(problem, hint=_config_hint(problem.span, view, root))
+    if place.source is not setup.source:
+        return code.at(place, message, hint=_config_hint(place, view, root))
     find, imports = imported(setup, "setuptools", "find_packages")
     call = f"{find}({where}exclude=['test'])"
     hint = f"write `packages={call}`"
@@ -237,29 +222,25 @@ def _with_packages(
     target = setup.value(setup.arguments.get("packages"))
     items = setup.items(setup.arguments.get("packages"))
     names = [setup.text(item.node) for item in items if item.is_element]
-    existing = view.packages(folders)
+    existing = view.packages(package.folders)
     tops = {name for name, has_init in existing.items() if has_init and "." not in name}
     is_own = len(names) == len(items) and all(
-        name and name.partition(".")[0] == package for name in names
+        name and name.partition(".")[0] == package.name for name in names
     )
     edits: tuple[Edit, ...] = ()
     if "packages" not in setup.arguments:
         edits = argument(setup, f"packages={call}")
     elif view.roots.keys() <= {""} and target is not None:
-        if (is_own or listed is None) and tops <= {package, "test"}:
-            start, end = range_of(setup.source, target)
+        if (is_own or listed is None) and tops <= {package.name, "test"}:
             text = call.replace("'", quote_of(setup.source, target))
-            edits = (Edit(Span(setup.source, start, end), text),)
+            edits = (Edit(Span(setup.source, *range_of(setup.source, target)), text),)
         elif listed is not None:
-            own = f"*{find}({where}include=['{package}', '{package}.*'])"
+            own = f"*{find}({where}include=['{package.name}', '{package.name}.*'])"
             edits = append_elements(setup.source, listed, [own])
             hint = f"add `{own}` to `packages`"
-    also = ", with `from setuptools import find_packages`" if imports else ""
-    return msgspec.structs.replace(
-        problem,
-        hint=hint + also + ("; --fix does" if edits else ""),
-        edits=(*imports, *edits) if edits else (),
-    )
+    hint += ", with `from setuptools import find_packages`" if imports else ""
+    hint += "; --fix does" if edits else ""
+    return code.at(place, message, hint=hint, edits=(*imports, *edits) if edits else ())
 
 
 def _config_hint(place: Span, view: Layout, root: str) -> str:
@@ -271,10 +252,6 @@ def _config_hint(place: Span, view: Layout, root: str) -> str:
         return f"write `packages.find = {{ where = {where} }}` in [tool.setuptools]"
     also = f", and `where = {root}` in [options.packages.find]" if root else ""
     return f"write `packages = find:`{also}"
-
-
-def _kinds(keys: Iterable[str]) -> list[str]:
-    return sorted({key.split("/")[0] for key in keys})
 
 
 def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
@@ -289,19 +266,15 @@ def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
             hint=f"create it: `mkdir -p resource && touch resource/{facts.name}`",
         )
     elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
-        problem = codes.NO_RESOURCE_MARKER.at(
-            setup.place("data_files"), f"`resource/{facts.name}` is not among the `data_files`"
-        )
+        message = f"`resource/{facts.name}` is not among the `data_files`"
         line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
-        yield _with_data_files(problem, setup, [line])
+        yield _data_files_problem(codes.NO_RESOURCE_MARKER, message, setup, [line])
 
 
 def entry_points(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """Each console script names an existing function."""
     if facts.setup_py is None:
         return
-    from idlc.check.package.setup_py import span_of
-
     setup = _read(facts.setup_py)
     view = _layout(facts, setup)
     elsewhere = view is None or bool(view.roots) or "py_modules" in setup.arguments
@@ -317,8 +290,6 @@ def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | N
 
     `elsewhere`: modules may be in folders that were not searched.
     """
-    from idlc.check.package.setup_py import defines
-
     script, equals, target = text.partition("=")
     module, colon, function = (part.strip() for part in target.partition(":"))
     if not equals or not colon or not function:

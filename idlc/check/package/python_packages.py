@@ -5,21 +5,20 @@ setup.py lists them, or setup.cfg, or pyproject.toml; otherwise setuptools searc
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from configparser import Error as ConfigError
+from configparser import RawConfigParser
 from fnmatch import fnmatchcase
 from posixpath import normpath
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from idlc.check.package.setup_py import name_of_call
+from idlc.check.package.setup_py import Setup, name_of_call
 from idlc.diagnostics.source import Source, Span
 from idlc.project.settings import toml
 
-if TYPE_CHECKING:
-    import ast
-
-    from idlc.check.package.setup_py import Setup
-
+_SEARCH = ("where", "include", "exclude")
 _FINDERS = ("find_packages", "find_namespace_packages")
 #: Characters of the longest setup.cfg or pyproject.toml that is read.
 _MOST = 100_000
@@ -32,7 +31,6 @@ _NOT_FOUND = frozenset(
     "unit_test unit_tests example examples scripts tools util utils python build benchmark "
     "benchmarks exercise exercises htmlcov".split()
 )
-_HEADER = re.compile(r"\[([^\]\r\n]*)\]")
 
 
 class Finder(NamedTuple):
@@ -168,8 +166,6 @@ def _of_setup(setup: Setup) -> PackagingConfig | None:
 
 def _finder(setup: Setup, node: ast.expr) -> Finder | None:
     """Return the search of a find_packages call; `None` if its arguments are computed."""
-    import ast
-
     call = setup.value(node)
     if not isinstance(call, ast.Call) or name_of_call(call) not in _FINDERS:
         return None
@@ -187,52 +183,34 @@ def _finder(setup: Setup, node: ast.expr) -> Finder | None:
 
 
 def _of_cfg(source: Source | None) -> PackagingConfig | None:
-    if source and len(source.text) > _MOST:
+    if source is None or len(source.text) > _MOST:
+        return None if source else PackagingConfig()
+    parser = RawConfigParser(strict=False)
+    try:
+        parser.read_string(source.text)
+    except ConfigError:
         return None
-    options = dict(_options(source)) if source else {}
-    packages, place = options.get(("options", "packages"), ([], None))
-    lines = options.get(("options", "package_dir"), ([], None))[0]
-    pairs = [line.partition("=") for line in lines]
-    roots = {key.strip(): root.strip() for key, equals, root in pairs if equals}
-    installed = None
-    if place and packages in (["find:"], ["find_namespace:"]):
-        lists = (
-            options.get(("options.packages.find", key), ([], None))[0]
-            for key in ("where", "include", "exclude")
-        )
-        where, include, exclude = lists
-        if len(where) > 1:
-            return None
-        finder = Finder("".join(where) or ".", tuple(include), tuple(exclude))
-        installed = Installed(place, (), (finder,))
-    elif place:
-        installed = Installed(place, tuple(packages))
-    return PackagingConfig(installed, roots or None)
+    dirs = _words(parser, "options", "package_dir") or _words(parser, "options", "package-dir")
+    pairs = [line.partition("=") for line in dirs]
+    roots = {key.strip(): root.strip() for key, equals, root in pairs if equals} or None
+    names = _words(parser, "options", "packages")
+    at = re.compile(r"(?mi)^packages\b").search(source.text, max(source.text.find("[options]"), 0))
+    if not parser.has_option("options", "packages") or at is None:
+        return PackagingConfig(roots=roots)
+    place = Span(source, *at.span())
+    if names not in (("find:",), ("find_namespace:",)):
+        return PackagingConfig(Installed(place, names), roots)
+    section = "options.packages.find"
+    where, include, exclude = (_words(parser, section, key) for key in _SEARCH)
+    finder = Finder("".join(where) or ".", include, exclude)
+    return None if len(where) > 1 else PackagingConfig(Installed(place, (), (finder,)), roots)
 
 
-def _options(source: Source) -> Iterator[tuple[tuple[str, str], tuple[list[str], Span]]]:
-    """Yield the options of a setup.cfg by section and name: a value's parts, and its range."""
-    section = ""
-    key = None
-    values: list[str] = []
-    at = 0
-    for line, start in zip((*source.lines, "[]"), (*source.line_starts, 0), strict=False):
-        text = line.strip()
-        if not text or text[0] in "#;":
-            continue
-        if line[0].isspace() and key:
-            values.append(text)
-            continue
-        if key:
-            parts = values if len(values) > 1 else values[0].split(",")
-            words = [word for part in parts if (word := part.strip())]
-            yield (section, key), (words, Span(source, at, at + len(key)))
-            key = None
-        if header := _HEADER.match(text):
-            section = header[1].strip()
-        elif option := re.match(r"([\w.-]+)[ \t]*[=:]", text):
-            key, at = option[1].replace("-", "_").lower(), start
-            values = [text[option.end() :].strip()]
+def _words(parser: RawConfigParser, section: str, option: str) -> tuple[str, ...]:
+    """Return the parts of a value, which lines or commas separate."""
+    text = parser.get(section, option, fallback="") or ""
+    parts = text.split("\n") if "\n" in text else text.split(",")
+    return tuple(word for part in parts if (word := part.strip()))
 
 
 def _of_toml(source: Source | None) -> PackagingConfig | None:

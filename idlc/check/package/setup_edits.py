@@ -10,9 +10,7 @@ import re
 import tokenize
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
-from typing import TypeAlias, TypeGuard
-
-import msgspec
+from typing import TypeAlias
 
 from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of, span_of, start_of
 from idlc.diagnostics import codes
@@ -250,16 +248,15 @@ COMPILE = "compile_interfaces"
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
     """Yield the problem of a setup.py that registers a package without installing libraries."""
     index = [entry for entry in setup.data_files or () if "/packages" in (entry.folder or "")]
-    if not index or installs(setup):
-        return
-    edits = edits_for(setup)
-    problem = codes.NO_LIBRARY_INSTALLED.at(
-        span_of(setup.source, index[0].node),
-        f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
-        "installs no library for its types",
-        hint=f"pass `{KEYWORD}=True` to setup()" + ("; --fix does" if edits else ""),
-    )
-    yield msgspec.structs.replace(problem, edits=edits)
+    if index and not installs(setup):
+        edits = () if KEYWORD in setup.arguments else argument(setup, f"{KEYWORD}=True")
+        yield codes.NO_LIBRARY_INSTALLED.at(
+            span_of(setup.source, index[0].node),
+            f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
+            "installs no library for its types",
+            hint=f"pass `{KEYWORD}=True` to setup()" + ("; --fix does" if edits else ""),
+            edits=edits,
+        )
 
 
 def installs(setup: Setup) -> bool:
@@ -267,21 +264,6 @@ def installs(setup: Setup) -> bool:
     asked = setup.arguments.get(KEYWORD)
     if asked is not None:
         return not isinstance(asked, ast.Constant) or bool(asked.value)
-    dropped = {id(node.value) for node in setup.nodes if _is_plain(node)}
-    return any(_is_compile(node) and id(node) not in dropped for node in setup.nodes)
-
-
-def edits_for(setup: Setup) -> tuple[Edit, ...]:
-    """Return the edits after which a setup.py installs libraries; none if it is too unusual."""
-    if setup.call is None or KEYWORD in setup.arguments or installs(setup):
-        return ()
-    return argument(setup, f"{KEYWORD}=True")
-
-
-def _is_compile(node: ast.AST) -> bool:
-    return name_of_call(node) == COMPILE
-
-
-def _is_plain(node: ast.AST) -> TypeGuard[ast.Expr]:
-    """Return whether a statement only calls the function, and drops its result."""
-    return isinstance(node, ast.Expr) and _is_compile(node.value)
+    # a statement that only calls the function drops its result
+    dropped = {id(node.value) for node in setup.nodes if isinstance(node, ast.Expr)}
+    return any(name_of_call(node) == COMPILE and id(node) not in dropped for node in setup.nodes)

@@ -246,24 +246,23 @@ class Setup:
                 value = node.id not in self._grown and self.value(node)
                 self._texts[node.id] = self.text(value, depth + 1) if value else None
             return self._texts[node.id]
-        if isinstance(node, ast.Constant):
-            text = node.value if isinstance(node.value, str) else None
-        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-            text = self._joined("", (node.left, node.right), depth)
-        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
-            values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
-            text = self._filled("%s", node.left, values, depth)
-        elif isinstance(node, ast.JoinedStr):
-            text = self._joined("", node.values, depth)
-        elif isinstance(node, ast.FormattedValue):
-            plain = node.conversion == -1 and node.format_spec is None
-            text = self.text(node.value, depth + 1) if plain else None
-        elif isinstance(node, ast.Call) and not node.keywords:
-            function = node.func
-            if name_of_call(node) == "join" and _is_of_paths(function):
+        match node:
+            case ast.Constant(value=str(literal)):
+                text = literal
+            case ast.BinOp(op=ast.Add()):
+                text = self._joined("", (node.left, node.right), depth)
+            case ast.BinOp(op=ast.Mod(), right=ast.Tuple(elts=values)):
+                text = self._filled("%s", node.left, values, depth)
+            case ast.BinOp(op=ast.Mod()):
+                text = self._filled("%s", node.left, (node.right,), depth)
+            case ast.JoinedStr():
+                text = self._joined("", node.values, depth)
+            case ast.FormattedValue(conversion=-1, format_spec=None):
+                text = self.text(node.value, depth + 1)
+            case ast.Call(func=ast.Attribute(pattern, "format"), args=values, keywords=[]):
+                text = self._filled("{}", pattern, values, depth)
+            case ast.Call(keywords=[]) if name_of_call(node) == "join" and _is_of_paths(node.func):
                 text = self._joined("/", node.args, depth)
-            elif isinstance(function, ast.Attribute) and function.attr == "format":
-                text = self._filled("{}", function.value, node.args, depth)
         return text if text is not None and len(text) <= _MOST else None
 
     def _joined(self, between: str, nodes: Iterable[ast.expr], depth: int) -> str | None:
