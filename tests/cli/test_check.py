@@ -243,12 +243,12 @@ def test_what_can_be_fixed_is_fixed_once_and_nothing_else_changes(capsys):
     assert check(capsys, "--fix")[1] == "no problems in 1 file\n"
 
 
-def test_the_first_dependency_comes_behind_what_every_package_says(capsys):
+def test_the_first_dependency_is_a_group_after_the_head(capsys):
     head = '<package format="3">\n  <name>demo</name>\n  <license>MIT</license>\n'
     end = "\n  <export>\n    <build_type>ament_cmake</build_type>\n  </export>\n</package>\n"
     write_all({"package.xml": head + end, "msg/A.msg": "std_msgs/Header header\n"})
     assert check(capsys, "--fix")[0] == 0
-    assert Path("package.xml").read_text() == f"{head}  <depend>std_msgs</depend>\n{end}"
+    assert Path("package.xml").read_text() == f"{head}\n  <depend>std_msgs</depend>\n{end}"
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ import sys
 
 import idlc
 import idlc.generate.python.render
+import idlc.project.settings
 import idlc.project.templates
 
 WRITES = {"os.mkdir", "os.rmdir", "os.remove", "os.rename", "os.utime", "os.chmod", "os.truncate"}
@@ -111,6 +112,7 @@ def main():
     for name in (*names, "xml.parsers.expat"):
         importlib.import_module(name)
     idlc.project.templates.environment()
+    idlc.project.settings.toml("")
     for line in sys.stdin:
         order = json.loads(line)
         read, write = os.pipe()

@@ -233,6 +233,8 @@ class _Encoder(Builder):
         if alignment.is_at(align):
             return
         known = alignment.knows(align)
+        if not known and not self.position.base.isidentifier():
+            self.store_position("at")  # or the expression would grow with every field
         pad = self.tables.function(f"pad{align}", f"PAD{align}")
         part = f"{pad}[{alignment.residue if known else f'{self.position.text()} & 7'}]"
         part = f'{part} if {unless_empty} else b""' if unless_empty else part

@@ -155,9 +155,9 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
         put(nothings_block)
         at = (at + 4 & -4) + len(nothings) + 4
         put(write_count_at[at & 7].pack(doubles_count))
-        put(pad8[(at + 3 & -4) + 4 & 7] if doubles_count else b"")
-        put(doubles)
         at = (at + 3 & -4) + 4
+        put(pad8[at & 7] if doubles_count else b"")
+        put(doubles)
         if doubles_count:
             at = (at + 3 & -8) + 8 * doubles_count + 4
         shorts = message._shorts
@@ -174,14 +174,15 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
         put(flags)
         at = (at + 3 & -4) + len(flags) + 4
         texts = write_texts(message._texts)
-        wides = write_wides(message._wides)
-        stamps = listed(message._stamps)
         put(write_octets(octets_2(message._octets)))
         put(pad4[at + 2 & 7])
         put(texts)
-        put(pad4[(at + 5 & -4) + len(texts) & 7])
+        at = (at + 5 & -4) + len(texts)
+        wides = write_wides(message._wides)
+        stamps = listed(message._stamps)
+        put(pad4[at & 7])
         put(wides)
-        at = ((at + 5 & -4) + len(texts) + 3 & -4) + len(wides)
+        at = (at + 3 & -4) + len(wides)
         stamps_block = b"".join([
             write_stamps_item(
                 stamps_item._sec,

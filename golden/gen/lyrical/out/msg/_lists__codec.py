@@ -99,7 +99,7 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         flags = flags_of(message._flags)
         if len(flags) > 4:
             raise ValueError("too many elements")
-        at = at + len(flags) + 4
+        at = len(flags) + 4
         wide = write_wide(message._wide)
         str_ = write_str(message._str)
         put(write_count(len(flags)))
@@ -113,13 +113,14 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         if type(data_) is not array:
             data_ = array_of_uint8(data_)
         data_count = len(data_)
-        texts_in_a_long_field_name = write_texts_in_a_long_field_name(message._texts_in_a_long_field_name)
         put(write_position_at[at & 7].pack(
             bytes_of_float32_3(message._position),
             data_count,
         ))
         put(data_)
-        put(pad4[(at + 3 & -4) + data_count + 16 & 7])
+        at = (at + 3 & -4) + data_count + 16
+        texts_in_a_long_field_name = write_texts_in_a_long_field_name(message._texts_in_a_long_field_name)
+        put(pad4[at & 7])
         put(texts_in_a_long_field_name)
         raw = join(parts)
         if len(data_) != data_count:

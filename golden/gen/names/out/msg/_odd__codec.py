@@ -75,11 +75,11 @@ def odd_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 message._at,
                 len(item),
             ),
-            pad8[(at + 3 & -4) + 16 & 7] if item else b"",
-            item_block,
         ]
         put = parts.append
         at = (at + 3 & -4) + 16
+        put(pad8[at & 7] if item else b"")
+        put(item_block)
         if item:
             at = (at + 3 & -8) + 16 * len(item) + 4
         array_ = message._array
