@@ -293,7 +293,11 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
         return value if isinstance(value, array) else array(field.primitive.code, value)
     import numpy as np
 
-    return np.asanyarray(value, field.primitive.name)
+    return (
+        value
+        if isinstance(value, np.ndarray)
+        else np.array(value, field.primitive.name)
+    )
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:
