@@ -362,26 +362,6 @@ def test_an_internal_error_shows_its_traceback_only_when_asked(monkeypatch, caps
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch, capsys):
-    from idlc.generate.python import render
-
-    make("demo/msg/A.msg")
-    real = render.render_package
-
-    def broken(*arguments):
-        return tuple(
-            type(file)(file.path, "def (: \\\n") if file.path == "msg/_a.py" else file
-            for file in real(*arguments)
-        )
-
-    monkeypatch.setattr("idlc.generate.python.render.render_package", broken)
-    assert main(["gen", "demo", "-o", "out/demo"]) == 3
-    shown = capsys.readouterr().err
-    assert "stage `compile`" in shown
-    assert "out/demo/msg/_a.py" in shown
-    assert not Path("out").exists()
-
-
 def test_a_huge_file_is_refused_unread():
     make("demo/msg/A.msg")
     os.truncate("demo/msg/A.msg", 100 << 30)  # sparse: reading it would take a minute
