@@ -34,7 +34,8 @@ def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  #
 
     def run_commands() -> None:
         del distribution.run_commands
-        compiled = compile_interfaces(distribution.get_name(), type(distribution))
+        name = str(distribution.get_name())  # setuptools 78 has its own str for pyproject.toml's
+        compiled = compile_interfaces(name, type(distribution))
         distribution.__class__ = compiled.get("distclass", type(distribution))
         if hasattr(distribution, "set_defaults"):  # from setuptools 61 on
             distribution.set_defaults()
