@@ -92,11 +92,11 @@ def _findings(
         yield from chain.from_iterable(rule(model) for rule in rules)
         return
     findings = incremental.still_valid(model)
-    for part in model.per_interface():
-        name = part.own[0].name
-        if name not in findings:
-            findings[name] = tuple(chain.from_iterable(rule(part) for rule in rules))
-        yield from findings[name]
+    for interface in model.own:
+        if interface.name not in findings:
+            alone = model.alone(interface)
+            findings[interface.name] = tuple(chain.from_iterable(rule(alone) for rule in rules))
+        yield from findings[interface.name]
 
 
 def check_package(facts: Facts, model: Model, report: Report) -> None:

@@ -294,10 +294,15 @@ class Model:
         own = tuple(interface for interface in self.own if interface.name in names)
         return Model(self.package, own, self.interfaces, self._pool)
 
-    def per_interface(self) -> Iterator[Model]:
-        """Yield the model with each of its own interfaces alone."""
+    def alone(self, interface: ir.Interface) -> Model:
+        """Return the model with one of its own interfaces alone."""
+        return Model(self.package, (interface,), self.interfaces, self._pool)
+
+    def references(self) -> Iterator[tuple[ir.Field, ir.TypeName]]:
+        """Yield the fields of the own interfaces that name messages, each with the message."""
         for interface in self.own:
-            yield Model(self.package, (interface,), self.interfaces, self._pool)
+            entry = self._pool.get(interface.name)
+            yield from entry.references if entry else ()
 
     def graph(self) -> Graph:
         """Return the own interfaces and all that they refer to, `None` for missing ones."""

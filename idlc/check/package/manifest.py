@@ -11,7 +11,7 @@ from idlc.diagnostics.report import Diagnostic, Edit, Label
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
-from idlc.model.link import Model, own_fields, own_sections
+from idlc.model.link import Model, own_fields
 from idlc.project.package_xml import Facts, addition
 from idlc.version import RUNTIME
 
@@ -38,10 +38,9 @@ def used_packages(model: Model) -> dict[str, Span]:
     """Return the packages whose messages are used, with the range of each one's first use."""
     packages = _packages_with_interfaces(model)
     spans: dict[str, Span] = {}
-    for message in own_sections(model):
-        for field, target in message.holders:
-            if field.type_span is not None and target.package in packages:
-                spans.setdefault(target.package, field.type_span)
+    for field, target in model.references():
+        if field.type_span is not None and target.package in packages:
+            spans.setdefault(target.package, field.type_span)
     return spans
 
 
