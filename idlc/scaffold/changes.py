@@ -214,6 +214,8 @@ def accepted(
     project: Project, edits: Mapping[str, Outcome], report: Report
 ) -> dict[str, str] | None:
     """Return the edited texts; report IDL621 for each refusal and return `None`."""
+    if report.had_errors:  # a file that cannot be read is not missing
+        return None
     edited = {}
     for path, outcome in edits.items():
         if isinstance(outcome, Edited):

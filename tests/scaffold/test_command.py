@@ -404,3 +404,18 @@ def test_only_what_is_spelled_out_is_imported(package):
     text = (package / "demo/listener.py").read_text()
     assert "from geometry_msgs.msg import PoseStamped\n" in text
     assert "Quaternion" not in text
+
+
+def test_a_file_that_is_no_text_is_not_called_missing(package, capsys):
+    (package / "setup.cfg").unlink()
+    setup = package / "setup.py"
+    setup.write_bytes("# é\n".encode("latin-1") + setup.read_bytes())
+    assert main(NODE) == 1
+    assert re.findall(r"\[(IDL\d+)\]", capsys.readouterr().err) == ["IDL603"]
+
+
+def test_tabs_stay_tabs(package):
+    setup = package / "setup.py"
+    setup.write_text(re.sub("(?m)^(    )+", lambda m: "\t" * (len(m[0]) // 4), setup.read_text()))
+    assert main(NODE) == 0
+    assert not re.search(r"(?m)^\s* ", setup.read_text().replace("    from", "\tfrom"))

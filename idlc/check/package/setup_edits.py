@@ -17,7 +17,6 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit
 from idlc.diagnostics.source import Source, Span
 
-STEP = "    "
 #: The widest line that the linters of ROS 2 accept.
 WIDTH = 99
 
@@ -38,6 +37,11 @@ def indent_of(source: Source, at: int) -> str:
     start = max(source.text.rfind("\n", 0, at), source.text.rfind("\r", 0, at)) + 1
     match = re.compile(r"[ \t]*").match(source.text, start)
     return match[0] if match else ""
+
+
+def step_of(source: Source) -> str:
+    """Return one step of indentation: a tab where lines begin with tabs."""
+    return "\t" if re.search(r"^\t", source.text, re.MULTILINE) else "    "
 
 
 def quote_of(source: Source, node: ast.AST) -> str:
@@ -66,7 +70,8 @@ def append_elements(source: Source, node: Brackets, elements: Sequence[str]) -> 
         between = f",\n{margin}" if hangs else ", "
         before, behind = (between[1:], ",") if comma else (between, "") if ranges else ("", ", ")
         return (insertion(source, last, before + between.join(new) + behind),)
-    lines = "".join(f"\n{_broken(margin, element)}," for element in new)
+    step = step_of(source)
+    lines = "".join(f"\n{_broken(margin, step, element)}," for element in new)
     edits = () if comma or not ranges else (insertion(source, last, ","),)
     return (*edits, insertion(source, last + tail.start(), lines))
 
@@ -95,7 +100,9 @@ def margin_of(source: Source, node: Brackets) -> str:
     margins = [indent_of(source, at) for at in starts if _begins_line(source, at)]
     if margins:
         return margins[-1]
-    return indent_of(source, range_of(source, node)[1] - 1) + STEP * is_spread(source, node)
+    return indent_of(source, range_of(source, node)[1] - 1) + step_of(source) * is_spread(
+        source, node
+    )
 
 
 def is_spread(source: Source, node: Brackets) -> bool:
@@ -111,10 +118,10 @@ def _range(source: Source, node: Brackets) -> tuple[int, int]:
     return start, end
 
 
-def _broken(margin: str, element: str) -> str:
+def _broken(margin: str, step: str, element: str) -> str:
     """Return an element on a line of its own, on two if it is long."""
     line = margin + element
-    return line if len(line) < WIDTH else line.replace(", ", f",\n{margin}{STEP}", 1)
+    return line if len(line) < WIDTH else line.replace(", ", f",\n{margin}{step}", 1)
 
 
 def _begins_line(source: Source, at: int) -> bool:
@@ -235,7 +242,7 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
     else:
         items = [code(element) for element in elements_of(node)]
     margin, line = indent_of(source, start), line_end(source)
-    body = "".join(f"{margin}{STEP}{item},{line}" for item in items)
+    body = "".join(f"{margin}{step_of(source)}{item},{line}" for item in items)
     spread = f"{text[: start + 1]}{line}{body}{margin}{text[end - 1 :]}"
     return spread if items and spread not in refused else None
 

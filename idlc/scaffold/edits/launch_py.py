@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from idlc.check.package.setup_edits import (
-    STEP,
     WIDTH,
     added_name,
     append_element,
@@ -87,7 +86,7 @@ def _in_description(
     match description:
         case ast.Call(args=[ast.List() as listed], keywords=[]):
             margin = margin_of(file.source, listed)
-            before = margin if is_spread(file.source, listed) else STEP
+            before = margin if is_spread(file.source, listed) else "    "
             new = _call(called, node, margin, before, ",")
             return append_element(file.source, listed, new)
         case ast.Call(args=[], keywords=[]):
@@ -132,7 +131,7 @@ def _call(function: str, node: Started, margin: str, before: str, tail: str) -> 
     arguments = [f"{name}='{word}'" for name, word in node.words.items()]
     line = f"{function}({', '.join(arguments)})"
     if len(before + line + tail) > WIDTH:
-        lines = "".join(f"{margin}{STEP}{argument},\n" for argument in arguments)
+        lines = "".join(f"{margin}    {argument},\n" for argument in arguments)
         line = f"{function}(\n{lines}{margin})"
     return line
 

@@ -12,12 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
 from idlc.check.package.installation import check_setup
-from idlc.check.package.setup_edits import (
-    STEP,
-    append_element,
-    is_spread,
-    margin_of,
-)
+from idlc.check.package.setup_edits import append_element, is_spread, margin_of, step_of
 from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
@@ -157,8 +152,8 @@ def _with_script(setup: Setup, call: ast.Call, script: Script) -> Change:
         return "setup() gets its arguments from elsewhere (`**`)"
     points = f"{{'{KEY}': ['{script.line}']}}"
     if is_spread(setup.source, call):
-        margin = margin_of(setup.source, call)
-        inner = f"{margin}{STEP}'{KEY}': [\n{margin}{STEP * 2}'{script.line}',\n{margin}{STEP}],"
+        margin, step = margin_of(setup.source, call), step_of(setup.source)
+        inner = f"{margin}{step}'{KEY}': [\n{margin}{step * 2}'{script.line}',\n{margin}{step}],"
         points = f"{{\n{inner}\n{margin}}}"
     return append_element(setup.source, call, f"entry_points={points}")
 
