@@ -293,11 +293,8 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
         return value if isinstance(value, array) else array(field.primitive.code, value)
     import numpy as np
 
-    return (
-        value
-        if isinstance(value, np.ndarray)
-        else np.array(value, field.primitive.name)
-    )
+    exact = isinstance(value, np.ndarray)
+    return value if exact else np.array(value, field.primitive.name)
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:
