@@ -40,13 +40,6 @@ def converted(batch: pa.RecordBatch, convert: Callable[[pa.Array], pa.Array]) ->
     return pa.RecordBatch.from_arrays(columns, schema=schema.with_metadata(batch.schema.metadata))
 
 
-def no_rows(schema: pa.Schema) -> pa.RecordBatch:
-    """Return a batch without rows, whose conversion has the schema of all that are converted."""
-    import pyarrow as pa
-
-    return pa.RecordBatch.from_arrays([pa.nulls(0, type_) for type_ in schema.types], schema=schema)
-
-
 def filled(column: pa.Array) -> pa.Array:
     """Return a column, of which nothing is null, as Parquet can hold it: no struct without fields.
 
@@ -137,25 +130,35 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
 
 def write(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any, style: str) -> None:
     """Write batches to an open file in a format."""
-    if style == "parquet":
-        _parquet(batches, schema, file)
-    elif style == "csv":
-        _csv(batches, schema, file)
-    else:
-        _arrow(batches, schema, file, stream=file is sys.stdout.buffer)
-
-
-def _parquet(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
     import pyarrow as pa
-    from pyarrow import parquet
 
-    kept = converted(no_rows(schema), filled).schema
-    if kept != schema:
-        batches = (converted(batch, filled) for batch in batches)
-    with parquet.ParquetWriter(file, kept) as writer:
-        for group in _groups(batches):
-            table = pa.Table.from_batches(group, kept)
-            writer.write_table(table, row_group_size=ROWS * 2)
+    nothing = pa.RecordBatch.from_arrays(
+        [pa.nulls(0, type_) for type_ in schema.types], schema=schema
+    )
+    if style == "parquet":
+        from pyarrow import parquet
+
+        kept = converted(nothing, filled).schema
+        if kept != schema:
+            batches = (converted(batch, filled) for batch in batches)
+        with parquet.ParquetWriter(file, kept) as writer:
+            for group in _groups(batches):
+                table = pa.Table.from_batches(group, kept)
+                writer.write_table(table, row_group_size=ROWS * 2)
+        return
+    if style == "csv":
+        from pyarrow import csv
+
+        batches = (converted(batch, plain) for batch in batches)
+        opened = csv.CSVWriter(file, converted(nothing, plain).schema)
+    elif file is sys.stdout.buffer:
+        # the index of a file is at its end, where a reader of a pipe cannot seek
+        opened = pa.ipc.new_stream(file, schema)
+    else:
+        opened = pa.ipc.new_file(file, schema)
+    with opened as writer:
+        for batch in batches:
+            writer.write_batch(batch)
 
 
 def _groups(batches: Iterator[pa.RecordBatch]) -> Iterator[list[pa.RecordBatch]]:
@@ -169,25 +172,6 @@ def _groups(batches: Iterator[pa.RecordBatch]) -> Iterator[list[pa.RecordBatch]]
             group, rows, size = [], 0, 0
     if group:
         yield group
-
-
-def _arrow(
-    batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any, *, stream: bool
-) -> None:
-    import pyarrow as pa
-
-    # the index of a file is at its end, where a reader of a pipe cannot seek
-    with (pa.ipc.new_stream if stream else pa.ipc.new_file)(file, schema) as writer:
-        for batch in batches:
-            writer.write_batch(batch)
-
-
-def _csv(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
-    from pyarrow import csv
-
-    with csv.CSVWriter(file, converted(no_rows(schema), plain).schema) as writer:
-        for batch in batches:
-            writer.write_batch(converted(batch, plain))
 
 
 #: The placeholder in OUT for the name of a topic.
@@ -247,21 +231,31 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     A topic that cannot be read does not keep others from being written.
     """
     done: list[WrittenFile] = []
-    paths, check, include = options.recordings, options.check, options.include
+    missing: dict[str, list[str]] = {}
+    paths = options.recordings
     with (
         _problems(options, report),
         Recording(
             paths[0] if len(paths) == 1 else paths,
             index=options.use_index,
-            check=check,
-            include=include,
+            check=options.check,
+            include=options.include,
         ) as recording,
     ):
         report.notes += recording.notes
-        with _warnings(report):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
             for job in _jobs(recording, options, report):
                 with _problems(options, report):
                     done.append(_written(job, options, progress))
+        for message in (warning.message for warning in caught):
+            if isinstance(message, OtherDefinitionWarning):
+                report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
+            if isinstance(message, MissingDefinitionWarning):
+                missing.setdefault(message.message, []).append(f"`{message.topic}`")
+        for problem, topics in missing.items():
+            text = f"{first_few(topics, NAMED)}: {problem}"
+            report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
     return done
 
 
@@ -280,23 +274,6 @@ def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
 
 
-@contextmanager
-def _warnings(report: Report) -> Iterator[None]:
-    """Report IDL652 and IDL654 for definitions that are missing, or have another hash."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    missing: dict[str, list[str]] = {}
-    for message in (warning.message for warning in caught):
-        if isinstance(message, OtherDefinitionWarning):
-            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
-        if isinstance(message, MissingDefinitionWarning):
-            missing.setdefault(message.message, []).append(f"`{message.topic}`")
-    for problem, topics in missing.items():
-        text = f"{first_few(topics, NAMED)}: {problem}"
-        report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
-
-
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:
     """Return a job for each topic; empty if one of them cannot be done."""
     names = tuple(dict.fromkeys(options.topics or recording))
@@ -306,8 +283,7 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
         with nullcontext() if options.topics else _problems(options, report):
             topics.append(recording[name].between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
-    problem = _problem(jobs, options)
-    if problem:
+    if problem := _problem(jobs, options):
         message, hint = problem
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
         return ()
@@ -320,7 +296,9 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
 
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     """Return where a topic goes: to a file in a folder if there are several, or OUT is one."""
-    out, name = options.out, _file_name(topic.topic.name)
+    out, dotted = options.out, topic.topic.name.replace("/", ".").lstrip(".")
+    # `camera.image` is the file of /camera/image
+    name = re.sub(r"[^\w.-]", "_", dotted, flags=re.ASCII) or "_"
     suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
         return Job(topic, out, options.style or "arrow")
@@ -332,19 +310,11 @@ def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     return Job(topic, out, options.style or suffix or "")
 
 
-def _file_name(topic: str) -> str:
-    """Return a topic's name as that of a file: `camera.image` of /camera/image."""
-    return re.sub(r"[^\w.-]", "_", topic.replace("/", ".").lstrip("."), flags=re.ASCII) or "_"
-
-
 def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | None:
     """Return why columns cannot be written, and a hint."""
-    if any(not job.style for job in jobs):
-        suffixes = ", ".join(STYLES)
-        return (
-            f"`{options.out}` does not say which format is meant",
-            f"--format, or one of {suffixes}",
-        )
+    if not all(job.style for job in jobs):
+        hint = f"--format, or one of {', '.join(STYLES)}"
+        return f"`{options.out}` does not say which format is meant", hint
     paths = [job.path for job in jobs]
     twice = next((path for path, count in Counter(paths).items() if count > 1), None)
     if twice is not None:
@@ -359,14 +329,12 @@ def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | 
 
 def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFile:
     """Write the columns of one topic."""
-    name = job.topic.topic.name
+    name, rows = job.topic.topic.name, 0
     flat = job.style == "csv" or not options.nested
-    reading = {"fields": options.fields, "flat": flat, "datetimes": options.datetimes}
     try:
-        reader = job.topic.to_reader(**reading)
+        reader = job.topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
     except ValueError as error:
         raise UnknownFieldError(str(error), name) from None
-    rows = 0
 
     def counted() -> Iterator[pa.RecordBatch]:
         nonlocal rows

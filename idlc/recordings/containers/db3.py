@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
-from idlc.recordings.containers.file import START, File, Topic, full_name, recorded_schema
+from idlc.recordings.containers.file import START, File, Schema, Topic, full_name, recorded_schema
 from idlc.recordings.containers.source import RecordingError, first_bytes, of_file
 
 if TYPE_CHECKING:
@@ -61,13 +61,13 @@ class Db3File(File):
             location = f"file:{quote(str(self._path))}?mode=ro{'&immutable=1' * self._lone}"
             self._db = sqlite3.connect(location, PATIENCE, uri=True, check_same_thread=False)
             # truncating a mapped file would kill the process
-            for pragma in (
-                *("trusted_schema=OFF", "query_only=ON", "cell_size_check=ON", "mmap_size=0"),
-            ):
+            for pragma in "trusted_schema=OFF query_only=ON cell_size_check=ON mmap_size=0".split():
                 self._db.execute(f"PRAGMA {pragma}")
         try:
             columns = self._tables()
-            self._check_size()
+            ((page,),) = self._rows("PRAGMA page_size")
+            if rest := self._path.stat().st_size % page:  # which SQLite fills with zeros
+                raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
             self.topics = list(self._topics(columns)) if read else []
         except RecordingError:
             self._db.close()
@@ -119,12 +119,6 @@ class Db3File(File):
         if self._is_in_use() or (now.st_mtime_ns, now.st_size) != (then.st_mtime_ns, then.st_size):
             raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
 
-    def _check_size(self) -> None:
-        """Raise RecordingError if the last page is cut off, which SQLite fills with zeros."""
-        ((page,),) = self._rows("PRAGMA page_size")
-        if rest := self._path.stat().st_size % page:
-            raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
-
     def _tables(self) -> dict[str, set[str]]:
         """Return each table's columns; raise RecordingError if there are others than plain ones."""
         tables: dict[str, set[str]] = {}
@@ -170,7 +164,7 @@ class Db3File(File):
             recorded = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
             schema_encoding, text, other = recorded or ("", "", "")
             kind, count = full_name(kind), counts.get(number, 0)
-            schema = recorded_schema(kind, schema_encoding, text)
+            schema = recorded_schema(Schema(kind, schema_encoding, text))
             yield Topic(name, kind, count, digest or other or None, encoding, schema), number
 
     def _definitions(self, columns: set[str]) -> dict[str, tuple[str, str, str]]:

@@ -88,10 +88,9 @@ def full_name(name: str) -> str:
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
 
 
-def recorded_schema(name: str, encoding: str, text: str) -> Schema | None:
+def recorded_schema(schema: Schema) -> Schema | None:
     """Return a definition; where a recorder has none, it writes an empty one of no encoding."""
-    schema = Schema(name, encoding, text)
-    return None if schema.is_blank and encoding != MSG else schema
+    return None if schema.is_blank and schema.encoding != MSG else schema
 
 
 def check_count(topic: str, counted: int, actual: int) -> None:
