@@ -46,16 +46,15 @@ def filled(column: pa.Array) -> pa.Array:
     They get the field that ROS 2 adds for C++, for the same reason.
     """
     import pyarrow as pa
-    from pyarrow import types
 
     kind = column.type
-    if types.is_struct(kind):
+    if pa.types.is_struct(kind):
         names = [field.name for field in kind] or [DUMMY_FIELD]
         zeros = pa.array(bytes(len(column)), pa.uint8())
         return pa.StructArray.from_arrays(list(map(filled, column.flatten())) or [zeros], names)
-    if types.is_fixed_size_list(kind):
+    if pa.types.is_fixed_size_list(kind):
         return pa.FixedSizeListArray.from_arrays(filled(column.flatten()), kind.list_size)
-    if types.is_large_list(kind):
+    if pa.types.is_large_list(kind):
         return pa.LargeListArray.from_arrays(column.offsets, filled(column.values))
     return column
 
@@ -63,14 +62,13 @@ def filled(column: pa.Array) -> pa.Array:
 def plain(column: pa.Array) -> pa.Array:
     """Return a column of numbers, times or texts: lists are JSON, bytes are in base64."""
     import pyarrow as pa
-    from pyarrow import types
 
     kind = column.type
-    if types.is_duration(kind):
+    if pa.types.is_duration(kind):
         return column.cast(pa.int64())
-    if types.is_large_binary(kind) or types.is_fixed_size_binary(kind):
+    if pa.types.is_large_binary(kind) or pa.types.is_fixed_size_binary(kind):
         return pa.array(map(_base64, column.to_pylist()), pa.string())
-    if types.is_nested(kind):
+    if pa.types.is_nested(kind):
         values = column.cast(_timeless(kind)).to_pylist()
         dumps = partial(json.dumps, default=_base64, ensure_ascii=False)
         return pa.array(map(dumps, values), pa.string())
@@ -80,17 +78,16 @@ def plain(column: pa.Array) -> pa.Array:
 def _timeless(kind: pa.DataType) -> pa.DataType:
     """Return a type with times as texts: those of Python have no nanoseconds."""
     import pyarrow as pa
-    from pyarrow import types
 
-    if types.is_struct(kind):
+    if pa.types.is_struct(kind):
         return pa.struct([field.with_type(_timeless(field.type)) for field in kind])
-    if types.is_large_list(kind):
+    if pa.types.is_large_list(kind):
         return pa.large_list(_timeless(kind.value_type))
-    if types.is_fixed_size_list(kind):
+    if pa.types.is_fixed_size_list(kind):
         return pa.list_(_timeless(kind.value_type), kind.list_size)
-    if types.is_timestamp(kind):
+    if pa.types.is_timestamp(kind):
         return pa.string()
-    return pa.int64() if types.is_duration(kind) else kind
+    return pa.int64() if pa.types.is_duration(kind) else kind
 
 
 def _base64(data: bytes) -> str:
@@ -179,14 +176,6 @@ MARK = "{topic}"
 STDOUT = "-"
 
 
-class UnknownFieldError(Exception):
-    """The type of a topic has no such field."""
-
-    def __init__(self, message: str, topic: str) -> None:
-        super().__init__(message)
-        self.topic = topic
-
-
 #: Called with a topic, the number of messages done, and of all.
 Progress = Callable[[str, int, int], None]
 
@@ -247,7 +236,7 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
             warnings.simplefilter("always")
             for job in _jobs(recording, options, report):
                 with _problems(options, report):
-                    done.append(_written(job, options, progress))
+                    done += _written(job, options, report, progress)
         for message in (warning.message for warning in caught):
             if isinstance(message, OtherDefinitionWarning):
                 report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
@@ -261,14 +250,11 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
 
 @contextmanager
 def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
-    """Report problems of a recording, or of the topics and fields that were selected."""
+    """Report problems of a recording, or of the topics that were selected."""
     try:
         yield
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
-    except UnknownFieldError as error:
-        hint = f"`idlc show {options.recordings[0]} {error.topic}` lists the fields"
-        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
     except RecordingError as error:
         where = ", ".join(options.recordings)
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
@@ -327,14 +313,18 @@ def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | 
     return None
 
 
-def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFile:
-    """Write the columns of one topic."""
+def _written(
+    job: Job, options: ColumnsOptions, report: Report, progress: Progress
+) -> Iterator[WrittenFile]:
+    """Write the columns of one topic, unless it has no such fields."""
     name, rows = job.topic.topic.name, 0
     flat = job.style == "csv" or not options.nested
     try:
         reader = job.topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
     except ValueError as error:
-        raise UnknownFieldError(str(error), name) from None
+        hint = f"`idlc show {options.recordings[0]} {name}` lists the fields"
+        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
+        return
 
     def counted() -> Iterator[pa.RecordBatch]:
         nonlocal rows
@@ -346,4 +336,4 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFi
     stdout = nullcontext(sys.stdout.buffer)
     with stdout if job.path == STDOUT else whole_file(job.path) as file:
         write(counted(), reader.schema, file, job.style)
-    return WrittenFile(name, job.path, rows)
+    yield WrittenFile(name, job.path, rows)

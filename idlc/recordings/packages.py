@@ -96,7 +96,9 @@ def recorded_packages(
         return [], {}
     types = recorded_types(groups[0], LocalTypes(scope, report), report)
     report.extend(contradicted(types))
-    names = types.names
+    names: dict[str, set[ir.TypeName]] = {}
+    for name in types.interfaces:
+        names.setdefault(name.package, set()).add(name)
     if whole:
         names = {package: set(types.library.interfaces(package)) for package in names}
     if not names:

@@ -30,9 +30,8 @@ LEAST_NANOSECONDS = 10**17
 #: No recording needs more.
 MOST_DIGITS = 20
 
-UNITS = {"h": 3600, "m": 60, "s": 1}
-#: Seconds of each unit that is always as long.
-NUMPY_UNITS = {
+#: Seconds of each unit that is always as long, as numpy calls them.
+UNITS = {
     "W": Fraction(604800),
     "D": Fraction(86400),
     "h": Fraction(3600),
@@ -90,9 +89,9 @@ def _of_numpy(value: Any, start: Callable[[], int]) -> int:
         months = count * factor * (12 if unit == "Y" else 1)
         year = min(max(1970 + months // 12, datetime.min.year), datetime.max.year)
         return _nanoseconds(datetime(year, months % 12 + 1, 1, tzinfo=timezone.utc))
-    if unit not in NUMPY_UNITS:  # how long a year is depends on which
+    if unit not in UNITS:  # how long a year is depends on which
         raise _no_time(value)
-    length = ceil(count * factor * NUMPY_UNITS[unit] * SECOND)
+    length = ceil(count * factor * UNITS[unit] * SECOND)
     return length if kind == "M" else start() + length
 
 
@@ -353,12 +352,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
     """
 
     def __init__(
-        self,
-        path: Any,
-        *,
-        index: bool = True,
-        check: bool = False,
-        include: Iterable[str] = (),
+        self, path: Any, *, index: bool = True, check: bool = False, include: Iterable[str] = ()
     ) -> None:
         self._include = tuple(map(str, include))
         self._container: Container = open_recording(path, index=index, check=check)
@@ -386,7 +380,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
         if len(topics) > 1:
             kinds = ", ".join(sorted({topic.type for topic in topics}))
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
-        return RecordedTopic(self._container, topics[0], include=self._include)
+        return RecordedTopic(self._container, topics[0], ALWAYS, self._include)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -421,11 +415,7 @@ class RecordedTopic(Selection):
     """The messages of one topic of an open recording."""
 
     def __init__(
-        self,
-        container: Container,
-        topic: Topic,
-        window: Window = ALWAYS,
-        include: tuple[str, ...] = (),
+        self, container: Container, topic: Topic, window: Window, include: tuple[str, ...]
     ) -> None:
         super().__init__(topic, include)
         self._container = container

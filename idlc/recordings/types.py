@@ -220,10 +220,11 @@ def recorded_types(version: Version, local: LocalTypes, report: Report) -> Recor
     """
     problems, others = Report(), Report()
     types = RecordedTypes(version, local, problems, {})
+    faulty = {diagnostic.where[0] for diagnostic in types.errors}
     broken = {
         **dict.fromkeys(types.empty, ABSENT),
         **dict.fromkeys(types.wrong, WRONG),
-        **dict.fromkeys(types.broken, UNREADABLE),
+        **{name: UNREADABLE for name, own in types.texts.items() if own.path in faulty},
     }
     broken = {name: why for name, why in broken.items() if local.library.source(name) is not None}
     if broken:
@@ -249,6 +250,7 @@ class RecordedTypes:
         self._names: dict[ir.TypeName, set[ir.TypeName]] = {}
         texts = {name: source for name, source in version.texts.items() if name not in broken}
         texts |= _empty_ones(version.topics, texts, local)
+        self.texts = texts
         scope, own = local.scope, local.near
         self.library = Library(
             scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts
@@ -302,19 +304,6 @@ class RecordedTypes:
                 codes.MISSING_DEFINITION.of(recording, f"{listed} is left out: {why}", hint=hint)
             )
 
-    @property
-    def texts(self) -> Mapping[ir.TypeName, Source]:
-        """The definitions of the recording."""
-        return self.library.texts
-
-    @property
-    def names(self) -> dict[str, set[ir.TypeName]]:
-        """The names of all that is needed, by package."""
-        names: dict[str, set[ir.TypeName]] = {}
-        for name in self.interfaces:
-            names.setdefault(name.package, set()).add(name)
-        return names
-
     def _substitutions(self) -> Iterator[Diagnostic]:
         """Yield IDL652 or IDL654 for definitions that are not the recording's.
 
@@ -349,12 +338,6 @@ class RecordedTypes:
         return self._names[name]
 
     @property
-    def broken(self) -> set[ir.TypeName]:
-        """The definitions of the recording that have errors."""
-        wrong = {diagnostic.where[0] for diagnostic in self.errors}
-        return {name for name, source in self.texts.items() if source.path in wrong}
-
-    @property
     def wrong(self) -> set[ir.TypeName]:
         """The definitions that differ from the local ones, where these have the recorded hash."""
         contents = Contents()
@@ -368,8 +351,7 @@ class RecordedTypes:
             if digest == self._local.hash(typed.name, typed.interface):
                 for name in self.names_of(typed) & self.texts.keys():
                     local_source = self._local.library.source(name)
-                    recorded = self.texts[name]
-                    if local_source is None or not contents.same(name, recorded, local_source):
+                    if not (local_source and contents.same(name, self.texts[name], local_source)):
                         names.add(name)
         return names
 

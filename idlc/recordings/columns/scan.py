@@ -99,7 +99,7 @@ def placed(level: Level, at: Any, phase: Any) -> tuple[dict[int, Any], Any]:
 
 
 def repeat_fixed(
-    level: Level, cursors: Cursors, counts: Any, result: ScanResult | None, first: int
+    level: Level, cursors: Cursors, counts: Any, result: ScanResult, first: int
 ) -> None:
     """Scan elements of fixed size with gaps.
 
@@ -118,7 +118,7 @@ def repeat_fixed(
     cursor.advance((counts - 1) * distance)
     cursors.at = cursors.at.copy()
     cursors.at[some] = cursor.at
-    if result is None or not level.wanted:
+    if not level.wanted:
         return
     owner = np.repeat(np.arange(len(some)), counts)
     firsts = np.cumsum(counts) - counts

@@ -6,24 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from idlc.recordings.columns.plan import (
-    Instant,
-    Level,
-    List,
-    Node,
-    Numbers,
-    Segment,
-    Struct,
-    Text,
-)
+from idlc.recordings.columns.plan import Instant, Level, List, Node, Numbers, Segment, Struct, Text
 from idlc.recordings.columns.scan import ScanResult, joined
-from idlc.recordings.columns.source import (
-    Place,
-    Source,
-    narrow_texts,
-    offsets_of,
-    wide_texts,
-)
+from idlc.recordings.columns.source import Place, Source, narrow_texts, offsets_of, wide_texts
 from idlc.recordings.columns.values import Columns, Ragged
 
 

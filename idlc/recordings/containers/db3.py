@@ -80,7 +80,11 @@ class Db3File(File):
     def _is_in_use(self) -> bool:
         """Return whether a journal or log has something that the file has not, or may have."""
         journal = self._path.with_name(self._path.name + "-journal")
-        return _begins(self._log) or _begins(journal)
+        # an empty one has nothing, and one that is done may be marked with zeros
+        return any(
+            path.is_file() and first_bytes(path, 1) not in (b"", b"\0")
+            for path in (self._log, journal)
+        )
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
@@ -88,21 +92,19 @@ class Db3File(File):
         try:
             yield
         except (sqlite3.Error, OSError, OverflowError, UnicodeError) as error:
-            raise self._error(str(error)) from None
-
-    def _error(self, what: str) -> RecordingError:
-        """Return an error with a hint for a problem that SQLite reports."""
-        repair = f"sqlite3 {shlex.quote(self.name)} .schema"
-        if "readonly" in what:  # it would have to write to roll back
-            why = "is not whole: its writer stopped in the middle of a transaction"
-            return RecordingError(f"`{self.name}` {why}", f"SQLite undoes it: {repair}")
-        if "locked" in what:
-            why = "is locked by the program that writes it"
-            return RecordingError(f"`{self.name}` {why}", "try again when that has ended")
-        if "unable to open" in what and self._is_in_use():
-            why = f"cannot be read with its `{self._log.name}`, which needs a file beside it"
-            return RecordingError(f"`{self.name}` {why}", "copy both to a folder of your own")
-        return RecordingError(f"`{self.name}` cannot be read: {what}")
+            what, hint = str(error), None
+            if "readonly" in what:  # it would have to write to roll back
+                why = "is not whole: its writer stopped in the middle of a transaction"
+                hint = f"SQLite undoes it: sqlite3 {shlex.quote(self.name)} .schema"
+            elif "locked" in what:
+                why = "is locked by the program that writes it"
+                hint = "try again when that has ended"
+            elif "unable to open" in what and self._is_in_use():
+                why = f"cannot be read with its `{self._log.name}`, which needs a file beside it"
+                hint = "copy both to a folder of your own"
+            else:
+                why = f"cannot be read: {what}"
+            raise RecordingError(f"`{self.name}` {why}", hint) from None
 
     def _rows(
         self, query: str, values: tuple[Any, ...] = ()
@@ -258,8 +260,3 @@ class Db3File(File):
                     if size >= GROUP:
                         return times, raws, row + 1
         return times, raws, rows.last + 1
-
-
-def _begins(path: Path) -> bool:
-    """Return whether there is a journal or log that is not empty, or marked as done with zeros."""
-    return path.is_file() and first_bytes(path, 1) not in (b"", b"\0")

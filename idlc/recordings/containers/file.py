@@ -132,10 +132,8 @@ def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:
     if kind:
         what = f"messages of `{topic}` are written as {kind}, and idlc reads only plain CDR"
         return UnreadTopic(what, "record them from a publisher whose data representation is XCDR1")
-    for magic, name in _COMPRESSIONS.items():
-        if start.startswith(magic):
-            what = (
-                f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
-            )
-            return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")
-    return None
+    name = next((name for magic, name in _COMPRESSIONS.items() if start.startswith(magic)), None)
+    if name is None:
+        return None
+    what = f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
+    return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")
