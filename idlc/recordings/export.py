@@ -129,9 +129,9 @@ def write(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any, style
     """Write batches to an open file in a format."""
     import pyarrow as pa
 
-    nothing = pa.RecordBatch.from_arrays(
-        [pa.nulls(0, type_) for type_ in schema.types], schema=schema
-    )
+    # its conversion has the schema of all that is converted
+    nulls = [pa.nulls(0, type_) for type_ in schema.types]
+    nothing = pa.RecordBatch.from_arrays(nulls, schema=schema)
     if style == "parquet":
         from pyarrow import parquet
 

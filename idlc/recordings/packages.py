@@ -42,14 +42,11 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
 def check_versions(groups: Sequence[Version], report: Report) -> None:
     """Report IDL653 for each name with several definitions."""
     for name, first, second in contradictions(groups):
-        report.add(
-            codes.SEVERAL_DEFINITIONS.at(
-                Span(second, 0, 0),
-                f"this defines `{name}` in another way",
-                labels=(Label(Span(first, 0, 0), "this is the other"),),
-                hint="choose topics that agree, or one recording after the other",
-            )
-        )
+        message = f"this defines `{name}` in another way"
+        other = Label(Span(first, 0, 0), "this is the other")
+        hint = "choose topics that agree, or one recording after the other"
+        here = Span(second, 0, 0)
+        report.add(codes.SEVERAL_DEFINITIONS.at(here, message, labels=(other,), hint=hint))
 
 
 def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:

@@ -300,9 +300,8 @@ class RecordedTypes:
         for (recording, why), names in missing.items():
             listed = first_few((f"`{name}`" for name in names), NAMED)
             hint = None if "no type of" in why else f"{including('DIR')} with the package's sources"
-            report.add(
-                codes.MISSING_DEFINITION.of(recording, f"{listed} is left out: {why}", hint=hint)
-            )
+            message = f"{listed} is left out: {why}"
+            report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
 
     def _substitutions(self) -> Iterator[Diagnostic]:
         """Yield IDL652 or IDL654 for definitions that are not the recording's.
@@ -321,11 +320,8 @@ class RecordedTypes:
             names = first_few((f"`{name}`" for name in sorted(undefined)), NAMED)
             which = "has the recorded hash and" if sure else "by that name"
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
-            yield code.of(
-                recording,
-                f"{why} {names}; what is known here {which} is used",
-                hint=None if sure else BORROWED,
-            )
+            message = f"{why} {names}; what is known here {which} is used"
+            yield code.of(recording, message, hint=None if sure else BORROWED)
 
     def names_of(self, topic: DefinedTopic) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of, without those that ROS 2 adds."""

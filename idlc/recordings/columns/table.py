@@ -80,14 +80,15 @@ class Table:
             }
             return Columns(columns, count)
         if node.step is not None:
-            return self.sequences(elements, node.step)
+            offsets, elements, numbers = self.inside(elements, node.step)
+            return Ragged(offsets, self.column(node.element, elements.total, elements, numbers))
         assert node.size is not None
         every = count * node.size
         inner = self.column(node.element, every, elements, numbers, depth + 1)
         return Ragged(np.arange(count + 1) * node.size, inner)
 
-    def sequences(self, around: Elements, step: List) -> Ragged:
-        """Return a column of sequences, or of arrays whose elements are not of fixed size."""
+    def inside(self, around: Elements, step: List) -> tuple[Any, Elements, dict[int, Any]]:
+        """Return the offsets of a column of sequences, their elements, and the numbers in these."""
         assert step.key is not None
         counts = self.sorted(around, self.scanned.size[step.key])
         offsets = offsets_of(counts)
@@ -108,7 +109,7 @@ class Table:
             self.cut(packed, Place(content, 0, (elements.total,), (size,)), numbers)
         elif not packed:
             numbers = self.numbers(elements)
-        return Ragged(offsets, self.column(level.node, elements.total, elements, numbers))
+        return offsets, elements, numbers
 
     def numbers(self, elements: Elements) -> dict[int, Any]:
         """Return the numbers of a level, perhaps as views of the buffer, by their keys."""

@@ -79,12 +79,9 @@ class Db3File(File):
 
     def _is_in_use(self) -> bool:
         """Return whether a journal or log has something that the file has not, or may have."""
-        journal = self._path.with_name(self._path.name + "-journal")
+        logs = (self._log, self._path.with_name(self._path.name + "-journal"))
         # an empty one has nothing, and one that is done may be marked with zeros
-        return any(
-            path.is_file() and first_bytes(path, 1) not in (b"", b"\0")
-            for path in (self._log, journal)
-        )
+        return any(path.is_file() and first_bytes(path, 1) not in (b"", b"\0") for path in logs)
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
@@ -128,10 +125,8 @@ class Db3File(File):
             if kind == "index":
                 continue
             if kind != "table" or str(text).split()[1:2] != ["TABLE"]:
-                kind = kind if kind != "table" else "virtual table"
-                raise RecordingError(
-                    f"`{self.name}` holds a {kind}, `{name}`, as no recording does"
-                )
+                what = f"a {kind if kind != 'table' else 'virtual table'}, `{name}`"
+                raise RecordingError(f"`{self.name}` holds {what}, as no recording does")
             quoted = '"' + str(name).replace('"', '""') + '"'
             columns = list(self._rows(f"PRAGMA table_xinfo({quoted})"))
             if any(column[6] in COMPUTED for column in columns):
@@ -140,10 +135,8 @@ class Db3File(File):
                 # it hides the numbers of rows, which no two have in common
                 raise RecordingError(f"`{self.name}`: a column of `{name}` is called rowid")
             tables[str(name)] = {str(column[1]) for column in columns}
-        for table, needed in (
-            ("topics", {"id", "name", "type"}),
-            ("messages", {"topic_id", "data"}),
-        ):
+        required = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "data"}}
+        for table, needed in required.items():
             if not needed <= tables.get(table, set()):
                 raise RecordingError(f"`{self.name}` is no recording: it has no table of {table}")
         return tables
@@ -155,9 +148,8 @@ class Db3File(File):
         digest = "type_description_hash" if "type_description_hash" in own else "''"
         query = f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id"  # noqa: S608 # ours
         definitions = self._definitions(columns.get("message_definitions", set()))
-        counts = dict(
-            self._rows("SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id")
-        )
+        counting = "SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id"
+        counts = dict(self._rows(counting))
         for number, *texts in self._rows(query):
             if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
                 raise RecordingError(f"`{self.name}`: a topic has values of other types")

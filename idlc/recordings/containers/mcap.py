@@ -197,10 +197,8 @@ def _add_loose(source: Source, facts: Facts, start: int) -> None:
     """
     facts.chunks.sort(key=lambda chunk: chunk.at)
     walk, end = _Walk(source), len(MAGIC)
-    for at, following in [
-        *((chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks),
-        (start, start),
-    ]:
+    ranges = [(chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks]
+    for at, following in (*ranges, (start, start)):
         if at < end:
             raise RecordingError("its summary names chunks that are not there")
         for op, place, size in heads(source, end, at):
@@ -279,9 +277,8 @@ class _Walk:
             self.damaged = True
             content, counts = memoryview(b""), named
             first, last = head.first, head.last
-        for (op, _, data), _ in zip(
-            records.read_records(content), self.room.records(), strict=False
-        ):
+        every = zip(records.read_records(content), self.room.records(), strict=False)
+        for (op, _, data), _ in every:
             if op != MESSAGE_OP:
                 self.facts.add(op, data)
             elif len(data) >= CHANNEL_AND_TIME.size:
