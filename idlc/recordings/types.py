@@ -249,7 +249,16 @@ class RecordedTypes:
         self._local = local
         self._names: dict[ir.TypeName, set[ir.TypeName]] = {}
         texts = {name: source for name, source in version.texts.items() if name not in broken}
-        texts |= _empty_ones(version.topics, texts, local)
+        for topic in version.topics:
+            name = topic.interface
+            if name is None or name.kind != "msg" or name in texts:
+                continue
+            # it may be empty because it has no fields, as its hash says, or else the local
+            # definition; otherwise it may be one that the recorder did not find
+            empty = Describer({name: ir.Message(name=name)}).hash(str(name))
+            if (topic.topic.hash or local.hash(name, name)) == empty:
+                path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
+                texts[name] = Source(path, "", topic.recording)
         self.texts = texts
         scope, own = local.scope, local.near
         self.library = Library(
@@ -382,21 +391,3 @@ class RecordedTypes:
     def hash(self, topic: DefinedTopic) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
         return _hash_in(self.models[topic.name.package], topic.name)
-
-
-def _empty_ones(
-    topics: Iterable[RecordedDefinition], texts: Mapping[ir.TypeName, Source], local: LocalTypes
-) -> Iterator[tuple[ir.TypeName, Source]]:
-    """Yield the messages whose definitions are empty because they have no fields.
-
-    Their recorded hashes say so, or else the local definition. Otherwise an empty definition may
-    be one that the recorder did not find.
-    """
-    for topic in topics:
-        name, recorded = topic.interface, topic.topic.hash
-        if name is None or name.kind != "msg" or name in texts:
-            continue
-        empty = Describer({name: ir.Message(name=name)}).hash(str(name))
-        if (recorded or local.hash(name, name)) == empty:
-            path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
-            yield name, Source(path, "", topic.recording)

@@ -235,7 +235,10 @@ class _Builder:
         level.node = inside.element(field, wanted)
         packed = level.packed
         if packed and field.size is not None:
-            self.array(packed, field.size)
+            segment, offset = self.place(packed.align, field.size * packed.size)
+            for leaf in packed.leaves:
+                repeats = ((field.size, packed.size), *leaf.repeats)
+                segment.leaves.append(leaf._replace(offset=offset + leaf.offset, repeats=repeats))
             return Lists(field.size, None, level.node)
         key = None if wanted == NOTHING else next(self.keys)
         least = min(least_element(field), MOST_BYTES)
@@ -269,13 +272,6 @@ class _Builder:
         if wanted is None:
             segment.leaves.append(Leaf(key, offset, code, () if size is None else ((size, width),)))
         return Numbers(key, code, size)
-
-    def array(self, element: Segment, size: int) -> None:
-        """Plan an array of structures that are one segment each."""
-        segment, offset = self.place(element.align, size * element.size)
-        for leaf in element.leaves:
-            repeats = ((size, element.size), *leaf.repeats)
-            segment.leaves.append(leaf._replace(offset=offset + leaf.offset, repeats=repeats))
 
     def place(self, align: int, size: int) -> tuple[Segment, int]:
         """Plan bytes of fixed size; return where they are."""

@@ -338,16 +338,13 @@ class McapFile(File):
         with of_file(self.name):
             self.facts = read_facts(self.source, index, check) if read else Facts()
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
-        self.topics = [(self._topic(number), number) for number in self.facts.channels]
-
-    def _topic(self, number: int) -> Topic:
-        channel = self.facts.channels[number]
-        schema = self.facts.schemas.get(channel.schema)
-        name = schema.name if schema else ""
-        count = self.facts.counts.get(number, 0)
-        digest = channel.metadata.get("topic_type_hash") or None
-        recorded = recorded_schema(schema) if schema else None
-        return Topic(channel.topic, name, count, digest, channel.encoding, recorded)
+        self.topics = []
+        for number, channel in self.facts.channels.items():
+            schema, count = self.facts.schemas.get(channel.schema), self.facts.counts.get(number, 0)
+            kind, recorded = (schema.name, recorded_schema(schema)) if schema else ("", None)
+            digest = channel.metadata.get("topic_type_hash") or None
+            topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded)
+            self.topics.append((topic, number))
 
     @property
     def start(self) -> int | None:
