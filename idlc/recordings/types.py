@@ -264,11 +264,11 @@ class RecordedTypes:
         self.library = Library(
             scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts
         )
-        self.topics = tuple(self._typed(version.topics, report))
-        self._compiler = Compiler(self.library)
-        self.interfaces = self._compiler.reached(typed.interface for typed in self.topics)
+        self.topics = tuple(self._typed(version, report))
+        compiler = Compiler(self.library)
+        self.interfaces = compiler.reached(typed.interface for typed in self.topics)
         every = Report()
-        self.models = self._compiler.models(self.interfaces, every)
+        self.models = compiler.models(self.interfaces, every)
         if not every.had_errors:
             extents: ContentSizes = {}
             for model in self.models.values():
@@ -280,12 +280,10 @@ class RecordedTypes:
             self.models = {name: model.sound(faulty) for name, model in self.models.items()}
         report.extend(self._substitutions())
 
-    def _typed(
-        self, topics: Iterable[RecordedDefinition], report: Report
-    ) -> Iterator[DefinedTopic]:
+    def _typed(self, version: Version, report: Report) -> Iterator[DefinedTopic]:
         """Yield the topics whose types are known; report the others."""
         missing: dict[tuple[str, str], list[str]] = {}
-        for topic in topics:
+        for topic in version.topics:
             recorded, name, interface = topic.topic, topic.name, topic.interface
             schema = recorded.schema
             if not recorded.type:
