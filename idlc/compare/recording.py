@@ -54,7 +54,7 @@ def compare_with_recordings(
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
     for version in versions(topics):
-        types = recorded_types(version, local.types, options.scope, report)
+        types = recorded_types(version, local.types, report)
         models = types.models.values()
         report.extend(types.errors)
         for old, new in local.pairs(models, types.texts):

@@ -157,7 +157,7 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     local = LocalTypes(scope, report)
     facts = []
     for version in versions(recording.topics) if recording else ():
-        types = recorded_types(version, local, scope, Report())
+        types = recorded_types(version, local, Report())
         own = (typed for typed in types.topics if typed.interface in types.texts)
         # a name may stand for several topics, of different types
         hashes = {id(typed.recorded): types.hash(typed) for typed in own}
@@ -190,7 +190,7 @@ def definitions(
     recorded = topics_of([path], selected, scope.root, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
-        types = recorded_types(version, local, scope, report)
+        types = recorded_types(version, local, report)
         for name in dict.fromkeys(typed.interface for typed in types.topics):
             model = types.models[name.package]
             if name in model.interfaces:

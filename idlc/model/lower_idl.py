@@ -6,76 +6,86 @@ spelling of a text.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import msgspec
+from lark import Token, Transformer, v_args
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.diagnostics.source import Span
+from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import including
-from idlc.language import idl
 from idlc.language.escapes import inside_literal
+from idlc.language.idl import IdlFile, piece
 from idlc.language.tree import OPTIONAL, Fault, Piece
 from idlc.model import ir, lower_types, lower_values, names
 from idlc.model.lower_types import STRINGS, as_parsed, positive
 from idlc.model.lower_values import MAX_ELEMENTS
 
+#: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
+_PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}
 #: The annotations that ROS 2's adapter writes.
 ANNOTATIONS = frozenset({"verbatim", "default", "unit", "optional"})
-#: The literal that the adapter writes between the lines of a comment.
-_LINE_END = '"\\n"'
+_CONSTANTS = "_Constants"
+_DUMMY = (ir.DUMMY_FIELD, ir.Primitive("uint8"))
 
 
-def parameter(annotations: Iterable[idl.Annotation], name: str, key: str) -> idl.Value | None:
+class _Value(NamedTuple):
+    """A number, `TRUE` or `FALSE` as written; or texts in quotes, joined."""
+
+    words: str
+    is_text: bool
+    start: int
+    end: int
+
+
+class _Type(NamedTuple):
+    """A type and its name in the text, for problems with it."""
+
+    type: ir.FieldType
+    piece: Piece
+
+
+class _Annotation(NamedTuple):
+    """`@name (parameter=value, ...)`."""
+
+    name: Piece
+    parameters: Mapping[str, _Value]
+
+
+def _parameter(annotations: Iterable[_Annotation], name: str, key: str) -> _Value | None:
     """Return a parameter of the first annotation of a name, or `None`."""
     matches = (annotation.parameters for annotation in annotations if annotation.name.text == name)
     return next(matches, {}).get(key)
 
 
-def comment(annotations: Iterable[idl.Annotation]) -> tuple[str, ...]:
-    """Return the lines of a comment: a literal for each, and line ends between them."""
-    value = parameter(annotations, "verbatim", "text")
-    if value is None:
-        return ()
-    between = value.pieces[1::2]
-    if len(value.pieces) % 2 and all(piece.text == _LINE_END for piece in between):
-        return tuple(_inside(piece) for piece in value.pieces[::2])
-    return tuple(text(value).split("\n"))
+def _comment(annotations: Iterable[_Annotation]) -> tuple[str, ...]:
+    value = _parameter(annotations, "verbatim", "text")
+    return tuple(value.words.split("\n")) if value else ()
 
 
-def unit(annotations: Iterable[idl.Annotation]) -> str | None:
-    """Return the unit in `@unit`."""
-    value = parameter(annotations, "unit", "value")
-    return None if value is None else text(value)
-
-
-def text(value: idl.Value) -> str:
-    """Return the texts of a value as one; a number as written."""
-    return "".join(map(_inside, value.pieces)) if value.is_text else value.pieces[0].text
-
-
-def _inside(piece: Piece) -> str:
+def _inside(literal: str) -> str:
     try:
-        return inside_literal(piece.text[1:-1])
+        return inside_literal(literal[1:-1])
     except ValueError:  # an incomplete escape, which rosidl would not have written
-        return piece.text[1:-1]
+        return literal[1:-1]
 
 
-def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
-    """Return the value of `@default`, or its fault."""
-    words = text(value)
+def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
+    """Return the value of `@default` or of a constant; a fault's offsets count from its start."""
+    words = value.words
     if not value.is_text and isinstance(type_, ir.Primitive):
-        lowered = lower_values.default(type_, words)
-        return lowered.moved(value.whole.start) if isinstance(lowered, Fault) else lowered
+        return lower_values.default(type_, words)
     if value.is_text and isinstance(type_, ir.String) and _fits(type_, words):
         return ir.Default(words, words)
     if value.is_text and isinstance(type_, (ir.Array, ir.Sequence)):
         values = _elements(type_, words)
         if values is not None:
-            wrong = lower_values.wrong_length(type_, len(values), value.whole.text)
-            return wrong.moved(value.whole.start) if wrong else ir.Default(values, words)
+            wrong = lower_values.wrong_length(type_, len(values), words)
+            return wrong or ir.Default(values, words)
     message = f"this is no value of type `{ir.spell(type_)}`"
-    return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
+    return Fault(codes.BAD_VALUE, message, 0, value.end - value.start)
 
 
 def _elements(type_: ir.Array | ir.Sequence, words: str) -> tuple[ir.Scalar, ...] | None:
@@ -103,190 +113,194 @@ def _fits(type_: ir.Element, value: object) -> bool:
     return False
 
 
-#: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
-_PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}
-_CONSTANTS = "_Constants"
-
-
-def lower_idl(file: idl.IdlFile, names: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
+def lower_idl(file: IdlFile, names: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
     """Return the structures of these names from a file, which must hold no others."""
-    return _Lowering(file, report).structures(names)
+    lowering = _Lowering(file.source, names, report)
+    if file.broken is None:
+        lowering.transform(file.tree)
+    else:
+        word = f"`{file.broken.text}`" if file.broken.text else "this end of the text"
+        _add_foreign(file.source, file.broken, word, report)
+    return [*lowering.messages.values()]
 
 
-class _Type(NamedTuple):
-    """A type and its name in the text, for problems with it."""
+def _add_foreign(source: Source, part: Piece, subject: str, report: Report) -> None:
+    message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
+    hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
+    span = Span(source, part.start, part.end)
+    report.add(codes.FOREIGN_IDL.at(span, message, hint=hint))
 
-    type: ir.FieldType
-    piece: Piece
 
+@v_args(inline=True)
+class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x only
+    """Lowers the tree of one file; its public methods are the rules of the grammar."""
 
-class _Lowering:
-    """Lowers one file; holds the state that its steps share."""
+    def __init__(self, source: Source, names: Sequence[ir.TypeName], report: Report) -> None:
+        super().__init__()
+        self.messages = {name.name: ir.Message(name=name, source=source) for name in names}
+        self._source = source
+        self._top = names[0]
+        self._report = report
+        self._missing = [name.name for name in names]
+        self._typedefs: dict[str, _Type] = {}
+        self._strange = False
 
-    def __init__(self, file: idl.IdlFile, report: Report) -> None:
-        self.file = file
-        self.report = report
-        self.typedefs: dict[str, _Type] = {}
-        self.strange = False
+    def file(self, *parts: Any) -> None:
+        package, kind = (piece(part) for part in parts if isinstance(part, Token))
+        for name, written in ((package, self._top.package), (kind, self._top.kind)):
+            if name.text != written:
+                self._foreign(name, f"module `{name.text}` for `{self._top}`")
+        for missing in () if self._strange else self._missing:
+            self._foreign(kind, f"a module without `{missing}`")
 
-    def structures(self, names: Sequence[ir.TypeName]) -> list[ir.Message]:
-        if self.file.broken is not None:
-            word = f"`{self.file.broken.text}`" if self.file.broken.text else "this end of the text"
-            self._foreign(self.file.broken, word)
-            return [ir.Message(name=name, source=self.file.source) for name in names]
-        top, file = names[0], self.file
-        for piece, written in ((file.package, top.package), (file.kind, top.kind)):
-            if piece.text != written:
-                self._foreign(piece, f"module `{piece.text}` for `{top}`")
-        constants: dict[str, list[ir.Constant]] = {}
-        structures: dict[str, idl.Structure] = {}
-        expected = {name.name for name in names}
-        for part in self.file.parts:
-            name = part.name.text.removesuffix(_CONSTANTS)
-            if isinstance(part, idl.Typedef):
-                self._typedef(part)
-            elif name not in expected:
-                self._foreign(part.name, f"`{part.name.text}` among the parts of `{names[0]}`")
-            elif isinstance(part, idl.Constants):
-                lowered = map(self._constant, part.constants)
-                constants.setdefault(name, []).extend(constant for constant in lowered if constant)
-            elif structures.setdefault(name, part) is not part:
-                self._foreign(part.name, f"a second `{name}`")
-        if not self.strange:
-            for name in expected - structures.keys():
-                self._foreign(self.file.kind, f"a module without `{name}`")
-        return [self._structure(name, structures.get(name.name), constants) for name in names]
-
-    def _foreign(self, piece: Piece, subject: str) -> None:
-        self.strange = True
-        message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
-        hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
-        self.report.add(codes.FOREIGN_IDL.at(self.file.span(piece), message, hint=hint))
-
-    def _fault(self, fault: Fault) -> None:
-        span = Span(self.file.source, fault.start, fault.end)
-        self.report.add(fault.code.at(span, fault.message, hint=fault.hint))
-
-    def _structure(
-        self,
-        name: ir.TypeName,
-        structure: idl.Structure | None,
-        constants: dict[str, list[ir.Constant]],
-    ) -> ir.Message:
-        fields = [self._field(member) for member in structure.members] if structure else []
-        dummy = ir.DUMMY_FIELD, ir.Primitive("uint8")
-        if [(field.name, field.type) for field in fields] == [dummy]:
-            fields = []
-        return ir.Message(
-            name=name,
-            fields=tuple(fields),
-            constants=tuple(constants.get(name.name, ())),
-            comment=comment(structure.annotations) if structure else (),
-            source=self.file.source,
-        )
-
-    def _typedef(self, typedef: idl.Typedef) -> None:
-        target = self._type(typedef.type)
+    def typedef(self, target: _Type, name: Token, size: Token | None = None) -> None:
         type_ = target.type
-        if size := self._positive(typedef.size, "the array's size"):
+        if length := self._positive(size, "the array's size"):
             if isinstance(type_, (ir.Array, ir.Sequence)):
-                self._foreign(typedef.name, "an array of arrays")
+                self._foreign(piece(name), "an array of arrays")
                 type_ = ir.Unknown()
             else:
-                type_ = ir.Array(type_, size)
-        self.typedefs[typedef.name.text] = _Type(type_, target.piece)
+                type_ = ir.Array(type_, length)
+        self._typedefs[str(name)] = _Type(type_, target.piece)
 
-    def _positive(self, piece: Piece | None, subject: str) -> int | None:
-        size = None if piece is None else positive(piece, subject)
+    def sequence(self, element: _Type, bound: Token | None = None) -> _Type:
+        if isinstance(element.type, (ir.Array, ir.Sequence)):
+            self._foreign(element.piece, "a sequence of arrays")
+            return _Type(ir.Unknown(), element.piece)
+        most = self._positive(bound, "the array's size")
+        return _Type(as_parsed(ir.Sequence(element.type, most)), element.piece)
+
+    def element(self, *tokens: Token) -> _Type:
+        bound = tokens[-1] if tokens[-1].type == "SIZE" else None
+        parts = [str(token) for token in tokens if token is not bound]
+        whole = Piece("::".join(parts), piece(tokens[0]).start)
+        if whole.text in STRINGS:
+            length = self._positive(bound, "the string's bound")
+            return _Type(ir.String(STRINGS[whole.text], length), whole)
+        if bound is None:
+            if whole.text in _PRIMITIVES:
+                return _Type(_PRIMITIVES[whole.text], whole)
+            if whole.text in self._typedefs:
+                return self._typedefs[whole.text]
+            match parts:
+                case [package, "msg", name] if names.is_package_name(
+                    package
+                ) and names.is_message_name(name):
+                    return _Type(ir.Ref(ir.TypeName(package, "msg", name)), whole)
+        self._foreign(whole, f"the type `{whole.text}`")
+        return _Type(ir.Unknown(), whole)
+
+    def annotation(self, name: Token, *parameters: tuple[str, _Value]) -> _Annotation:
+        return _Annotation(piece(name), dict(parameters))
+
+    def parameter(self, name: Token, value: _Value) -> tuple[str, _Value]:
+        return str(name), value
+
+    def value(self, *tokens: Token) -> _Value:
+        is_text = tokens[0].type == "STRING"
+        words = "".join(map(_inside, tokens)) if is_text else str(tokens[0])
+        return _Value(words, is_text, piece(tokens[0]).start, piece(tokens[-1]).end)
+
+    def struct(self, *parts: Any) -> None:
+        at = next(i for i, part in enumerate(parts) if isinstance(part, Token))
+        name = str(parts[at])
+        if message := self._message(parts[at], name):
+            if name not in self._missing:
+                self._foreign(piece(parts[at]), f"a second `{name}`")
+                return
+            self._missing.remove(name)
+            fields = parts[at + 1 :]
+            if [(field.name, field.type) for field in fields] == [_DUMMY]:
+                fields = ()
+            comment = _comment(parts[:at])
+            self.messages[name] = msgspec.structs.replace(message, fields=fields, comment=comment)
+
+    def constants(self, token: Token, *constants: ir.Constant | None) -> None:
+        name = token.removesuffix(_CONSTANTS)
+        if message := self._message(token, name):
+            every = (*message.constants, *filter(None, constants))
+            self.messages[name] = msgspec.structs.replace(message, constants=every)
+
+    def member(self, *parts: Any) -> ir.Field:
+        *annotations, (type_, at), token = parts
+        name = self._name(token, annotations, lower_types.field_name)
+        value = _parameter(annotations, "default", "value")
+        unit = _parameter(annotations, "unit", "value")
+        return ir.Field(
+            name=name.text,
+            type=type_,
+            default=value and self._default(type_, value),
+            comment=_comment(annotations),
+            unit=unit and unit.words,
+            optional=any(annotation.name.text == OPTIONAL[1:] for annotation in annotations),
+            name_span=self._span(name),
+            type_span=self._span(at),
+        )
+
+    def constant(self, *parts: Any) -> ir.Constant | None:
+        *annotations, (type_, at), token, value = parts
+        name = self._name(token, annotations, lower_types.constant_name)
+        if not isinstance(type_, (ir.Primitive, ir.String)):
+            self._foreign(at, f"a constant of the type `{at.text}`")
+            return None
+        lowered = self._default(type_, value)
+        if lowered is None:
+            return None
+        assert not isinstance(lowered.value, tuple)
+        return ir.Constant(
+            name=name.text,
+            type=type_,
+            value=lowered.value,
+            comment=_comment(annotations),
+            name_span=self._span(name),
+        )
+
+    def _foreign(self, part: Piece, subject: str) -> None:
+        self._strange = True
+        _add_foreign(self._source, part, subject, self._report)
+
+    def _fault(self, fault: Fault) -> None:
+        span = Span(self._source, fault.start, fault.end)
+        self._report.add(fault.code.at(span, fault.message, hint=fault.hint))
+
+    def _span(self, part: Piece) -> Span:
+        return Span(self._source, part.start, part.end)
+
+    def _message(self, token: Token, name: str) -> ir.Message | None:
+        if name not in self.messages:
+            self._foreign(piece(token), f"`{token}` among the parts of `{self._top}`")
+        return self.messages.get(name)
+
+    def _positive(self, token: Token | None, subject: str) -> int | None:
+        size = None if token is None else positive(piece(token), subject)
         if not isinstance(size, Fault):
             return size
         self._fault(size)
         return None
 
-    def _type(self, type_: idl.Element | idl.Sequence) -> _Type:
-        if isinstance(type_, idl.Element):
-            return self._element(type_)
-        element, piece = self._element(type_.element)
-        if isinstance(element, (ir.Array, ir.Sequence)):
-            self._foreign(piece, "a sequence of arrays")
-            return _Type(ir.Unknown(), piece)
-        bound = self._positive(type_.bound, "the array's size")
-        return _Type(as_parsed(ir.Sequence(element, bound)), piece)
-
-    def _element(self, element: idl.Element) -> _Type:
-        piece = element.name
-        if piece.text in STRINGS:
-            bound = self._positive(element.bound, "the string's bound")
-            return _Type(ir.String(STRINGS[piece.text], bound), piece)
-        if element.bound is None:
-            if piece.text in _PRIMITIVES:
-                return _Type(_PRIMITIVES[piece.text], piece)
-            if piece.text in self.typedefs:
-                return self.typedefs[piece.text]
-            match element.parts:
-                case (package, "msg", name) if names.is_package_name(
-                    package
-                ) and names.is_message_name(name):
-                    return _Type(ir.Ref(ir.TypeName(package, "msg", name)), piece)
-        self._foreign(piece, f"the type `{piece.text}`")
-        return _Type(ir.Unknown(), piece)
-
-    def _check(self, member: idl.Member) -> None:
-        """Report unknown annotations, and a name that ROS 2 does not allow."""
-        for annotation in member.annotations:
+    def _name(
+        self,
+        token: Token,
+        annotations: Iterable[_Annotation],
+        fault_of: Callable[[str], Fault | None],
+    ) -> Piece:
+        """Return a name; report one that ROS 2 does not allow, and unknown annotations."""
+        for annotation in annotations:
             if annotation.name.text not in ANNOTATIONS:
                 self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
-        fault_of = lower_types.constant_name if member.value else lower_types.field_name
-        if fault := fault_of(member.name.text):
-            self._fault(fault.moved(member.name.start))
+        name = piece(token)
+        if fault := fault_of(name.text):
+            self._fault(fault.moved(name.start))
+        return name
 
-    def _field(self, member: idl.Member) -> ir.Field:
-        self._check(member)
-        type_, piece = self._type(member.type)
-        return ir.Field(
-            name=member.name.text,
-            type=type_,
-            default=self._default(type_, member.annotations),
-            comment=comment(member.annotations),
-            unit=unit(member.annotations),
-            optional=any(
-                f"@{annotation.name.text}" == OPTIONAL for annotation in member.annotations
-            ),
-            name_span=self.file.span(member.name),
-            type_span=self.file.span(piece),
-        )
-
-    def _default(
-        self, type_: ir.FieldType, annotations: Sequence[idl.Annotation]
-    ) -> ir.Default | None:
-        value = parameter(annotations, "default", "value")
+    def _default(self, type_: ir.FieldType, value: _Value) -> ir.Default | None:
         element = ir.element_of(type_)
-        if value is None or isinstance(element, ir.Unknown):
-            return None
         if isinstance(element, ir.Ref):
-            self._foreign(value.whole, "a default for a message")
+            self._foreign(Piece(value.words, value.start), "a default for a message")
+        if isinstance(element, (ir.Ref, ir.Unknown)):
             return None
-        lowered = default(type_, value)
+        lowered = _default(type_, value)
         if isinstance(lowered, Fault):
-            self._fault(lowered)
+            self._fault(lowered.moved(value.start))
             return None
         return lowered
-
-    def _constant(self, constant: idl.Member) -> ir.Constant | None:
-        self._check(constant)
-        type_, piece = self._type(constant.type)
-        if not isinstance(type_, (ir.Primitive, ir.String)) or constant.value is None:
-            self._foreign(piece, f"a constant of the type `{piece.text}`")
-            return None
-        lowered = default(type_, constant.value)
-        if isinstance(lowered, Fault):
-            self._fault(lowered)
-            return None
-        assert not isinstance(lowered.value, tuple)
-        return ir.Constant(
-            name=constant.name.text,
-            type=type_,
-            value=lowered.value,
-            comment=comment(constant.annotations),
-            name_span=self.file.span(constant.name),
-        )

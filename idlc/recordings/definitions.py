@@ -74,27 +74,18 @@ def read_definition(
     key = topic.schema, interface
     cache = {} if cache is None else cache
     if key not in cache:
-        cache[key] = _texts(topic, interface, recording)
+        texts: dict[ir.TypeName, Source] = {}
+        repeated = []
+        for own, extension, text in _definitions(topic, interface):
+            source = Source(f"{recording}: topic {topic.name}: {own}.{extension}", text, recording)
+            first = texts.setdefault(own, source)
+            # where a recorder finds no .msg file that it can use, it writes an empty one, then IDL
+            if not first.text and source.is_idl:
+                texts[own] = source
+            elif first.text != text and (text or not first.is_idl):
+                repeated.append((own, source))
+        cache[key] = texts, tuple(repeated)
     return RecordedDefinition(recording, topic, name, interface, *cache[key])
-
-
-def _texts(
-    topic: Topic, interface: ir.TypeName, recording: str
-) -> tuple[dict[ir.TypeName, Source], tuple[tuple[ir.TypeName, Source], ...]]:
-    """Return the texts that came with a topic, and others of the same names.
-
-    Where a recorder finds no .msg file that it can use, it writes an empty one and then the IDL.
-    """
-    texts: dict[ir.TypeName, Source] = {}
-    repeated = []
-    for name, extension, text in _definitions(topic, interface):
-        source = Source(f"{recording}: topic {topic.name}: {name}.{extension}", text, recording)
-        first = texts.setdefault(name, source)
-        if not first.text and source.is_idl:
-            texts[name] = source
-        elif first.text != text and (text or not first.is_idl):
-            repeated.append((name, source))
-    return texts, tuple(repeated)
 
 
 def type_name(text: str, kind: ir.Kind = "msg") -> ir.TypeName | None:
@@ -119,28 +110,19 @@ def interface_of(name: ir.TypeName) -> ir.TypeName:
 def _definitions(topic: Topic, root: ir.TypeName) -> Iterator[tuple[ir.TypeName, str, str]]:
     """Yield name, extension and text of each definition that came with a topic."""
     schema = topic.schema
-    if schema is None or schema.encoding not in ENCODINGS or _is_too_large(schema.text):
+    if schema is None or schema.encoding not in ENCODINGS:
         return
-    is_idl = schema.encoding == IDL
+    if len(schema.text) > MAX_TEXT or sum(map(schema.text.count, LINE_ENDS)) > MAX_LINES:
+        return
     head, *parts = _DELIMITER.split(schema.text)
-    if head.strip() and schema.encoding in ENCODINGS[:2] and _is_readable(head, is_idl):
-        yield root, "idl" if is_idl else root.kind, _tidy(head, is_idl)
+    definitions: list[tuple[ir.TypeName | None, bool, str]] = []
+    if head.strip() and schema.encoding in ENCODINGS[:2]:
+        definitions.append((root, schema.encoding == IDL, head))
     for mark, written, text in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
         name = type_name(written, _KINDS[mark])
-        if name is not None and _is_readable(text, mark == "IDL"):
-            own = interface_of(name)
-            yield own, "idl" if mark == "IDL" else own.kind, _tidy(text, mark == "IDL")
-
-
-def _is_too_large(text: str) -> bool:
-    return len(text) > MAX_TEXT or sum(map(text.count, LINE_ENDS)) > MAX_LINES
-
-
-def _is_readable(text: str, is_idl: bool) -> bool:
-    return not is_idl or len(text) <= MAX_IDL
-
-
-def _tidy(text: str, is_idl: bool) -> str:
-    """Return a text as every distribution reads it, without the line ends that recorders add."""
-    text = text.rstrip("\r\n") + "\n" if text.strip() else ""
-    return text if is_idl else _ODDITIES.sub(r"\1", text)
+        definitions.append((name and interface_of(name), mark == "IDL", text))
+    for own, is_idl, text in definitions:
+        if own is not None and (not is_idl or len(text) <= MAX_IDL):
+            # as every distribution reads it, without the line ends that recorders add
+            tidy = text.rstrip("\r\n") + "\n" if text.strip() else ""
+            yield own, "idl" if is_idl else own.kind, tidy if is_idl else _ODDITIES.sub(r"\1", tidy)

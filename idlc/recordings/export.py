@@ -40,29 +40,21 @@ def converted(batch: pa.RecordBatch, convert: Callable[[pa.Array], pa.Array]) ->
     return pa.RecordBatch.from_arrays(columns, schema=schema.with_metadata(batch.schema.metadata))
 
 
-def no_rows(schema: pa.Schema) -> pa.RecordBatch:
-    """Return a batch without rows, whose conversion has the schema of all that are converted."""
-    import pyarrow as pa
-
-    return pa.RecordBatch.from_arrays([pa.nulls(0, type_) for type_ in schema.types], schema=schema)
-
-
 def filled(column: pa.Array) -> pa.Array:
     """Return a column, of which nothing is null, as Parquet can hold it: no struct without fields.
 
     They get the field that ROS 2 adds for C++, for the same reason.
     """
     import pyarrow as pa
-    from pyarrow import types
 
     kind = column.type
-    if types.is_struct(kind):
+    if pa.types.is_struct(kind):
         names = [field.name for field in kind] or [DUMMY_FIELD]
         zeros = pa.array(bytes(len(column)), pa.uint8())
         return pa.StructArray.from_arrays(list(map(filled, column.flatten())) or [zeros], names)
-    if types.is_fixed_size_list(kind):
+    if pa.types.is_fixed_size_list(kind):
         return pa.FixedSizeListArray.from_arrays(filled(column.flatten()), kind.list_size)
-    if types.is_large_list(kind):
+    if pa.types.is_large_list(kind):
         return pa.LargeListArray.from_arrays(column.offsets, filled(column.values))
     return column
 
@@ -70,14 +62,13 @@ def filled(column: pa.Array) -> pa.Array:
 def plain(column: pa.Array) -> pa.Array:
     """Return a column of numbers, times or texts: lists are JSON, bytes are in base64."""
     import pyarrow as pa
-    from pyarrow import types
 
     kind = column.type
-    if types.is_duration(kind):
+    if pa.types.is_duration(kind):
         return column.cast(pa.int64())
-    if types.is_large_binary(kind) or types.is_fixed_size_binary(kind):
+    if pa.types.is_large_binary(kind) or pa.types.is_fixed_size_binary(kind):
         return pa.array(map(_base64, column.to_pylist()), pa.string())
-    if types.is_nested(kind):
+    if pa.types.is_nested(kind):
         values = column.cast(_timeless(kind)).to_pylist()
         dumps = partial(json.dumps, default=_base64, ensure_ascii=False)
         return pa.array(map(dumps, values), pa.string())
@@ -87,17 +78,16 @@ def plain(column: pa.Array) -> pa.Array:
 def _timeless(kind: pa.DataType) -> pa.DataType:
     """Return a type with times as texts: those of Python have no nanoseconds."""
     import pyarrow as pa
-    from pyarrow import types
 
-    if types.is_struct(kind):
+    if pa.types.is_struct(kind):
         return pa.struct([field.with_type(_timeless(field.type)) for field in kind])
-    if types.is_large_list(kind):
+    if pa.types.is_large_list(kind):
         return pa.large_list(_timeless(kind.value_type))
-    if types.is_fixed_size_list(kind):
+    if pa.types.is_fixed_size_list(kind):
         return pa.list_(_timeless(kind.value_type), kind.list_size)
-    if types.is_timestamp(kind):
+    if pa.types.is_timestamp(kind):
         return pa.string()
-    return pa.int64() if types.is_duration(kind) else kind
+    return pa.int64() if pa.types.is_duration(kind) else kind
 
 
 def _base64(data: bytes) -> str:
@@ -137,25 +127,35 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
 
 def write(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any, style: str) -> None:
     """Write batches to an open file in a format."""
-    if style == "parquet":
-        _parquet(batches, schema, file)
-    elif style == "csv":
-        _csv(batches, schema, file)
-    else:
-        _arrow(batches, schema, file, stream=file is sys.stdout.buffer)
-
-
-def _parquet(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
     import pyarrow as pa
-    from pyarrow import parquet
 
-    kept = converted(no_rows(schema), filled).schema
-    if kept != schema:
-        batches = (converted(batch, filled) for batch in batches)
-    with parquet.ParquetWriter(file, kept) as writer:
-        for group in _groups(batches):
-            table = pa.Table.from_batches(group, kept)
-            writer.write_table(table, row_group_size=ROWS * 2)
+    # its conversion has the schema of all that is converted
+    nulls = [pa.nulls(0, type_) for type_ in schema.types]
+    nothing = pa.RecordBatch.from_arrays(nulls, schema=schema)
+    if style == "parquet":
+        from pyarrow import parquet
+
+        kept = converted(nothing, filled).schema
+        if kept != schema:
+            batches = (converted(batch, filled) for batch in batches)
+        with parquet.ParquetWriter(file, kept) as writer:
+            for group in _groups(batches):
+                table = pa.Table.from_batches(group, kept)
+                writer.write_table(table, row_group_size=ROWS * 2)
+        return
+    if style == "csv":
+        from pyarrow import csv
+
+        batches = (converted(batch, plain) for batch in batches)
+        opened = csv.CSVWriter(file, converted(nothing, plain).schema)
+    elif file is sys.stdout.buffer:
+        # the index of a file is at its end, where a reader of a pipe cannot seek
+        opened = pa.ipc.new_stream(file, schema)
+    else:
+        opened = pa.ipc.new_file(file, schema)
+    with opened as writer:
+        for batch in batches:
+            writer.write_batch(batch)
 
 
 def _groups(batches: Iterator[pa.RecordBatch]) -> Iterator[list[pa.RecordBatch]]:
@@ -171,36 +171,9 @@ def _groups(batches: Iterator[pa.RecordBatch]) -> Iterator[list[pa.RecordBatch]]
         yield group
 
 
-def _arrow(
-    batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any, *, stream: bool
-) -> None:
-    import pyarrow as pa
-
-    # the index of a file is at its end, where a reader of a pipe cannot seek
-    with (pa.ipc.new_stream if stream else pa.ipc.new_file)(file, schema) as writer:
-        for batch in batches:
-            writer.write_batch(batch)
-
-
-def _csv(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
-    from pyarrow import csv
-
-    with csv.CSVWriter(file, converted(no_rows(schema), plain).schema) as writer:
-        for batch in batches:
-            writer.write_batch(converted(batch, plain))
-
-
 #: The placeholder in OUT for the name of a topic.
 MARK = "{topic}"
 STDOUT = "-"
-
-
-class UnknownFieldError(Exception):
-    """The type of a topic has no such field."""
-
-    def __init__(self, message: str, topic: str) -> None:
-        super().__init__(message)
-        self.topic = topic
 
 
 #: Called with a topic, the number of messages done, and of all.
@@ -247,54 +220,44 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     A topic that cannot be read does not keep others from being written.
     """
     done: list[WrittenFile] = []
-    paths, check, include = options.recordings, options.check, options.include
+    missing: dict[str, list[str]] = {}
+    paths = options.recordings
     with (
         _problems(options, report),
         Recording(
             paths[0] if len(paths) == 1 else paths,
             index=options.use_index,
-            check=check,
-            include=include,
+            check=options.check,
+            include=options.include,
         ) as recording,
     ):
         report.notes += recording.notes
-        with _warnings(report):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
             for job in _jobs(recording, options, report):
                 with _problems(options, report):
-                    done.append(_written(job, options, progress))
+                    done += _written(job, options, report, progress)
+        for message in (warning.message for warning in caught):
+            if isinstance(message, OtherDefinitionWarning):
+                report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
+            if isinstance(message, MissingDefinitionWarning):
+                missing.setdefault(message.message, []).append(f"`{message.topic}`")
+        for problem, topics in missing.items():
+            text = f"{first_few(topics, NAMED)}: {problem}"
+            report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
     return done
 
 
 @contextmanager
 def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
-    """Report problems of a recording, or of the topics and fields that were selected."""
+    """Report problems of a recording, or of the topics that were selected."""
     try:
         yield
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
-    except UnknownFieldError as error:
-        hint = f"`idlc show {options.recordings[0]} {error.topic}` lists the fields"
-        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
     except RecordingError as error:
         where = ", ".join(options.recordings)
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
-
-
-@contextmanager
-def _warnings(report: Report) -> Iterator[None]:
-    """Report IDL652 and IDL654 for definitions that are missing, or have another hash."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    missing: dict[str, list[str]] = {}
-    for message in (warning.message for warning in caught):
-        if isinstance(message, OtherDefinitionWarning):
-            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
-        if isinstance(message, MissingDefinitionWarning):
-            missing.setdefault(message.message, []).append(f"`{message.topic}`")
-    for problem, topics in missing.items():
-        text = f"{first_few(topics, NAMED)}: {problem}"
-        report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
 
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:
@@ -306,8 +269,7 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
         with nullcontext() if options.topics else _problems(options, report):
             topics.append(recording[name].between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
-    problem = _problem(jobs, options)
-    if problem:
+    if problem := _problem(jobs, options):
         message, hint = problem
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
         return ()
@@ -320,7 +282,9 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
 
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     """Return where a topic goes: to a file in a folder if there are several, or OUT is one."""
-    out, name = options.out, _file_name(topic.topic.name)
+    out, dotted = options.out, topic.topic.name.replace("/", ".").lstrip(".")
+    # `camera.image` is the file of /camera/image
+    name = re.sub(r"[^\w.-]", "_", dotted, flags=re.ASCII) or "_"
     suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
         return Job(topic, out, options.style or "arrow")
@@ -332,19 +296,11 @@ def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     return Job(topic, out, options.style or suffix or "")
 
 
-def _file_name(topic: str) -> str:
-    """Return a topic's name as that of a file: `camera.image` of /camera/image."""
-    return re.sub(r"[^\w.-]", "_", topic.replace("/", ".").lstrip("."), flags=re.ASCII) or "_"
-
-
 def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | None:
     """Return why columns cannot be written, and a hint."""
-    if any(not job.style for job in jobs):
-        suffixes = ", ".join(STYLES)
-        return (
-            f"`{options.out}` does not say which format is meant",
-            f"--format, or one of {suffixes}",
-        )
+    if not all(job.style for job in jobs):
+        hint = f"--format, or one of {', '.join(STYLES)}"
+        return f"`{options.out}` does not say which format is meant", hint
     paths = [job.path for job in jobs]
     twice = next((path for path, count in Counter(paths).items() if count > 1), None)
     if twice is not None:
@@ -357,16 +313,18 @@ def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | 
     return None
 
 
-def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFile:
-    """Write the columns of one topic."""
-    name = job.topic.topic.name
+def _written(
+    job: Job, options: ColumnsOptions, report: Report, progress: Progress
+) -> Iterator[WrittenFile]:
+    """Write the columns of one topic, unless it has no such fields."""
+    name, rows = job.topic.topic.name, 0
     flat = job.style == "csv" or not options.nested
-    reading = {"fields": options.fields, "flat": flat, "datetimes": options.datetimes}
     try:
-        reader = job.topic.to_reader(**reading)
+        reader = job.topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
     except ValueError as error:
-        raise UnknownFieldError(str(error), name) from None
-    rows = 0
+        hint = f"`idlc show {options.recordings[0]} {name}` lists the fields"
+        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
+        return
 
     def counted() -> Iterator[pa.RecordBatch]:
         nonlocal rows
@@ -378,4 +336,4 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFi
     stdout = nullcontext(sys.stdout.buffer)
     with stdout if job.path == STDOUT else whole_file(job.path) as file:
         write(counted(), reader.schema, file, job.style)
-    return WrittenFile(name, job.path, rows)
+    yield WrittenFile(name, job.path, rows)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from glob import glob, has_magic
 from pathlib import Path
 
-from idlc.project.files import is_file, is_folder
+from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS
 from idlc.project.root import MANIFEST, Root
 from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
@@ -21,23 +21,14 @@ def is_recording(word: str, root: Root) -> bool:
     A folder is that of a bag if it has a metadata.yaml, or recordings and no interfaces.
     """
     path = Path(root.path(word))
-    if path.name.endswith((*SUFFIXES, *COMPRESSED, ROS_1)):
-        return not is_folder(path) or _is_bag(path)
-    return is_folder(path) and _is_bag(path)
-
-
-def _is_bag(folder: Path) -> bool:
-    try:
-        entries = list(folder.iterdir())
-    except OSError:
-        return False
-    recorded = (entry for entry in entries if entry.name.endswith((*SUFFIXES, *COMPRESSED)))
+    if not is_folder(path):
+        return path.name.endswith((*SUFFIXES, *COMPRESSED, ROS_1))
+    inside = entries(path)
+    recorded = (entry for entry in inside if entry.name.endswith((*SUFFIXES, *COMPRESSED)))
     if not any(map(is_file, recorded)):
         return False
-    names = {entry.name for entry in entries}
-    is_package = bool(names & {*KIND_FOLDERS, MANIFEST}) or any(
-        entry.suffix in KINDS for entry in entries
-    )
+    names, kinds = {entry.name for entry in inside}, {entry.suffix for entry in inside}
+    is_package = not names.isdisjoint({*KIND_FOLDERS, MANIFEST}) or not kinds.isdisjoint(KINDS)
     return METADATA in names or not is_package
 
 

@@ -218,7 +218,7 @@ def _models_of(
         check_versions(groups, report)
         if len(groups) != 1:
             return {}, ()
-        types = recorded_types(groups[0], LocalTypes(where, report), where, Report())
+        types = recorded_types(groups[0], LocalTypes(where, report), Report())
         report.extend(types.errors)
         return types.models, {topic.interface for topic in types.topics}
     if is_path(what, where.root):
@@ -293,7 +293,7 @@ def _type_of(topic: Topic, include: tuple[str, ...], _: Distro) -> tuple[TopicTy
 def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
     where, report = Scope(Root.here(), include=include), Report()
     (version,) = versions([read_definition(topic, topic.name)])
-    return recorded_types(version, LocalTypes(where, report), where, report), report
+    return recorded_types(version, LocalTypes(where, report), report), report
 
 
 class OtherDefinitionWarning(UserWarning):

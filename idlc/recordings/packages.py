@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -16,7 +15,6 @@ from idlc.diagnostics.text import including
 from idlc.generate.target import borrowed
 from idlc.model import ir
 from idlc.project import inputs, prefixes
-from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
 
@@ -36,7 +34,7 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
             report.add(msgspec.structs.replace(problem, severity=Severity.WARNING))
         check_versions(groups, report)
         for version in groups:
-            types = recorded_types(version, local, scope, report)
+            types = recorded_types(version, local, report)
             report.extend(contradicted(types))
             report.extend(types.errors)
 
@@ -44,14 +42,11 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
 def check_versions(groups: Sequence[Version], report: Report) -> None:
     """Report IDL653 for each name with several definitions."""
     for name, first, second in contradictions(groups):
-        report.add(
-            codes.SEVERAL_DEFINITIONS.at(
-                Span(second, 0, 0),
-                f"this defines `{name}` in another way",
-                labels=(Label(Span(first, 0, 0), "this is the other"),),
-                hint="choose topics that agree, or one recording after the other",
-            )
-        )
+        message = f"this defines `{name}` in another way"
+        other = Label(Span(first, 0, 0), "this is the other")
+        hint = "choose topics that agree, or one recording after the other"
+        here = Span(second, 0, 0)
+        report.add(codes.SEVERAL_DEFINITIONS.at(here, message, labels=(other,), hint=hint))
 
 
 def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
@@ -76,7 +71,7 @@ def recorded_models(
     for path in paths:
         recording = read_topics(path, scope.root, report)
         for version in versions(recording.topics) if recording else ():
-            types = recorded_types(version, local, scope, report)
+            types = recorded_types(version, local, report)
             for model in types.models.values():
                 yield model, [name for interface in model.own for name in derived_names(interface)]
             report.extend(types.errors)
@@ -96,35 +91,30 @@ def recorded_packages(
     check_versions(groups, report)
     if report.had_errors or not groups:
         return [], {}
-    types = recorded_types(groups[0], LocalTypes(scope, report), scope, report)
+    types = recorded_types(groups[0], LocalTypes(scope, report), report)
     report.extend(contradicted(types))
-    names = types.names
+    names: dict[str, set[ir.TypeName]] = {}
+    for name in types.interfaces:
+        names.setdefault(name.package, set()).add(name)
     if whole:
         names = {package: set(types.library.interfaces(package)) for package in names}
     if not names:
-        message = (
-            f"no topic of {' or '.join(f'`{path}`' for path in paths)} has a type that is known"
-        )
+        recordings = " or ".join(f"`{path}`" for path in paths)
+        message = f"no topic of {recordings} has a type that is known"
         report.add(codes.NO_INTERFACES.of(paths[0], message))
-    if not whole:
-        _note_hidden(names, types.library, report)
+    # packages that are installed here with more interfaces than were recorded
+    hidden = [
+        f"`{package}`"
+        for package, mine in sorted(names.items())
+        if not whole
+        and prefixes.python_folders(package)
+        and set(types.library.interfaces(package)) - mine
+    ]
+    if hidden:
+        report.notes.append(
+            f"{first_few(hidden, NAMED)}: installed here with more than was recorded, which "
+            "programs do not see where what is written comes first on Python's path"
+        )
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
     home = scope.root.absolute(paths[0])
     return [msgspec.structs.replace(package, home=home) for package in packages], types.texts
-
-
-def _note_hidden(
-    names: Mapping[str, AbstractSet[ir.TypeName]], library: Library, report: Report
-) -> None:
-    """Note the packages that are installed here with more interfaces than were recorded."""
-    hidden = [
-        package
-        for package, mine in names.items()
-        if prefixes.python_folders(package) and set(library.interfaces(package)) - mine
-    ]
-    if hidden:
-        listed = first_few((f"`{package}`" for package in sorted(hidden)), NAMED)
-        report.notes.append(
-            f"{listed}: installed here with more than was recorded, which programs do not see "
-            "where what is written comes first on Python's path"
-        )

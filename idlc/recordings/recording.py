@@ -30,9 +30,8 @@ LEAST_NANOSECONDS = 10**17
 #: No recording needs more.
 MOST_DIGITS = 20
 
-UNITS = {"h": 3600, "m": 60, "s": 1}
-#: Seconds of each unit that is always as long.
-NUMPY_UNITS = {
+#: Seconds of each unit that is always as long, as numpy calls them.
+UNITS = {
     "W": Fraction(604800),
     "D": Fraction(86400),
     "h": Fraction(3600),
@@ -66,9 +65,9 @@ def moment(value: Any, start: Callable[[], int]) -> int:
     if isinstance(value, int) and not isinstance(value, bool):
         return value
     if isinstance(value, timedelta):
-        return start() + _nanoseconds(value)
+        return start() + value // timedelta(microseconds=1) * 1000
     if isinstance(value, datetime):
-        return _nanoseconds(_in_utc(value) - _EPOCH)
+        return _nanoseconds(value)
     raise _no_time(value)
 
 
@@ -89,10 +88,10 @@ def _of_numpy(value: Any, start: Callable[[], int]) -> int:
     if kind == "M" and unit in ("Y", "M"):
         months = count * factor * (12 if unit == "Y" else 1)
         year = min(max(1970 + months // 12, datetime.min.year), datetime.max.year)
-        return _nanoseconds(datetime(year, months % 12 + 1, 1, tzinfo=timezone.utc) - _EPOCH)
-    if unit not in NUMPY_UNITS:  # how long a year is depends on which
+        return _nanoseconds(datetime(year, months % 12 + 1, 1, tzinfo=timezone.utc))
+    if unit not in UNITS:  # how long a year is depends on which
         raise _no_time(value)
-    length = ceil(count * factor * NUMPY_UNITS[unit] * SECOND)
+    length = ceil(count * factor * UNITS[unit] * SECOND)
     return length if kind == "M" else start() + length
 
 
@@ -112,17 +111,15 @@ def _text(text: str, start: Callable[[], int]) -> int:
     plain = text[: fraction.end(1)] + text[fraction.end() :] if fraction else text
     try:
         date = datetime.fromisoformat(re.sub(r"[zZ]$", "+00:00", plain))
-        return _nanoseconds(_in_utc(date) - _EPOCH) + int(digits or 0)
+        return _nanoseconds(date) + int(digits or 0)
     except (ValueError, OverflowError):
         raise RecordingError(f"`{text}` is no time", HINT) from None
 
 
-def _in_utc(date: datetime) -> datetime:
-    return date if date.tzinfo else date.replace(tzinfo=timezone.utc)
-
-
-def _nanoseconds(length: timedelta) -> int:
-    return (length // timedelta(microseconds=1)) * 1000
+def _nanoseconds(date: datetime) -> int:
+    """Return the nanoseconds since 1970; a date without a zone is in UTC."""
+    date = date if date.tzinfo else date.replace(tzinfo=timezone.utc)
+    return (date - _EPOCH) // timedelta(microseconds=1) * 1000
 
 
 Kind = TypeVar("Kind")
@@ -239,43 +236,36 @@ class Selection:
         pa = arrow()
         source = self._source(kind)
         tables = list(self._tables(source, options))
-        return pa.concat_tables(tables) if tables else _empty(source, options)
+        return pa.concat_tables(tables) if tables else _table(source, options)
 
     def to_reader(self, kind: Any = None, **options: Any) -> pa.RecordBatchReader:
         """Return the same piece by piece, without the whole table in memory."""
         pa = arrow()
         source = self._source(kind)
         batches = (batch for table in self._tables(source, options) for batch in table.to_batches())
-        return pa.RecordBatchReader.from_batches(_empty(source, options).schema, batches)
+        return pa.RecordBatchReader.from_batches(_table(source, options).schema, batches)
 
     def _tables(self, source: Any, options: Any) -> Iterator[pa.Table]:
-        from idlc.recordings.columns import to_arrow
-
         done = 0
         for batch in self.batches():
             with _at(self.topic, batch.views, done):
-                table = to_arrow(source, batch, **options)
-            yield _with_times(table, batch)
+                table = _table(source, options, batch)
+            yield table
             done += len(batch)
 
 
-def _names(taken: Iterable[str]) -> list[str]:
+def _names(fields: list[str]) -> list[str]:
     """Return names for the times of messages that no field has: none begins with an underscore."""
-    fields = set(taken)
     return [f"_{name}" if name in fields else name for name in TIMES]
 
 
-def _empty(source: Any, options: Any) -> pa.Table:
-    """Return the table of no messages."""
+def _table(source: Any, options: Any, batch: Messages | None = None) -> pa.Table:
+    """Return the table of some messages, or of none, with their times in front."""
     from idlc.recordings.columns import to_arrow
 
-    return _with_times(to_arrow(source, [], **options), join_messages([]))
-
-
-def _with_times(table: pa.Table, batch: Messages) -> pa.Table:
-    """Return a table with the times of its messages in front."""
     pa = arrow()
-    kind = pa.timestamp("ns")
+    batch = join_messages([]) if batch is None else batch
+    table, kind = to_arrow(source, batch, **options), pa.timestamp("ns")
     names = _names(table.column_names)
     for name, times in zip(names[::-1], (batch.publish_times, batch.log_times), strict=True):
         if times is None:
@@ -309,11 +299,9 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
         why = unread_reason(topic.name, bytes(views()[number][:START]))
         if why:
             raise RecordingError(*why) from error
-        where = f"{path}: " if path else ""
-        raise RecordingError(
-            f"message {done + number} of `{topic.name}` is broken: "
-            f"{where}{error.problem} at byte {error.offset}"
-        ) from error
+        problem = f"{path}: {error.problem}" if path else error.problem
+        what = f"message {done + number} of `{topic.name}` is broken"
+        raise RecordingError(f"{what}: {problem} at byte {error.offset}") from error
 
 
 class Part(Selection):
@@ -364,12 +352,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
     """
 
     def __init__(
-        self,
-        path: Any,
-        *,
-        index: bool = True,
-        check: bool = False,
-        include: Iterable[str] = (),
+        self, path: Any, *, index: bool = True, check: bool = False, include: Iterable[str] = ()
     ) -> None:
         self._include = tuple(map(str, include))
         self._container: Container = open_recording(path, index=index, check=check)
@@ -397,7 +380,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
         if len(topics) > 1:
             kinds = ", ".join(sorted({topic.type for topic in topics}))
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
-        return RecordedTopic(self._container, topics[0], include=self._include)
+        return RecordedTopic(self._container, topics[0], ALWAYS, self._include)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -432,11 +415,7 @@ class RecordedTopic(Selection):
     """The messages of one topic of an open recording."""
 
     def __init__(
-        self,
-        container: Container,
-        topic: Topic,
-        window: Window = ALWAYS,
-        include: tuple[str, ...] = (),
+        self, container: Container, topic: Topic, window: Window, include: tuple[str, ...]
     ) -> None:
         super().__init__(topic, include)
         self._container = container

@@ -38,9 +38,8 @@ TRIED = 16
 
 
 class RecordingTopics(NamedTuple):
-    """The topics of a recording; `path` is its name in reports."""
+    """The topics of a recording."""
 
-    path: str
     topics: tuple[RecordedDefinition, ...]
     unread: tuple[UnreadTopic, ...] = ()
 
@@ -69,7 +68,7 @@ def read_topics(
             report.notes += container.notes
             cache: TextCache = {}
             topics = tuple(read_definition(topic, path, cache) for topic in container.topics)
-            return RecordingTopics(path, topics, tuple(container.unread()) if check else ())
+            return RecordingTopics(topics, tuple(container.unread()) if check else ())
     except RecordingError as error:
         message = error.message.replace(place, path)
         hint = error.hint.replace(place, path) if error.hint else None
@@ -186,6 +185,7 @@ class LocalTypes:
     """The types that are defined locally, without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
+        self.scope = scope
         self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
             scope.include, scope.root, report, own=self.near, distro=scope.distro
@@ -203,35 +203,32 @@ class LocalTypes:
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
         """Return the hash of a type that an interface defines; `None` if it is not known."""
         if name not in self._hashes:
-            model = self.model(interface.package, [interface])
-            is_known = defines(model, name)
-            self._hashes[name] = model.describer.hash(str(name)) if is_known else None
+            self._hashes[name] = _hash_in(self.model(interface.package, [interface]), name)
         return self._hashes[name]
 
 
-def defines(model: Model, name: ir.TypeName) -> bool:
-    """Return whether a structure or interface is in a model."""
-    return name in model.messages or name in model.interfaces
+def _hash_in(model: Model, name: ir.TypeName) -> str | None:
+    is_known = name in model.messages or name in model.interfaces
+    return model.describer.hash(str(name)) if is_known else None
 
 
-def recorded_types(
-    version: Version, local: LocalTypes, scope: Scope, report: Report
-) -> RecordedTypes:
+def recorded_types(version: Version, local: LocalTypes, report: Report) -> RecordedTypes:
     """Return the types of the topics of a version; reports IDL652 for undefined ones.
 
     Local definitions replace those that have errors or another hash than the recorded one, unless
     a recorded hash says that something else was recorded. Then the errors are in `errors`.
     """
     problems, others = Report(), Report()
-    types = RecordedTypes(version, local, scope, problems)
+    types = RecordedTypes(version, local, problems, {})
+    faulty = {diagnostic.where[0] for diagnostic in types.errors}
     broken = {
         **dict.fromkeys(types.empty, ABSENT),
         **dict.fromkeys(types.wrong, WRONG),
-        **dict.fromkeys(types.broken, UNREADABLE),
+        **{name: UNREADABLE for name, own in types.texts.items() if own.path in faulty},
     }
     broken = {name: why for name, why in broken.items() if local.library.source(name) is not None}
     if broken:
-        trial = RecordedTypes(version, local, scope, others, broken)
+        trial = RecordedTypes(version, local, others, broken)
         if trial.fit_locally(version.topics, broken.keys()):
             types, problems = trial, others
     report.extend(problems)
@@ -242,48 +239,76 @@ class RecordedTypes:
     """The types of the topics of a version, and all that these refer to."""
 
     def __init__(
-        self,
-        version: Version,
-        local: LocalTypes,
-        scope: Scope,
-        report: Report,
-        broken: Mapping[ir.TypeName, str] | None = None,
+        self, version: Version, local: LocalTypes, report: Report, broken: Mapping[ir.TypeName, str]
     ) -> None:
         """Look the types up; reports IDL652 for types that the recording does not define.
 
         Definitions in `broken` are ignored; its values say why.
         """
-        self._broken = broken = broken or {}
+        self._broken = broken
         self._local = local
         self._names: dict[ir.TypeName, set[ir.TypeName]] = {}
         texts = {name: source for name, source in version.texts.items() if name not in broken}
-        texts |= _empty_ones(version.topics, texts, local)
+        for topic in version.topics:
+            name = topic.interface
+            if name is None or name.kind != "msg" or name in texts:
+                continue
+            # it may be empty because it has no fields, as its hash says, or else the local
+            # definition; otherwise it may be one that the recorder did not find
+            empty = Describer({name: ir.Message(name=name)}).hash(str(name))
+            if (topic.topic.hash or local.hash(name, name)) == empty:
+                path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
+                texts[name] = Source(path, "", topic.recording)
+        self.texts = texts
+        scope, own = local.scope, local.near
         self.library = Library(
-            scope.include,
-            scope.root,
-            Report(),
-            own=local.near,
-            distro=scope.distro,
-            texts=texts,
+            scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts
         )
-        self.topics = tuple(_typed(version.topics, texts, local, report))
-        self._compiler = Compiler(self.library)
-        self.interfaces = self._compiler.reached(typed.interface for typed in self.topics)
-        self.models, self.errors = self._compile()
+        self.topics = tuple(self._typed(version, report))
+        compiler = Compiler(self.library)
+        self.interfaces = compiler.reached(typed.interface for typed in self.topics)
+        every = Report()
+        self.models = compiler.models(self.interfaces, every)
+        if not every.had_errors:
+            extents: ContentSizes = {}
+            for model in self.models.values():
+                every.extend(oversized(model, extents))
+        self.errors = Report()
+        self.errors.extend(every.errors)
+        faulty = {diagnostic.where[0] for diagnostic in self.errors}
+        if faulty:
+            self.models = {name: model.sound(faulty) for name, model in self.models.items()}
         report.extend(self._substitutions())
 
-    @property
-    def texts(self) -> Mapping[ir.TypeName, Source]:
-        """The definitions of the recording."""
-        return self.library.texts
-
-    @property
-    def names(self) -> dict[str, set[ir.TypeName]]:
-        """The names of all that is needed, by package."""
-        names: dict[str, set[ir.TypeName]] = {}
-        for name in self.interfaces:
-            names.setdefault(name.package, set()).add(name)
-        return names
+    def _typed(self, version: Version, report: Report) -> Iterator[DefinedTopic]:
+        """Yield the topics whose types are known; report the others."""
+        missing: dict[tuple[str, str], list[str]] = {}
+        for topic in version.topics:
+            recorded, name, interface = topic.topic, topic.name, topic.interface
+            schema = recorded.schema
+            if not recorded.type:
+                why = "it has no type of ROS 2"
+            elif name is None or interface is None:
+                encoding = schema.encoding if schema else ""
+                what = f", but of {encoding}" if encoding not in ENCODINGS else ""
+                why = f"`{recorded.type}` is no type of ROS 2{what}"
+            elif interface not in self.texts and self._local.library.source(interface) is None:
+                why = f"there is no definition of `{interface}`"
+            elif (
+                interface not in self.texts
+                and recorded.hash
+                and recorded.hash != self._local.hash(name, interface)
+            ):
+                why = f"there is no definition of `{interface}`, and the one known here is another"
+            else:
+                yield DefinedTopic(topic, name, interface)
+                continue
+            missing.setdefault((topic.recording, why), []).append(recorded.name)
+        for (recording, why), names in missing.items():
+            listed = first_few((f"`{name}`" for name in names), NAMED)
+            hint = None if "no type of" in why else f"{including('DIR')} with the package's sources"
+            message = f"{listed} is left out: {why}"
+            report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
 
     def _substitutions(self) -> Iterator[Diagnostic]:
         """Yield IDL652 or IDL654 for definitions that are not the recording's.
@@ -302,11 +327,8 @@ class RecordedTypes:
             names = first_few((f"`{name}`" for name in sorted(undefined)), NAMED)
             which = "has the recorded hash and" if sure else "by that name"
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
-            yield code.of(
-                recording,
-                f"{why} {names}; what is known here {which} is used",
-                hint=None if sure else BORROWED,
-            )
+            message = f"{why} {names}; what is known here {which} is used"
+            yield code.of(recording, message, hint=None if sure else BORROWED)
 
     def names_of(self, topic: DefinedTopic) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of, without those that ROS 2 adds."""
@@ -317,27 +339,6 @@ class RecordedTypes:
                 {name} & known, lambda each: known & derive.references(self.interfaces[each])
             )
         return self._names[name]
-
-    def _compile(self) -> tuple[dict[str, Model], Report]:
-        """Return the model of each package, without faulty interfaces, and the errors in these."""
-        report = Report()
-        models = self._compiler.models(self.interfaces, report)
-        if not report.had_errors:
-            extents: ContentSizes = {}
-            for model in models.values():
-                report.extend(oversized(model, extents))
-        errors = Report()
-        errors.extend(report.errors)
-        broken = {diagnostic.where[0] for diagnostic in errors}
-        if broken:
-            models = {name: model.sound(broken) for name, model in models.items()}
-        return models, errors
-
-    @property
-    def broken(self) -> set[ir.TypeName]:
-        """The definitions of the recording that have errors."""
-        wrong = {diagnostic.where[0] for diagnostic in self.errors}
-        return {name for name, source in self.texts.items() if source.path in wrong}
 
     @property
     def wrong(self) -> set[ir.TypeName]:
@@ -353,8 +354,7 @@ class RecordedTypes:
             if digest == self._local.hash(typed.name, typed.interface):
                 for name in self.names_of(typed) & self.texts.keys():
                     local_source = self._local.library.source(name)
-                    recorded = self.texts[name]
-                    if local_source is None or not contents.same(name, recorded, local_source):
+                    if not (local_source and contents.same(name, self.texts[name], local_source)):
                         names.add(name)
         return names
 
@@ -380,77 +380,12 @@ class RecordedTypes:
         for wanted in topics:
             topic, digest = typed.get(id(wanted)), wanted.topic.hash
             if topic is None:
-                fits = wanted.interface not in broken
-            else:
-                unaffected = not digest or broken.isdisjoint(self.names_of(topic))
-                fits = unaffected or digest == self.hash(topic)
-            if not fits:
+                if wanted.interface in broken:
+                    return False
+            elif digest and broken & self.names_of(topic) and digest != self.hash(topic):
                 return False
         return True
 
     def hash(self, topic: DefinedTopic) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
-        model = self.models[topic.name.package]
-        return model.describer.hash(str(topic.name)) if defines(model, topic.name) else None
-
-
-def _empty_ones(
-    topics: Iterable[RecordedDefinition], texts: Mapping[ir.TypeName, Source], local: LocalTypes
-) -> Iterator[tuple[ir.TypeName, Source]]:
-    """Yield the messages whose definitions are empty because they have no fields.
-
-    Their recorded hashes say so, or else the local definition. Otherwise an empty definition may
-    be one that the recorder did not find.
-    """
-    for topic in topics:
-        name, recorded = topic.interface, topic.topic.hash
-        if name is None or name.kind != "msg" or name in texts:
-            continue
-        empty = Describer({name: ir.Message(name=name)}).hash(str(name))
-        if (recorded or local.hash(name, name)) == empty:
-            path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
-            yield name, Source(path, "", topic.recording)
-
-
-def _typed(
-    topics: Iterable[RecordedDefinition],
-    texts: Mapping[ir.TypeName, Source],
-    local: LocalTypes,
-    report: Report,
-) -> Iterator[DefinedTopic]:
-    """Yield the topics whose types are known; report the others."""
-    missing: dict[tuple[str, str], list[str]] = {}
-    for topic in topics:
-        if topic.name is None or topic.interface is None:
-            why = _foreign(topic)
-        else:
-            why = "" if topic.interface in texts else _why_not_local(topic, local)
-            if not why:
-                yield DefinedTopic(topic, topic.name, topic.interface)
-        if why:
-            missing.setdefault((topic.recording, why), []).append(topic.topic.name)
-    for (recording, why), names in missing.items():
-        listed = first_few((f"`{name}`" for name in names), NAMED)
-        hint = None if "no type of" in why else f"{including('DIR')} with the package's sources"
-        report.add(
-            codes.MISSING_DEFINITION.of(recording, f"{listed} is left out: {why}", hint=hint)
-        )
-
-
-def _foreign(topic: RecordedDefinition) -> str:
-    schema = topic.topic.schema
-    if not topic.topic.type:
-        return "it has no type of ROS 2"
-    what = f", but of {schema.encoding}" if schema and schema.encoding not in ENCODINGS else ""
-    return f"`{topic.topic.type}` is no type of ROS 2{what}"
-
-
-def _why_not_local(topic: RecordedDefinition, local: LocalTypes) -> str:
-    """Return why a local definition does not replace a missing one; empty if it does."""
-    assert topic.name is not None
-    assert topic.interface is not None
-    if local.library.source(topic.interface) is None:
-        return f"there is no definition of `{topic.interface}`"
-    if topic.topic.hash and topic.topic.hash != local.hash(topic.name, topic.interface):
-        return f"there is no definition of `{topic.interface}`, and the one known here is another"
-    return ""
+        return _hash_in(self.models[topic.name.package], topic.name)

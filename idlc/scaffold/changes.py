@@ -99,10 +99,6 @@ class Project:
         self._report.extend(report)
         return None if report.had_errors else (Plan(self.path, (*changes.values(),), {}), outcomes)
 
-    def apply(self, plan: Plan) -> bool:
-        """Make planned changes, all or none; report IDL612 and return `False` otherwise."""
-        return apply(plan, self.name, self._report)
-
     def diff(self, plan: Plan) -> Iterator[str]:
         """Yield the lines of a unified diff of planned changes."""
         for change in plan.changes:
@@ -249,7 +245,7 @@ def write(
     changes, done = planned
     if settings.dry_run:
         return Result(project.name, tuple(done), tuple(project.diff(changes)))
-    if not project.apply(changes):
+    if not apply(changes, project.name, report):
         return None
     return Result(project.name, tuple(done))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 
 from idlc.check.compiler import compile_package
 from idlc.check.package.facts import folders
@@ -13,9 +13,7 @@ from idlc.model import catalog, derive, ir, names
 from idlc.model.link import Model
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused
-from idlc.scaffold import package
 from idlc.scaffold.changes import (
-    Project,
     Result,
     Settings,
     accepted,
@@ -28,11 +26,9 @@ from idlc.scaffold.changes import (
     write,
 )
 from idlc.scaffold.edits import setup_py
-from idlc.scaffold.templates import Templates
+from idlc.scaffold.package import rendered_for
 
 SEPARATOR = "---"
-#: The folder of files that only tools of ROS 2 read.
-RESOURCE = "resource"
 
 
 def check_interface_name(name: str) -> str:
@@ -92,14 +88,6 @@ def starter(word: str) -> tuple[str, str]:
     )
 
 
-def interface_index(package: str, keys: Iterable[str]) -> tuple[str, str]:
-    """Return path and text of the file by which ROS 2's tools know a package's interfaces.
-
-    `keys` are the interface files, such as `msg/Drive.msg`. Source: language 9.
-    """
-    return f"{RESOURCE}/rosidl_interfaces/{package}", "".join(f"{key}\n" for key in sorted(keys))
-
-
 def check_fields(fields: Sequence[str]) -> None:
     """Raise ValueError for a field that would be more than one line of the file."""
     for field in fields:
@@ -131,41 +119,8 @@ def add_cmake_dependencies(text: str, names: Sequence[str]) -> Outcome:
 CMAKE = "CMakeLists.txt"
 MANIFEST = "package.xml"
 SETUP = "setup.py"
-
-
-def interface_edits(
-    model: Model,
-    texts: Mapping[str, str],
-    keys: Iterable[str],
-    folders: Mapping[str, bool],
-    *,
-    tested: bool,
-) -> dict[str, Outcome]:
-    """Return the edits of a package that gets the interfaces of a model.
-
-    `texts` are those of the package's files that exist, `keys` all its interfaces as
-    `kind/Name.kind`, `folders` those that there are by dotted name, and whether each is a Python
-    package. The package needs pytest if it is `tested`.
-    """
-    needed = implied_packages(model)
-    tests = ["python3-pytest"] if tested else []
-    edits: dict[str, Outcome] = {
-        MANIFEST: package_xml.add_dependencies(
-            texts.get(MANIFEST, ""), depends=needed, tests=tests, group=True
-        )
-    }
-    if CMAKE in texts:
-        edits[CMAKE] = add_cmake_dependencies(texts[CMAKE], needed)
-        return edits
-    if SETUP in texts:
-        wired = setup_py.add_interfaces(texts[SETUP], model.package, keys, folders)
-        edits[SETUP] = Edited(wired)
-    return edits
-
-
-def index_interface(model: Model, texts: Mapping[str, str], keys: Iterable[str]) -> dict[str, str]:
-    """Return the index of interfaces, for a package that no CMake installs."""
-    return {} if CMAKE in texts else dict([interface_index(model.package, set(keys))])
+#: The test that `colcon test` runs, for a package with [tool.idlc].
+TEST = "test/test_interfaces.py"
 
 
 def implied_packages(model: Model) -> list[str]:
@@ -192,41 +147,33 @@ def interface(
     path = f"{kind}/{name}.{kind}"
     text = interface_text(kind, fields, comment)
     used = templates(settings, report)
-    model = _model(project, ir.TypeName(own, kind, name), path, text, settings, report)
+    library = library_around(own, project, settings, report)
+    source = Source(project.shown(path), text)
+    model = compile_package(own, [(ir.TypeName(own, kind, name), source)], library, report)
     if report.had_errors:
         return None
     added = {path: text}
-    with rendering(name, report):
-        added |= _test_of_interfaces(project, own, used)
-    read = {file: project.text(file) for file in (CMAKE, MANIFEST, SETUP)}
-    texts = {file: text for file, text in read.items() if text is not None}
-    keys, present = {*keys_of(project), path}, folders(project.path)
-    edits = interface_edits(model, texts, keys, present, tested=len(added) > 1)
+    has_settings = "[tool.idlc]" in (project.text("pyproject.toml") or "")
+    if has_settings and not project.has(TEST):
+        with rendering(name, report):
+            added[TEST] = rendered_for(own, "package/test_interfaces.py.jinja", used)
+    needed, tests = implied_packages(model), ["python3-pytest"] if TEST in added else []
+    manifest = project.text(MANIFEST) or ""
+    edits: dict[str, Outcome] = {
+        MANIFEST: package_xml.add_dependencies(manifest, depends=needed, tests=tests, group=True)
+    }
+    keys, setup = {*keys_of(project), path}, project.text(SETUP)
+    cmake = project.text(CMAKE)
+    if cmake is not None:
+        edits[CMAKE] = add_cmake_dependencies(cmake, needed)
+    elif setup is not None:
+        wired = setup_py.add_interfaces(setup, own, keys, folders(project.path))
+        edits[SETUP] = Edited(wired)
     edited = accepted(project, edits, report)
     if edited is None:
         return None
-    edited |= index_interface(model, texts, keys)
+    if cmake is None:  # the file by which ROS 2's tools know a package's interfaces: language 9
+        edited[f"resource/rosidl_interfaces/{own}"] = "".join(f"{key}\n" for key in sorted(keys))
     result = write(project, added, edited, settings, report)
-    after = () if CMAKE in texts else generation(project, own, settings)
+    after = generation(project, own, settings) if cmake is None else ()
     return result and result._replace(following=after)
-
-
-def _model(
-    project: Project, name: ir.TypeName, path: str, text: str, settings: Settings, report: Report
-) -> Model:
-    """Return the model of a package with only the new interface; report its problems."""
-    library = library_around(name.package, project, settings, report)
-    problems = Report()
-    source = Source(project.shown(path), text)
-    model = compile_package(name.package, [(name, source)], library, problems)
-    report.extend(problems)
-    return model
-
-
-def _test_of_interfaces(project: Project, own: str, used: Templates) -> dict[str, str]:
-    """Return the test that `colcon test` runs, for a package with [tool.idlc]."""
-    path = "test/test_interfaces.py"
-    if "[tool.idlc]" not in (project.text("pyproject.toml") or "") or project.has(path):
-        return {}
-    template = "package/test_interfaces.py.jinja"
-    return {path: package.rendered_for(own, template, used)}

@@ -15,7 +15,7 @@ from idlc.diagnostics.report import Report
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.project import package_xml
-from idlc.project.edits import Edited, Outcome, Script
+from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.project.prefixes import distribution, python_folders
 from idlc.scaffold import spec
 from idlc.scaffold.changes import (
@@ -68,13 +68,15 @@ def node_entry(
     texts: Mapping[str, str],
     templates: Templates,
     *,
+    launch: bool = True,
     keys: Iterable[str] = (),
     folders: Mapping[str, bool] = MappingProxyType({}),
 ) -> Entry:
-    """Return the changes that add a node to a package, but for its own files and the launch file.
+    """Return the changes that add a node to a package, but for its own files.
 
     `texts` are those of the package's files that exist. A package with interfaces,
     whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name.
+    A launch file lists the node, unless it does one thing and ends: that is for the command line.
     """
     node = planned.node
     script = Script(node.name, f"{node.package}.{node.name}:main")
@@ -84,61 +86,34 @@ def node_entry(
         text = described[SETUP]
         described[SETUP] = setup_py.add_interfaces(text, node.package, own, folders)
     path, outcome = setup_py.add_console_script(described, script)
-    tests = test_packages(planned)
+    launch = launch and not planned.once
     manifest = package_xml.add_dependencies(
-        texts.get(MANIFEST, ""), depends=planned.packages, tests=tests
+        texts.get(MANIFEST, ""),
+        depends=planned.packages,
+        tests=test_packages(planned),
+        executes=("launch", "launch_ros") if launch else (),
     )
-    support = _support(node.package, texts, templates)
-    return Entry(support, {path: outcome, MANIFEST: manifest})
-
-
-def with_launch_entry(
-    planned: Plan, texts: Mapping[str, str], entry: Entry, templates: Templates
-) -> Entry:
-    """Return an entry that lists the node in the launch file, too, which may be new.
-
-    A node that does one thing and ends is for the command line.
-    """
-    if planned.once:
-        return entry
-    node = planned.node
-    manifest = entry.edits.get(MANIFEST)
-    if isinstance(manifest, Edited):  # what launch files import
-        needed = package_xml.add_dependencies(manifest.text, executes=("launch", "launch_ros"))
-        entry = entry._replace(edits={**entry.edits, MANIFEST: needed})
-    started = launch_py.Started(node.package, node.name, node.lifecycle)
-    path = next((name for name in texts if name.startswith("launch/")), "")
-    if path:
-        outcome = launch_py.add_node(texts[path], started)
-        return _launched(entry, path, outcome)
-    path = _launch_file(node.package, ())
-    text = rendered_for(node.package, "package/launch.py.jinja", templates)
-    outcome = launch_py.add_node(text, started)
-    if not isinstance(outcome, Edited):
-        return _launched(entry, path, outcome)._replace(added={**entry.added, path: text})
-    edits = dict(entry.edits)
+    edits: dict[str, Outcome] = {path: outcome, MANIFEST: manifest}
+    # files that nodes need beside them
+    added = {f"{node.package}/__init__.py": ""}
+    added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja", templates)
+    added = {path: text for path, text in added.items() if path not in texts}
+    if not launch:
+        return Entry(added, edits)
+    file = next((name for name in texts if name.startswith("launch/")), "")
+    text = texts.get(file) or rendered_for(node.package, "package/launch.py.jinja", templates)
+    started = launch_py.add_node(text, launch_py.Started(node.package, node.name, node.lifecycle))
+    path = file or _launch_file(node.package, ())
+    if isinstance(started, Refused):
+        line = f"add this {started.where}: {started.line.rstrip(',')}"
+        note = (path, f"is not edited: {started.why}; {line}")
+        return Entry(added if file else {**added, path: text}, edits, (note,))
+    if file:
+        return Entry(added, {**edits, path: started})
     before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
     if SETUP in texts and isinstance(before, Edited):
         edits[SETUP] = setup_py.add_launch(before.text, node.package, path)
-    return entry._replace(added={**entry.added, path: outcome.text}, edits=edits)
-
-
-def _launched(entry: Entry, path: str, outcome: Outcome) -> Entry:
-    """Return an entry with the edited launch file, or with a note of what to do by hand."""
-    if isinstance(outcome, Edited):
-        return entry._replace(edits={**entry.edits, path: outcome})
-    text = f"is not edited: {outcome.why}; add this {outcome.where}: {outcome.line.rstrip(',')}"
-    return entry._replace(notes=(*entry.notes, (path, text)))
-
-
-def _support(package: str, texts: Mapping[str, str], templates: Templates) -> dict[str, str]:
-    """Return the files that nodes need beside them and that their package lacks."""
-    support = {}
-    if CONFTEST not in texts:
-        support[CONFTEST] = rendered_for(package, "package/conftest.py.jinja", templates)
-    if f"{package}/__init__.py" not in texts:
-        support[f"{package}/__init__.py"] = ""
-    return support
+    return Entry({**added, path: started.text}, edits)
 
 
 def _launch_file(package: str, names: Iterable[str]) -> str:
@@ -211,9 +186,7 @@ def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) ->
     read = {path: project.text(path) for path in paths(own, project.names("launch"))}
     texts = {path: text for path, text in read.items() if text is not None}
     keys, present = keys_of(project), folders(project.path)
-    entry = node_entry(planned, texts, used, keys=keys, folders=present)
-    if launch:
-        entry = with_launch_entry(planned, texts, entry, used)
+    entry = node_entry(planned, texts, used, launch=launch, keys=keys, folders=present)
     return entry._replace(added={**files, **entry.added})
 
 

@@ -78,6 +78,22 @@ class Value(NamedTuple):
     period: float | None = None
 
 
+_TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+
+def _typed(text: str, shape: str = "TYPE:NAME") -> Value:
+    """Return the interface and the name that `TYPE:NAME` means."""
+    type_, colon, topic = text.partition(":")
+    if not colon or not type_ or not topic:
+        raise ValueError(f"`{text}` is not {shape}, such as `std_msgs/String:chatter`")
+    if not _TOPIC.fullmatch(topic) or "__" in topic:
+        raise ValueError(
+            f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
+            "and single underscores, parts separated by `/`"
+        )
+    return Value(type_, topic)
+
+
 class Role(NamedTuple):
     """A role: its option, its question in the wizard, and what its template needs around it.
 
@@ -90,12 +106,12 @@ class Role(NamedTuple):
 
     name: str
     kind: ir.Kind | None
-    metavar: str
     help: str
-    read: Callable[[str], Value]
     answer: str
     summary: str
     family: str
+    metavar: str = "TYPE:NAME"
+    read: Callable[[str], Value] = _typed
     samples: tuple[str, ...] = ()
     question: Question | None = None
     imports: Imports = NO_IMPORTS
@@ -122,22 +138,6 @@ class Endpoint(NamedTuple):
     def word(self) -> str:
         """The topic as part of a Python name."""
         return re.sub(r"[^a-z0-9]+", "_", self.topic.lower()).strip("_")[:30].rstrip("_")
-
-
-_TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
-
-
-def _typed(text: str, shape: str = "TYPE:NAME") -> Value:
-    """Return the interface and the name that `TYPE:NAME` means."""
-    type_, colon, topic = text.partition(":")
-    if not colon or not type_ or not topic:
-        raise ValueError(f"`{text}` is not {shape}, such as `std_msgs/String:chatter`")
-    if not _TOPIC.fullmatch(topic) or "__" in topic:
-        raise ValueError(
-            f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
-            "and single underscores, parts separated by `/`"
-        )
-    return Value(type_, topic)
 
 
 def _published(text: str) -> Value:
@@ -182,7 +182,6 @@ ROLES: tuple[Role, ...] = (
         kind="msg",
         metavar="TYPE:TOPIC",
         help="Receive messages.",
-        read=_typed,
         answer="subscribe",
         summary="listens to",
         family="subscriber",
@@ -190,9 +189,7 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="service",
         kind="srv",
-        metavar="TYPE:NAME",
         help="Answer requests.",
-        read=_typed,
         answer="serve",
         summary="serves",
         family="service",
@@ -201,9 +198,7 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="client",
         kind="srv",
-        metavar="TYPE:NAME",
         help="Call a service; the request's fields come from the command line.",
-        read=_typed,
         answer="call",
         summary="calls",
         family="action",
@@ -213,9 +208,7 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="action_server",
         kind="action",
-        metavar="TYPE:NAME",
         help="Work on goals, which can be cancelled and replaced.",
-        read=_typed,
         answer="act",
         summary="works on goals for",
         family="action",
@@ -237,9 +230,7 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="action_client",
         kind="action",
-        metavar="TYPE:NAME",
         help="Send a goal; its fields come from the command line.",
-        read=_typed,
         answer="send goals",
         summary="sends goals to",
         family="action",

@@ -222,7 +222,7 @@ def typed(around, name, encoding, text, hash_=None):
     """Return what a recording's topic of a type means."""
     topic = Topic("/x", name, 1, hash_, "cdr", Schema(name, encoding, text))
     (version,) = versions([read_definition(topic, "demo")])
-    return recorded_types(version, around, Scope(Root.here()), Report())
+    return recorded_types(version, around, Report())
 
 
 @pytest.mark.parametrize("style", ["ros2msg", "ros2idl"])

@@ -127,7 +127,7 @@ def test_the_first_of_two_definitions_counts_and_that_is_told():
 def types_of(*topics):
     report, scope = Report(), Scope(Root.here())
     (version,) = versions(topics)
-    return recorded_types(version, LocalTypes(scope, Report()), scope, report), report
+    return recorded_types(version, LocalTypes(scope, Report()), report), report
 
 
 def test_what_rosbags_writes_has_its_hash():

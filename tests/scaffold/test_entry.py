@@ -27,8 +27,7 @@ def heart(*, lifecycle: bool = False) -> Plan:
 
 
 def entered(texts, **options) -> new_node.Entry:
-    entry = new_node.node_entry(heart(**options), texts, Templates())
-    return new_node.with_launch_entry(heart(**options), texts, entry, Templates())
+    return new_node.node_entry(heart(**options), texts, Templates())
 
 
 def test_a_package_gets_what_its_nodes_share_once():

@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Strings, Struct, flat_nodes
+from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Struct, Text, flat_nodes
 from idlc.recordings.columns.read import table_of, type_of
-from idlc.recordings.columns.table import columns_of
 from idlc.recordings.columns.values import Columns
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
-#: Between a definition and those that it refers to.
-SEPARATOR = "=" * 80
 #: The unit of times in Arrow, by their dtype.
 TIMES = {"M8[ns]": "timestamp", "m8[ns]": "duration"}
 
@@ -36,90 +33,54 @@ def to_arrow(
             name="pyarrow",
         ) from error
     table, top = table_of(kind, messages, fields, datetimes)
-    node, columns = top.level.node, columns_of(table, top)
+    node, columns = top.level.node, table.columns(top)
     if flat:
         node, columns = Struct(flat_nodes(node)), Columns(columns.flat(), len(columns))
-    rows = _Arrays(pyarrow, dictionary).struct(node, columns)
-    batch = pyarrow.RecordBatch.from_struct_array(rows)
-    metadata = described(type_of(kind))
-    return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
-
-
-def described(structure: Structure) -> dict[str, str]:
-    """Return what the metadata of a schema says of the type."""
-    return {
+    batch = pyarrow.RecordBatch.from_struct_array(_array(pyarrow, node, columns, dictionary))
+    structure = type_of(kind)
+    metadata = {
         "ros2.type": structure.name,
         "ros2.hash": structure.hash,
         "ros2.definition": definition_of(structure),
     }
+    return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
 
 
-class _Arrays:
-    """Makes arrays of Arrow. `pa.array` would import pandas."""
+def _array(pa: Any, node: Node, column: Any, dictionary: bool) -> Any:
+    """Return the array of a column. `pa.array` would import pandas."""
 
-    def __init__(self, pa: Any, dictionary: bool) -> None:
-        self.pa = pa
-        self.dictionary = dictionary
+    def of_buffers(type_: Any, *buffers: Any, children: Any = None) -> Any:
+        every = [None, *map(pa.py_buffer, buffers)]
+        return pa.Array.from_buffers(type_, len(column), every, children=children)
 
-    def array(self, node: Node, column: Any) -> Any:
-        """Return the array of a column."""
-        pa = self.pa
-        if isinstance(node, Struct):
-            return self.struct(node, column)
-        if isinstance(node, Lists):
-            return self.lists(node, column)
-        if isinstance(node, Strings):
-            buffers = [None, *map(pa.py_buffer, (column.offsets, column.values))]
-            texts = pa.Array.from_buffers(pa.large_string(), len(column), buffers)
-            return texts.dictionary_encode() if self.dictionary else texts
-        if isinstance(node, Instant):
-            type_ = getattr(pa, TIMES[node.code])("ns")
-            return self.flat(type_, column.view(np.int64))
-        if node.size is None:
-            return self.numbers(column)
-        if column.dtype == np.uint8:
-            return self.flat(pa.binary(node.size), column, len(column))
-        inner = self.numbers(column.reshape(-1))
-        return pa.FixedSizeListArray.from_arrays(inner, node.size)
-
-    def numbers(self, column: Any) -> Any:
-        """Return the array of plain numbers."""
-        pa = self.pa
-        if column.dtype == np.bool_:
-            bits = np.packbits(column, bitorder="little")
-            return self.flat(pa.bool_(), bits, len(column))
-        return self.flat(pa.from_numpy_dtype(column.dtype), column)
-
-    def flat(self, type_: Any, values: Any, count: int | None = None) -> Any:
-        """Return the array of one buffer."""
-        buffers = [None, self.pa.py_buffer(values)]
-        count = len(values) if count is None else count
-        return self.pa.Array.from_buffers(type_, count, buffers)
-
-    def struct(self, node: Node, column: Any) -> Any:
-        """Return the array of Columns."""
-        assert isinstance(node, Struct)
-        pa = self.pa
-        arrays = [self.array(inner, column[name]) for name, inner in node.fields.items()]
+    if isinstance(node, Struct):
+        arrays = [
+            _array(pa, inner, column[name], dictionary) for name, inner in node.fields.items()
+        ]
         pairs = zip(node.fields, arrays, strict=True)
         type_ = pa.struct([pa.field(name, array.type) for name, array in pairs])
-        return pa.Array.from_buffers(type_, len(column), [None], children=arrays)
-
-    def lists(self, node: Lists, column: Any) -> Any:
-        """Return the array of sequences, or of arrays of what are no numbers."""
-        pa = self.pa
+        return of_buffers(type_, children=arrays)
+    if isinstance(node, Lists):
+        is_bytes = isinstance(node.element, Numbers) and column.values.dtype == np.uint8
+        if node.size is None and is_bytes:
+            return of_buffers(pa.large_binary(), column.offsets, column.values)
+        inner = _array(pa, node.element, column.values, dictionary)
         if node.size is not None:
-            inner = self.array(node.element, column.values)
-            type_ = pa.list_(inner.type, node.size)
-            return pa.Array.from_buffers(type_, len(column), [None], children=[inner])
-        offsets = pa.py_buffer(column.offsets)
-        if isinstance(node.element, Numbers) and column.values.dtype == np.uint8:
-            buffers = [None, offsets, pa.py_buffer(column.values)]
-            return pa.Array.from_buffers(pa.large_binary(), len(column), buffers)
-        inner = self.array(node.element, column.values)
-        type_ = pa.large_list(inner.type)
-        buffers = [None, offsets]
-        return pa.Array.from_buffers(type_, len(column), buffers, children=[inner])
+            return of_buffers(pa.list_(inner.type, node.size), children=[inner])
+        return of_buffers(pa.large_list(inner.type), column.offsets, children=[inner])
+    if isinstance(node, Text):
+        texts = of_buffers(pa.large_string(), column.offsets, column.values)
+        return texts.dictionary_encode() if dictionary else texts
+    if isinstance(node, Instant):
+        return of_buffers(getattr(pa, TIMES[node.code])("ns"), column.view(np.int64))
+    if node.size is not None and column.dtype == np.uint8:
+        return of_buffers(pa.binary(node.size), column)
+    if node.size is not None:
+        inner = _array(pa, node._replace(size=None), column.reshape(-1), dictionary)
+        return pa.FixedSizeListArray.from_arrays(inner, node.size)
+    if column.dtype == np.bool_:
+        return of_buffers(pa.bool_(), np.packbits(column, bitorder="little"))
+    return of_buffers(pa.from_numpy_dtype(column.dtype), column)
 
 
 def definition_of(structure: Structure) -> str:
@@ -131,12 +92,11 @@ def definition_of(structure: Structure) -> str:
     for type_ in needed:
         nested = (field.nested for field in type_.fields if field.nested)
         needed += [other for other in dict.fromkeys(nested) if other not in needed]
-    parts = [_message_text(structure)]
-    parts += [
-        f"{SEPARATOR}\nMSG: {_short_name(other.name)}\n{_message_text(other)}"
+    others = (
+        f"{'=' * 80}\nMSG: {_short_name(other.name)}\n{_message_text(other)}"
         for other in needed[1:]
-    ]
-    return "".join(parts)
+    )
+    return "".join([_message_text(structure), *others])
 
 
 def _message_text(structure: Structure) -> str:

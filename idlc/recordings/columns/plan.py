@@ -42,7 +42,7 @@ class Segment:
 
 
 class Text(NamedTuple):
-    """A string; without a key, nobody wants it."""
+    """A string, or the column of these; without a key, nobody wants it."""
 
     key: int | None
     wide: bool
@@ -109,12 +109,6 @@ class Numbers(NamedTuple):
     size: int | None
 
 
-class Strings(NamedTuple):
-    """Strings."""
-
-    text: Text
-
-
 class Struct(NamedTuple):
     """Columns by name."""
 
@@ -141,7 +135,7 @@ class Lists(NamedTuple):
     element: Node
 
 
-Node = Numbers | Strings | Struct | Instant | Lists
+Node = Numbers | Text | Struct | Instant | Lists
 
 
 def flat_nodes(node: Node, name: str = "") -> dict[str, Node]:
@@ -174,7 +168,9 @@ INSTANTS = {
 def plan_of(structure: Structure, fields: tuple[str, ...] | None, datetimes: bool) -> Level:
     """Return the plan of a type; raise ValueError for a field that it does not have."""
     wanted = None if fields is None else _selection(structure, fields)
-    level = _Builder(count(), datetimes, aligned=8).structure_level(structure, wanted)
+    builder = _Builder(count(), datetimes, aligned=8)
+    level = builder.level
+    level.node = builder.structure(structure, wanted)
     # what comes after the last column matters to nobody
     while fields is not None and level.steps and not is_wanted(level.steps[-1]):
         level.steps.pop()
@@ -216,11 +212,6 @@ class _Builder:
         self.aligned = aligned
         self.at = 0
 
-    def structure_level(self, structure: Structure, wanted: Wanted) -> Level:
-        """Return the level of a structure."""
-        self.level.node = self.structure(structure, wanted)
-        return self.level
-
     def structure(self, structure: Structure, wanted: Wanted) -> Struct:
         """Plan a structure."""
         if not structure.fields:
@@ -244,7 +235,10 @@ class _Builder:
         level.node = inside.element(field, wanted)
         packed = level.packed
         if packed and field.size is not None:
-            self.array(packed, field.size)
+            segment, offset = self.place(packed.align, field.size * packed.size)
+            for leaf in packed.leaves:
+                repeats = ((field.size, packed.size), *leaf.repeats)
+                segment.leaves.append(leaf._replace(offset=offset + leaf.offset, repeats=repeats))
             return Lists(field.size, None, level.node)
         key = None if wanted == NOTHING else next(self.keys)
         least = min(least_element(field), MOST_BYTES)
@@ -259,37 +253,25 @@ class _Builder:
             code = INSTANTS.get(field.nested.name)
             if code is None or not self.datetimes or wanted is not None:
                 return struct
-            seconds, nanoseconds = struct.fields.values()
-            assert isinstance(seconds, Numbers)
-            assert isinstance(nanoseconds, Numbers)
-            return Instant(code, seconds, nanoseconds)
+            return Instant(code, *struct.fields.values())  # type: ignore[arg-type]
         if field.primitive is not None:
             return self.numbers(field, wanted)
         text = Text(None if wanted == NOTHING else next(self.keys), field.wide)
         self.add(text, 4 if field.wide else 1)
-        return Strings(text)
+        return text
 
     def numbers(self, field: FieldInfo, wanted: Wanted, size: int | None = None) -> Node:
         """Plan a number, or an array of them."""
         assert field.primitive is not None
-        width = field.primitive.size
+        kind, width, key = field.primitive.code, field.primitive.size, next(self.keys)
         segment, offset = self.place(width, width * (1 if size is None else size))
-        leaf = Leaf(
-            next(self.keys),
-            offset,
-            code_of(field),
-            () if size is None else ((size, width),),
+        # what numpy calls it, without a byte order
+        code = {"c": "u1", "?": "?"}.get(kind) or (
+            f"{'f' if kind in 'fd' else 'i' if kind.islower() else 'u'}{width}"
         )
         if wanted is None:
-            segment.leaves.append(leaf)
-        return Numbers(leaf.key, leaf.code, size)
-
-    def array(self, element: Segment, size: int) -> None:
-        """Plan an array of structures that are one segment each."""
-        segment, offset = self.place(element.align, size * element.size)
-        for leaf in element.leaves:
-            repeats = ((size, element.size), *leaf.repeats)
-            segment.leaves.append(leaf._replace(offset=offset + leaf.offset, repeats=repeats))
+            segment.leaves.append(Leaf(key, offset, code, () if size is None else ((size, width),)))
+        return Numbers(key, code, size)
 
     def place(self, align: int, size: int) -> tuple[Segment, int]:
         """Plan bytes of fixed size; return where they are."""
@@ -310,12 +292,3 @@ class _Builder:
         """Add a step that is not of fixed size."""
         self.level.steps.append(step)
         self.segment, self.aligned, self.at = None, aligned, 0
-
-
-def code_of(field: FieldInfo) -> str:
-    """Return what numpy calls a primitive, without a byte order."""
-    assert field.primitive is not None
-    kind, size = field.primitive.code, field.primitive.size
-    if kind in "c?":
-        return "u1" if kind == "c" else "?"
-    return f"{'f' if kind in 'fd' else 'i' if kind.islower() else 'u'}{size}"

@@ -19,7 +19,7 @@ from idlc.recordings.columns.scan import (
     scan_uniform,
 )
 from idlc.recordings.columns.source import Flat, Pieces, Source
-from idlc.recordings.columns.table import Elements, Table, columns_of
+from idlc.recordings.columns.table import Elements, Table
 from idlc.runtime.cdr import order_of
 from idlc.runtime.names import DecodeError, owner_of
 from idlc.runtime.typeinfo import CarefulReader, Structure, structure_of
@@ -39,16 +39,21 @@ class Messages(NamedTuple):
         """Return some of the messages."""
         return self._replace(starts=self.starts[first:last], stops=self.stops[first:last])
 
-    def raw(self, index: int) -> bytes:
-        """Return one message."""
-        start, stop = (np.array([int(positions[index])]) for positions in (self.starts, self.stops))
-        return bytes(self.source.ranges(start, stop - start))
-
 
 def messages_of(messages: Any) -> Messages:
     """Return the messages of a batch, or of an iterable; small ones of that are copied."""
     if all(hasattr(messages, name) for name in ("buffer", "starts", "stops")):
-        return _of_batch(messages)
+        array = np.frombuffer(memoryview(messages.buffer).cast("B"), np.uint8)
+        starts, stops = np.asarray(messages.starts), np.asarray(messages.stops)
+        for positions in (starts, stops):
+            if positions.size and positions.dtype.kind not in "iu":
+                raise TypeError("starts and stops of a batch must be integers")
+        starts, stops = starts.astype(np.int64), stops.astype(np.int64)
+        if starts.shape != stops.shape or starts.ndim != 1:
+            raise ValueError("starts and stops of a batch must be as many")
+        if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
+            raise ValueError("a message of the batch is not within its buffer")
+        return Messages(Flat(array), starts, stops)
     raws = [raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages]
     sizes = np.fromiter(map(len, raws), np.int64, len(raws))
     stops = np.cumsum(sizes)
@@ -56,20 +61,6 @@ def messages_of(messages: Any) -> Messages:
     if len(raws) and stops[-1] >= LARGE * len(raws):
         return Messages(Pieces(raws, starts), starts, stops)
     return Messages(Flat(np.frombuffer(b"".join(raws), np.uint8)), starts, stops)
-
-
-def _of_batch(batch: Any) -> Messages:
-    array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
-    starts, stops = np.asarray(batch.starts), np.asarray(batch.stops)
-    for positions in (starts, stops):
-        if positions.size and positions.dtype.kind not in "iu":
-            raise TypeError("starts and stops of a batch must be integers")
-    starts, stops = starts.astype(np.int64), stops.astype(np.int64)
-    if starts.shape != stops.shape or starts.ndim != 1:
-        raise ValueError("starts and stops of a batch must be as many")
-    if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
-        raise ValueError("a message of the batch is not within its buffer")
-    return Messages(Flat(array), starts, stops)
 
 
 def type_of(kind: type | Structure) -> Structure:
@@ -85,7 +76,8 @@ def to_columns(
     datetimes: bool = False,
 ) -> Any:
     """Return Columns with a row for each message, or without `ragged` what was returned before."""
-    columns = columns_of(*table_of(kind, messages, fields, datetimes))
+    table, top = table_of(kind, messages, fields, datetimes)
+    columns = table.columns(top)
     if ragged:
         return columns
     warnings.warn(
@@ -116,9 +108,15 @@ def table_of(
 
 
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
-    big = big_endian(messages)
-    mixed = bool(big.any() and not big.all())
     source, result = messages.source, ScanResult()
+    if (messages.stops - messages.starts < 4).any():
+        raise UnreadableError
+    # the byte order, as the encapsulation headers say
+    zeros, orders = (source.items(messages.starts + at, "u1") for at in (0, 1))
+    if (zeros != 0).any() or (orders > 1).any():
+        raise UnreadableError
+    big = orders == 0
+    mixed = bool(big.any() and not big.all())
     done: list[Any] = []
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
         starts = messages.starts[rows] + 4
@@ -138,17 +136,6 @@ def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
     return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
 
 
-def big_endian(messages: Messages) -> Any:
-    """Return which messages are, as their encapsulation headers say."""
-    starts = messages.starts
-    if (messages.stops - starts < 4).any():
-        raise UnreadableError
-    first, second = (messages.source.items(starts + at, "u1") for at in (0, 1))
-    if (first != 0).any() or (second > 1).any():
-        raise UnreadableError
-    return second == 0
-
-
 def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
     """Raise the DecodeError of a class's package for the first message that is not one of it."""
     first, last = 0, len(messages.starts)
@@ -160,19 +147,16 @@ def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        raw = messages.raw(first)
+        broken = messages.part(first, first + 1)
+        raw = bytes(messages.source.ranges(broken.starts, broken.stops - broken.starts))
         # classes of other packages need not be installed
         reader = CarefulReader(raw, order_of(raw), lambda _: SimpleNamespace())
         reader.message(type_of(kind), "")
     except DecodeError as error:
         path = f"[{first}].{error.path}" if error.path else f"[{first}]"
-        raise _error_of(kind)(error.problem, path, error.offset) from error
+        own: Any = DecodeError
+        if not isinstance(kind, Structure):  # it comes with a runtime, perhaps of its own
+            base = owner_of(kind).__base__
+            own = sys.modules[base.__module__.rpartition(".")[0]].DecodeError
+        raise own(error.problem, path, error.offset) from error
     raise AssertionError(f"[{first}] can be read by itself")
-
-
-def _error_of(kind: Any) -> Any:
-    """Return the DecodeError of the runtime that a message class comes with."""
-    if isinstance(kind, Structure):
-        return DecodeError
-    base = owner_of(kind).__base__
-    return sys.modules[base.__module__.rpartition(".")[0]].DecodeError

@@ -99,7 +99,7 @@ def placed(level: Level, at: Any, phase: Any) -> tuple[dict[int, Any], Any]:
 
 
 def repeat_fixed(
-    level: Level, cursors: Cursors, counts: Any, result: ScanResult | None, first: int
+    level: Level, cursors: Cursors, counts: Any, result: ScanResult, first: int
 ) -> None:
     """Scan elements of fixed size with gaps.
 
@@ -118,7 +118,7 @@ def repeat_fixed(
     cursor.advance((counts - 1) * distance)
     cursors.at = cursors.at.copy()
     cursors.at[some] = cursor.at
-    if result is None or not level.wanted:
+    if not level.wanted:
         return
     owner = np.repeat(np.arange(len(some)), counts)
     firsts = np.cumsum(counts) - counts
@@ -317,21 +317,17 @@ class VectorScan:
             self.result.size[step.key].append(counts)
         packed = step.level.packed
         if packed:
-            self.packed(step, packed, cursors, counts)
+            before = cursors.at
+            cursors.align(packed.align)
+            cursors.at = np.where(counts > 0, cursors.at, before)
+            cursors.require(counts, packed.size)
+            start = cursors.advance(counts * packed.size)
+            if step.key is not None:
+                self.result.at[step.key].append(start)
         elif step.level.fixed:
             repeat_fixed(step.level, cursors, counts, self.result, first)
         else:
             self.varied(step.level, cursors, counts, first)
-
-    def packed(self, step: List, packed: Segment, cursors: Cursors, counts: Any) -> None:
-        """Scan elements without gaps."""
-        before = cursors.at
-        cursors.align(packed.align)
-        cursors.at = np.where(counts > 0, cursors.at, before)
-        cursors.require(counts, packed.size)
-        start = cursors.advance(counts * packed.size)
-        if step.key is not None:
-            self.result.at[step.key].append(start)
 
     def varied(self, level: Level, cursors: Cursors, counts: Any, first: int) -> None:
         """Scan elements of varying size: all first ones, all second ones, and so on."""
@@ -367,39 +363,29 @@ def scan_uniform(
 ) -> Iterator[Any]:
     """Scan messages that share one layout; yield the indices of their cursors, layout by layout."""
     rest = np.arange(len(cursors.at))
-    while len(rest) >= LEAST_UNIFORM and any(map(_varies, plan.steps)):
+    # others take no operation for each element
+    varies = any(isinstance(step, List) and not step.level.fixed for step in plan.steps)
+    while varies and len(rest) >= LEAST_UNIFORM:
         cursor = cursors.select(rest)
         first = ScanResult()
         scan = SequentialScan(order, first)
         scan.enter(source, cursor, 0)
         first.count[plan.key] = 1
         scan.level(plan, int(cursor.at[0]), 0)
-        same = _equal_layouts(source, order, cursor, scan.sizes)
+        # which have the length of the first, and its sizes at the same places
+        lengths = cursor.end - cursor.at
+        same = lengths == lengths[0]
+        starts = cursor.at[same]
+        equal: Any = True
+        for at, size in scan.sizes:
+            equal &= source.items(starts + (at - int(starts[0])), f"{order}u4") == size
+        same[same] = equal
         if same.sum() < LEAST_PART * len(rest):
             return
         chosen = rest[same]
         _replicate(plan, first, cursors.at[chosen], result)
         yield chosen
         rest = rest[~same]
-
-
-def _varies(step: Any) -> bool:
-    """Return whether a scan needs an operation for each element."""
-    return isinstance(step, List) and not (step.level.packed or step.level.fixed)
-
-
-def _equal_layouts(
-    source: Source, order: str, cursors: Cursors, sizes: list[tuple[int, int]]
-) -> Any:
-    """Return which messages have the length of the first, and its sizes at the same places."""
-    lengths = cursors.end - cursors.at
-    same = lengths == lengths[0]
-    starts = cursors.at if same.all() else cursors.at[same]
-    equal: Any = True
-    for at, size in sizes:
-        equal &= source.items(starts + (at - int(starts[0])), f"{order}u4") == size
-    same[same] = equal
-    return same
 
 
 def _replicate(plan: Level, first: ScanResult, starts: Any, result: ScanResult) -> None:

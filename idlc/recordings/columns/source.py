@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Iterable
+from itertools import pairwise, repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,7 +60,7 @@ class Flat:
         if distance is not None:
             return Place(self.array, int(starts[0]), (len(starts),), (distance,))
         if size > LARGEST_ITEM:
-            rows = self._one_by_one(starts, np.full(len(starts), size))
+            rows = _copied(repeat(self.view), starts, np.full(len(starts), size))
         else:
             rows = self._windows(f"V{size}")[starts].view(np.uint8)
         return Place(rows, 0, (len(starts),), (size,))
@@ -73,7 +74,7 @@ class Flat:
         if not total:
             return np.empty(0, np.uint8)
         if total >= LONG * len(sizes):
-            return self._one_by_one(starts, sizes)
+            return _copied(repeat(self.view), starts, sizes)
         longest = int(sizes.max())
         if longest <= SHORT and (starts + longest <= len(self.array)).all():
             rows = self._windows(f"V{longest}")[starts].view(np.uint8)
@@ -88,15 +89,6 @@ class Flat:
         """Return an array of what begins at each byte."""
         count = max(0, len(self.array) - np.dtype(dtype).itemsize + 1)
         return np.ndarray((count,), dtype, self.array, strides=(1,))
-
-    def _one_by_one(self, starts: Any, sizes: Any) -> Any:
-        result = fresh(int(sizes.sum()))
-        target, source, at = memoryview(result), self.view, 0
-        for start, size in zip(starts.tolist(), sizes.tolist(), strict=True):
-            end = at + size
-            target[at:end] = source[start : start + size]
-            at = end
-        return result
 
 
 class Pieces:
@@ -138,25 +130,25 @@ class Pieces:
         inside = starts - self.starts[rows]
         if (inside + sizes <= HEAD).all():
             return self.heads.ranges(self.head_starts[rows] + inside, sizes, item)
-        result = fresh(int(sizes.sum()))
-        target, raws, at = memoryview(result), self.raws, 0
-        for row, start, size in zip(rows.tolist(), inside.tolist(), sizes.tolist(), strict=True):
-            end = at + size
-            target[at:end] = raws[row][start : start + size]
-            at = end
-        return result
+        return _copied(map(self.raws.__getitem__, rows.tolist()), inside, sizes)
 
 
 Source = Flat | Pieces
 
 
-def fresh(size: int) -> Any:
-    """Return bytes of memory, so that if they are many, large pages are all they are made of."""
-    if size < 2 * PAGE:
-        return np.empty(size, np.uint8)
-    memory: Any = np.empty(size + PAGE, np.uint8)
-    start = -memory.__array_interface__["data"][0] % PAGE
-    return memory[start : start + size]
+def _copied(views: Iterable[Any], starts: Any, sizes: Any) -> Any:
+    """Return bytes of views, one after the other, each copied by itself."""
+    total, at = int(sizes.sum()), 0
+    result: Any = np.empty(total if total < 2 * PAGE else total + PAGE, np.uint8)
+    if len(result) > total:  # large pages are all that it is made of
+        start = -result.__array_interface__["data"][0] % PAGE
+        result = result[start : start + total]
+    target = memoryview(result)
+    for view, start, size in zip(views, starts.tolist(), sizes.tolist(), strict=False):
+        end = at + size
+        target[at:end] = view[start : start + size]
+        at = end
+    return result
 
 
 def _regular(starts: Any) -> int | None:
@@ -170,16 +162,12 @@ def _regular(starts: Any) -> int | None:
 # strings, as `deserialize` reads them: invalid UTF-8 and UTF-16 become U+FFFD
 
 
-def without_zeros(source: Source, starts: Any, sizes: Any) -> Any:
-    """Return the sizes of strings without their terminating zeros, if they have any."""
-    last = np.maximum(starts + sizes, 1) - 1
-    return sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
-
-
 def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
-    """Return the strings at some places, of so many bytes."""
+    """Return the strings at some places, of so many bytes with their terminating zeros, if any."""
+    last = np.maximum(starts + sizes, 1) - 1
+    sizes = sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
     texts = Texts(offsets_of(sizes), source.ranges(starts, sizes))
-    return texts if _is_utf8(texts) else _encoded(map(_text, _parts(texts)))
+    return texts if _is_utf8(texts) else _valid(texts, "utf-8")
 
 
 def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
@@ -189,7 +177,7 @@ def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) ->
         swapped = np.repeat(big, sizes)
         units[swapped] = units[swapped].byteswap()
     texts = Texts(offsets_of(sizes * 2), units.astype("<u2").view(np.uint8))
-    return _encoded(part.decode("utf-16-le", "replace") for part in _parts(texts))
+    return _valid(texts, "utf-16-le")
 
 
 def utf16_units(source: Source, starts: Any, sizes: Any, order: str) -> Any:
@@ -219,17 +207,9 @@ def _is_utf8(texts: Texts) -> bool:
     return True
 
 
-def _parts(texts: Texts) -> Any:
-    raw = texts.values.tobytes()
-    ends = texts.offsets.tolist()
-    return (raw[a:b] for a, b in pairwise(ends))
-
-
-def _text(raw: bytes) -> str:
-    return raw.decode("utf-8", "replace")
-
-
-def _encoded(texts: Any) -> Texts:
-    parts = [text.encode() for text in texts]
+def _valid(texts: Texts, encoding: str) -> Texts:
+    """Return texts of an encoding in UTF-8, with U+FFFD for what is not valid."""
+    raw, ends = texts.values.tobytes(), texts.offsets.tolist()
+    parts = [raw[a:b].decode(encoding, "replace").encode() for a, b in pairwise(ends)]
     sizes = np.fromiter(map(len, parts), np.int64, len(parts))
     return Texts(offsets_of(sizes), np.frombuffer(b"".join(parts), np.uint8))

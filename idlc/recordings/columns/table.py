@@ -6,26 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from idlc.recordings.columns.plan import (
-    Instant,
-    Level,
-    List,
-    Lists,
-    Node,
-    Numbers,
-    Segment,
-    Strings,
-)
+from idlc.recordings.columns.plan import Instant, Level, List, Node, Numbers, Segment, Struct, Text
 from idlc.recordings.columns.scan import ScanResult, joined
-from idlc.recordings.columns.source import (
-    Place,
-    Source,
-    narrow_texts,
-    offsets_of,
-    wide_texts,
-    without_zeros,
-)
-from idlc.recordings.columns.values import Columns, Ragged, Texts
+from idlc.recordings.columns.source import Place, Source, narrow_texts, offsets_of, wide_texts
+from idlc.recordings.columns.values import Columns, Ragged
 
 
 class Elements(NamedTuple):
@@ -61,31 +45,71 @@ class Table:
         result[elements.order] = values
         return result
 
-    def texts(self, elements: Elements, node: Strings) -> Texts:
-        """Return a column of strings."""
-        key = node.text.key
-        assert key is not None
-        starts = self.sorted(elements, self.scanned.at[key])
-        sizes = self.sorted(elements, self.scanned.size[key])
-        if node.text.wide:
-            return wide_texts(self.source, starts, sizes, self.order, elements.big)
-        return narrow_texts(self.source, starts, without_zeros(self.source, starts, sizes))
+    def columns(self, top: Elements) -> Columns:
+        """Return the columns of all messages."""
+        columns: Columns = self.column(top.level.node, top.total, top, self.numbers(top))
+        return columns
 
-    def list(self, elements: Elements, step: List) -> tuple[Any, Elements]:
-        """Return the offsets of a column of sequences, and what the elements are."""
+    def column(
+        self, node: Node, count: int, elements: Elements, numbers: dict[int, Any], depth: int = 0
+    ) -> Any:
+        """Return a column of `count` values, which are in arrays of `depth` dimensions.
+
+        They are of `elements`, whose `numbers` are found already.
+        """
+        if isinstance(node, Numbers):
+            values = self.native(numbers[node.key], node.code, elements.big)
+            return values.reshape(count, *values.shape[1 + depth :])
+        if isinstance(node, Text):
+            assert node.key is not None
+            starts = self.sorted(elements, self.scanned.at[node.key])
+            sizes = self.sorted(elements, self.scanned.size[node.key])
+            if node.wide:
+                return wide_texts(self.source, starts, sizes, self.order, elements.big)
+            return narrow_texts(self.source, starts, sizes)
+        if isinstance(node, Instant):
+            seconds, nanoseconds = (
+                self.column(part, count, elements, numbers, depth)
+                for part in (node.seconds, node.nanoseconds)
+            )
+            return (seconds.astype(np.int64) * 1_000_000_000 + nanoseconds).view(node.code)
+        if isinstance(node, Struct):
+            columns = {
+                name: self.column(inner, count, elements, numbers, depth)
+                for name, inner in node.fields.items()
+            }
+            return Columns(columns, count)
+        if node.step is not None:
+            offsets, elements, numbers = self.inside(elements, node.step)
+            return Ragged(offsets, self.column(node.element, elements.total, elements, numbers))
+        assert node.size is not None
+        every = count * node.size
+        inner = self.column(node.element, every, elements, numbers, depth + 1)
+        return Ragged(np.arange(count + 1) * node.size, inner)
+
+    def inside(self, around: Elements, step: List) -> tuple[Any, Elements, dict[int, Any]]:
+        """Return the offsets of a column of sequences, their elements, and the numbers in these."""
         assert step.key is not None
-        counts = self.sorted(elements, self.scanned.size[step.key])
+        counts = self.sorted(around, self.scanned.size[step.key])
         offsets = offsets_of(counts)
-        level, order = step.level, None
-        if not level.packed:
+        level, packed, order = step.level, step.level.packed, None
+        if not packed:
             parent = joined(self.scanned.parent[level.key])
-            if elements.order is not None:
-                parent = elements.order[parent]
+            if around.order is not None:
+                parent = around.order[parent]
             order = offsets[parent] + joined(self.scanned.index[level.key])
             if (order == np.arange(len(order))).all():
                 order = None
-        big = None if elements.big is None else np.repeat(elements.big, counts)
-        return offsets, Elements(level, int(offsets[-1]), order, big)
+        big = None if around.big is None else np.repeat(around.big, counts)
+        elements = Elements(level, int(offsets[-1]), order, big)
+        numbers: dict[int, Any] = {}
+        if packed and packed.leaves:
+            starts, size = self.sorted(around, self.scanned.at[step.key]), packed.size
+            content = self.source.ranges(starts, counts * size, size)
+            self.cut(packed, Place(content, 0, (elements.total,), (size,)), numbers)
+        elif not packed:
+            numbers = self.numbers(elements)
+        return offsets, elements, numbers
 
     def numbers(self, elements: Elements) -> dict[int, Any]:
         """Return the numbers of a level, perhaps as views of the buffer, by their keys."""
@@ -93,23 +117,7 @@ class Table:
         for step in elements.level.steps:
             if isinstance(step, Segment) and step.leaves:
                 starts = self.sorted(elements, self.scanned.at[step.key])
-                place = self.source.blocks(starts, step.size)
-                self.cut(step, place, result)
-        return result
-
-    def inside(self, around: Elements, step: List, elements: Elements) -> dict[int, Any]:
-        """Return the same for the elements of sequences."""
-        packed = step.level.packed
-        if not packed:
-            return self.numbers(elements)
-        assert step.key is not None
-        result: dict[int, Any] = {}
-        if packed.leaves:
-            starts = self.sorted(around, self.scanned.at[step.key])
-            counts = self.sorted(around, self.scanned.size[step.key])
-            size = packed.size
-            content = self.source.ranges(starts, counts * size, size)
-            self.cut(packed, Place(content, 0, (elements.total,), (size,)), result)
+                self.cut(step, self.source.blocks(starts, step.size), result)
         return result
 
     def native(self, numbers: Any, code: str, big: Any) -> Any:
@@ -138,47 +146,3 @@ class Table:
                 start = place.offset + leaf.offset
                 numbers = np.ndarray(shape, dtype, place.memory, start, strides)
             result[leaf.key] = numbers
-
-
-def columns_of(table: Table, top: Elements) -> Columns:
-    """Return the columns of all messages."""
-    making = _Making(table, top, table.numbers(top))
-    columns: Columns = making.column(top.level.node, top.total)
-    return columns
-
-
-class _Making:
-    """Makes columns of the elements of one level, whose numbers are found already."""
-
-    def __init__(self, table: Table, elements: Elements, numbers: dict[int, Any]) -> None:
-        self.table = table
-        self.elements = elements
-        self.numbers = numbers
-
-    def column(self, node: Node, count: int, depth: int = 0) -> Any:
-        """Return a column of `count` values, which are in arrays of so many dimensions."""
-        if isinstance(node, Numbers):
-            numbers = self.table.native(self.numbers[node.key], node.code, self.elements.big)
-            return numbers.reshape(count, *numbers.shape[1 + depth :])
-        if isinstance(node, Strings):
-            return self.table.texts(self.elements, node)
-        if isinstance(node, Instant):
-            parts = (node.seconds, node.nanoseconds)
-            seconds, nanoseconds = (self.column(part, count, depth) for part in parts)
-            return (seconds.astype(np.int64) * 1_000_000_000 + nanoseconds).view(node.code)
-        if isinstance(node, Lists):
-            return self.lists(node, count, depth)
-        columns = {name: self.column(inner, count, depth) for name, inner in node.fields.items()}
-        return Columns(columns, count)
-
-    def lists(self, node: Lists, count: int, depth: int) -> Ragged:
-        """Return a column of sequences or arrays."""
-        if node.step is None:
-            assert node.size is not None
-            offsets: Any = np.arange(count + 1) * node.size
-            inner = self.column(node.element, count * node.size, depth + 1)
-            return Ragged(offsets, inner)
-        offsets, elements = self.table.list(self.elements, node.step)
-        numbers = self.table.inside(self.elements, node.step, elements)
-        inside = _Making(self.table, elements, numbers)
-        return Ragged(offsets, inside.column(node.element, elements.total))

@@ -60,16 +60,16 @@ class _Sliced(Column):
         """The sizes of the elements."""
         return np.diff(self.offsets)
 
-    def _slice(self, place: slice) -> Any:
+    def __getitem__(self, place: Any) -> Any:
+        if not isinstance(place, slice):
+            index = self._index(place)
+            return self.values[self.offsets[index] : self.offsets[index + 1]]
         first, last, step = place.indices(len(self))
         if step != 1:
             raise ValueError("a slice of this column cannot have a step")
         offsets = self.offsets[first : max(first, last) + 1]
         values = self.values[offsets[0] : offsets[-1]]
         return type(self)(offsets - offsets[0], values)
-
-    def _part(self, index: int) -> Any:
-        return self.values[self.offsets[index] : self.offsets[index + 1]]
 
 
 class Texts(_Sliced):
@@ -78,9 +78,8 @@ class Texts(_Sliced):
     __slots__ = ()
 
     def __getitem__(self, place: Any) -> Any:
-        if isinstance(place, slice):
-            return self._slice(place)
-        return self._part(self._index(place)).tobytes().decode()
+        element = super().__getitem__(place)
+        return element if isinstance(place, slice) else element.tobytes().decode()
 
     def to_list(self) -> list[str]:
         """Return the texts."""
@@ -100,24 +99,17 @@ class Ragged(_Sliced):
 
     __slots__ = ()
 
-    def __getitem__(self, place: Any) -> Any:
-        if isinstance(place, slice):
-            return self._slice(place)
-        return self._part(self._index(place))
-
     def to_list(self) -> list[Any]:
         """Return a list for each sequence."""
         elements = column_list(self.values)
-        ends = self.offsets.tolist()
-        return [elements[a:b] for a, b in pairwise(ends)]
+        return [elements[a:b] for a, b in pairwise(self.offsets.tolist())]
 
     def stacked(self) -> Any:
         """Return numbers as an array of two dimensions or more.
 
         Raises ValueError where a sequence has another size than the first.
         """
-        sizes = self.sizes
-        values: Any = self.values
+        sizes, values = self.sizes, self.values
         if not isinstance(values, np.ndarray):
             raise TypeError("only numbers can be stacked")
         other = self.uneven()
@@ -154,9 +146,8 @@ class Columns(Column):
                 return self._columns[place]
             raise KeyError(f"no column {place!r}, but {', '.join(self._columns)}")
         if isinstance(place, slice):
-            count = len(range(self._count)[place])
             columns = {name: column[place] for name, column in self._columns.items()}
-            return Columns(columns, count)
+            return Columns(columns, len(range(self._count)[place]))
         index = self._index(place)
         return self[index : index + 1].to_list()[0]
 
@@ -169,8 +160,7 @@ class Columns(Column):
         if not self._columns:
             return [{} for _ in range(self._count)]
         lists = map(column_list, self._columns.values())
-        names = self.keys()
-        return [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
+        return [dict(zip(self._columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
     def structured(self) -> Any:
         """Return a structured array, with texts as bytes in UTF-8.
@@ -194,8 +184,7 @@ class Columns(Column):
         result: dict[str, Any] = {}
         for name, column in self._columns.items():
             if isinstance(column, Columns):
-                inner = column.flat()
-                result |= {f"{name}.{below}": leaf for below, leaf in inner.items()}
+                result |= {f"{name}.{below}": leaf for below, leaf in column.flat().items()}
             else:
                 result[name] = column
         return result
@@ -240,18 +229,15 @@ def _fill(target: Any, column: Any) -> None:
             _fill(target[name], inner)
     elif isinstance(column, Ragged):
         _fill(target, column.values)
-    else:
-        rows = _padded(column, target.itemsize) if isinstance(column, Texts) else column
+    elif isinstance(column, Texts):  # numpy has all as wide
+        rows, width = column.values, target.itemsize
+        if len(rows) != len(column) * width:
+            rows = np.zeros((len(column), width), np.uint8)
+            rows[np.arange(width) < column.sizes[:, None]] = column.values
+        rows = np.ascontiguousarray(rows).reshape(-1).view(f"S{width}")
         target[...] = rows.reshape(target.shape)
-
-
-def _padded(texts: Texts, width: int) -> Any:
-    """Return texts as numpy has them: all as wide."""
-    rows = texts.values
-    if len(rows) != len(texts) * width:
-        rows = np.zeros((len(texts), width), np.uint8)
-        rows[np.arange(width) < texts.sizes[:, None]] = texts.values
-    return np.ascontiguousarray(rows).reshape(-1).view(f"S{width}")
+    else:
+        target[...] = column.reshape(target.shape)
 
 
 def column_list(column: Any) -> Any:

@@ -40,10 +40,8 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
             notes += [f"`{name}` is not named in {METADATA} and left out" for name in others]
             present = {name: present[name] for name in named if name in present}
     if not present:
-        inside = sorted(path.parent for path in folder.glob(f"*/{METADATA}"))
-        hint = (
-            f"name a bag in it, such as `{inside[0]}`" if inside else "it has no .mcap or .db3 file"
-        )
+        inside = min((path.parent for path in folder.glob(f"*/{METADATA}")), default=None)
+        hint = f"name a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
         raise RecordingError(f"`{folder}` holds no recording", hint)
     for name in present:
         if name.endswith(COMPRESSED):
@@ -77,14 +75,14 @@ def _names(metadata: Path) -> list[str]:
         mark = getattr(error, "problem_mark", None)
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise RecordingError(f"`{METADATA}{where}` is not YAML") from None
-    lists = [
-        paths
+    return [
+        str(node.value)
         for information in _values(root, "rosbag2_bagfile_information")
         for paths in _values(information, "relative_file_paths")
+        if isinstance(paths, yaml.SequenceNode)
+        for node in paths.value
+        if isinstance(node, yaml.ScalarNode)
     ]
-    sequences = (node for node in lists if isinstance(node, yaml.SequenceNode))
-    nodes = [node for sequence in sequences for node in sequence.value]
-    return [str(node.value) for node in nodes if isinstance(node, yaml.ScalarNode)]
 
 
 def _values(node: Any, key: str) -> list[Any]:

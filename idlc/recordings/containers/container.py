@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
 
 Opened = TypeVar("Opened", bound="File | Container")
-DB3 = ".db3"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
@@ -122,7 +121,7 @@ def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Con
 
 def open_pieces(place: Any) -> File:
     """Open a file to read pieces of it that are known: nothing else is read."""
-    if is_local(place) and Path(place).suffix == DB3:
+    if is_local(place) and Path(place).suffix == ".db3":
         return Db3File(Path(place), read=False)
     return McapFile(place, read=False)
 

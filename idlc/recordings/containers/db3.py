@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
-from idlc.recordings.containers.file import START, File, Topic, full_name, recorded_schema
+from idlc.recordings.containers.file import START, File, Schema, Topic, full_name, recorded_schema
 from idlc.recordings.containers.source import RecordingError, first_bytes, of_file
 
 if TYPE_CHECKING:
@@ -61,13 +61,13 @@ class Db3File(File):
             location = f"file:{quote(str(self._path))}?mode=ro{'&immutable=1' * self._lone}"
             self._db = sqlite3.connect(location, PATIENCE, uri=True, check_same_thread=False)
             # truncating a mapped file would kill the process
-            for pragma in (
-                *("trusted_schema=OFF", "query_only=ON", "cell_size_check=ON", "mmap_size=0"),
-            ):
+            for pragma in "trusted_schema=OFF query_only=ON cell_size_check=ON mmap_size=0".split():
                 self._db.execute(f"PRAGMA {pragma}")
         try:
             columns = self._tables()
-            self._check_size()
+            ((page,),) = self._rows("PRAGMA page_size")
+            if rest := self._path.stat().st_size % page:  # which SQLite fills with zeros
+                raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
             self.topics = list(self._topics(columns)) if read else []
         except RecordingError:
             self._db.close()
@@ -79,8 +79,9 @@ class Db3File(File):
 
     def _is_in_use(self) -> bool:
         """Return whether a journal or log has something that the file has not, or may have."""
-        journal = self._path.with_name(self._path.name + "-journal")
-        return _begins(self._log) or _begins(journal)
+        logs = (self._log, self._path.with_name(self._path.name + "-journal"))
+        # an empty one has nothing, and one that is done may be marked with zeros
+        return any(path.is_file() and first_bytes(path, 1) not in (b"", b"\0") for path in logs)
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
@@ -88,21 +89,19 @@ class Db3File(File):
         try:
             yield
         except (sqlite3.Error, OSError, OverflowError, UnicodeError) as error:
-            raise self._error(str(error)) from None
-
-    def _error(self, what: str) -> RecordingError:
-        """Return an error with a hint for a problem that SQLite reports."""
-        repair = f"sqlite3 {shlex.quote(self.name)} .schema"
-        if "readonly" in what:  # it would have to write to roll back
-            why = "is not whole: its writer stopped in the middle of a transaction"
-            return RecordingError(f"`{self.name}` {why}", f"SQLite undoes it: {repair}")
-        if "locked" in what:
-            why = "is locked by the program that writes it"
-            return RecordingError(f"`{self.name}` {why}", "try again when that has ended")
-        if "unable to open" in what and self._is_in_use():
-            why = f"cannot be read with its `{self._log.name}`, which needs a file beside it"
-            return RecordingError(f"`{self.name}` {why}", "copy both to a folder of your own")
-        return RecordingError(f"`{self.name}` cannot be read: {what}")
+            what, hint = str(error), None
+            if "readonly" in what:  # it would have to write to roll back
+                why = "is not whole: its writer stopped in the middle of a transaction"
+                hint = f"SQLite undoes it: sqlite3 {shlex.quote(self.name)} .schema"
+            elif "locked" in what:
+                why = "is locked by the program that writes it"
+                hint = "try again when that has ended"
+            elif "unable to open" in what and self._is_in_use():
+                why = f"cannot be read with its `{self._log.name}`, which needs a file beside it"
+                hint = "copy both to a folder of your own"
+            else:
+                why = f"cannot be read: {what}"
+            raise RecordingError(f"`{self.name}` {why}", hint) from None
 
     def _rows(
         self, query: str, values: tuple[Any, ...] = ()
@@ -119,12 +118,6 @@ class Db3File(File):
         if self._is_in_use() or (now.st_mtime_ns, now.st_size) != (then.st_mtime_ns, then.st_size):
             raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
 
-    def _check_size(self) -> None:
-        """Raise RecordingError if the last page is cut off, which SQLite fills with zeros."""
-        ((page,),) = self._rows("PRAGMA page_size")
-        if rest := self._path.stat().st_size % page:
-            raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
-
     def _tables(self) -> dict[str, set[str]]:
         """Return each table's columns; raise RecordingError if there are others than plain ones."""
         tables: dict[str, set[str]] = {}
@@ -132,10 +125,8 @@ class Db3File(File):
             if kind == "index":
                 continue
             if kind != "table" or str(text).split()[1:2] != ["TABLE"]:
-                kind = kind if kind != "table" else "virtual table"
-                raise RecordingError(
-                    f"`{self.name}` holds a {kind}, `{name}`, as no recording does"
-                )
+                what = f"a {kind if kind != 'table' else 'virtual table'}, `{name}`"
+                raise RecordingError(f"`{self.name}` holds {what}, as no recording does")
             quoted = '"' + str(name).replace('"', '""') + '"'
             columns = list(self._rows(f"PRAGMA table_xinfo({quoted})"))
             if any(column[6] in COMPUTED for column in columns):
@@ -144,10 +135,8 @@ class Db3File(File):
                 # it hides the numbers of rows, which no two have in common
                 raise RecordingError(f"`{self.name}`: a column of `{name}` is called rowid")
             tables[str(name)] = {str(column[1]) for column in columns}
-        for table, needed in (
-            ("topics", {"id", "name", "type"}),
-            ("messages", {"topic_id", "data"}),
-        ):
+        required = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "data"}}
+        for table, needed in required.items():
             if not needed <= tables.get(table, set()):
                 raise RecordingError(f"`{self.name}` is no recording: it has no table of {table}")
         return tables
@@ -159,9 +148,8 @@ class Db3File(File):
         digest = "type_description_hash" if "type_description_hash" in own else "''"
         query = f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id"  # noqa: S608 # ours
         definitions = self._definitions(columns.get("message_definitions", set()))
-        counts = dict(
-            self._rows("SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id")
-        )
+        counting = "SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id"
+        counts = dict(self._rows(counting))
         for number, *texts in self._rows(query):
             if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
                 raise RecordingError(f"`{self.name}`: a topic has values of other types")
@@ -170,7 +158,7 @@ class Db3File(File):
             recorded = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
             schema_encoding, text, other = recorded or ("", "", "")
             kind, count = full_name(kind), counts.get(number, 0)
-            schema = recorded_schema(kind, schema_encoding, text)
+            schema = recorded_schema(Schema(kind, schema_encoding, text))
             yield Topic(name, kind, count, digest or other or None, encoding, schema), number
 
     def _definitions(self, columns: set[str]) -> dict[str, tuple[str, str, str]]:
@@ -264,8 +252,3 @@ class Db3File(File):
                     if size >= GROUP:
                         return times, raws, row + 1
         return times, raws, rows.last + 1
-
-
-def _begins(path: Path) -> bool:
-    """Return whether there is a journal or log that is not empty, or marked as done with zeros."""
-    return path.is_file() and first_bytes(path, 1) not in (b"", b"\0")

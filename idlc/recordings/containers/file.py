@@ -88,10 +88,9 @@ def full_name(name: str) -> str:
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
 
 
-def recorded_schema(name: str, encoding: str, text: str) -> Schema | None:
+def recorded_schema(schema: Schema) -> Schema | None:
     """Return a definition; where a recorder has none, it writes an empty one of no encoding."""
-    schema = Schema(name, encoding, text)
-    return None if schema.is_blank and encoding != MSG else schema
+    return None if schema.is_blank and schema.encoding != MSG else schema
 
 
 def check_count(topic: str, counted: int, actual: int) -> None:
@@ -133,10 +132,8 @@ def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:
     if kind:
         what = f"messages of `{topic}` are written as {kind}, and idlc reads only plain CDR"
         return UnreadTopic(what, "record them from a publisher whose data representation is XCDR1")
-    for magic, name in _COMPRESSIONS.items():
-        if start.startswith(magic):
-            what = (
-                f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
-            )
-            return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")
-    return None
+    name = next((name for magic, name in _COMPRESSIONS.items() if start.startswith(magic)), None)
+    if name is None:
+        return None
+    what = f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
+    return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")

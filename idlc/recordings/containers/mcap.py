@@ -60,22 +60,6 @@ class Channel(NamedTuple):
     metadata: dict[str, str]
 
 
-def read_schema(fields: Fields) -> Schema:
-    """Read a Schema record; invalid UTF-8 is replaced, as comments may be in any encoding."""
-    name, encoding = full_name(fields.name()), fields.name()
-    return Schema(name, encoding, str(fields.read(fields.number(4)), "utf-8", "replace"))
-
-
-def read_channel(fields: Fields) -> Channel:
-    """Read a Channel record."""
-    schema, topic, encoding = fields.number(2), fields.name(), fields.name()
-    part, metadata = fields.part(), {}
-    while part.more():
-        key = part.name()
-        metadata[key] = part.name()
-    return Channel(schema, topic, encoding, metadata)
-
-
 class Facts(msgspec.Struct):
     """The content of a file; `start` is the time of the first message.
 
@@ -94,12 +78,20 @@ class Facts(msgspec.Struct):
         """Add a schema or a channel; definitions of one number must be equal."""
         if op == records.SCHEMA_OP:
             fields = Fields(data, "a schema")
-            number, schema = fields.number(2), read_schema(fields)
+            number, name, encoding = fields.number(2), full_name(fields.name()), fields.name()
+            # comments may be in any encoding
+            text = str(fields.read(fields.number(4)), "utf-8", "replace")
+            schema = Schema(name, encoding, text)
             if self.schemas.setdefault(number, schema) != schema:
                 raise RecordingError(f"schema {number} is defined in two ways")
         elif op == records.CHANNEL_OP:
             fields = Fields(data, "a channel")
-            number, channel = fields.number(2), read_channel(fields)
+            number, schema_number = fields.number(2), fields.number(2)
+            topic, encoding, part, metadata = fields.name(), fields.name(), fields.part(), {}
+            while part.more():
+                key = part.name()
+                metadata[key] = part.name()
+            channel = Channel(schema_number, topic, encoding, metadata)
             if self.channels.setdefault(number, channel) != channel:
                 raise RecordingError(f"channel {number} is defined in two ways")
 
@@ -205,10 +197,8 @@ def _add_loose(source: Source, facts: Facts, start: int) -> None:
     """
     facts.chunks.sort(key=lambda chunk: chunk.at)
     walk, end = _Walk(source), len(MAGIC)
-    for at, following in [
-        *((chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks),
-        (start, start),
-    ]:
+    ranges = [(chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks]
+    for at, following in (*ranges, (start, start)):
         if at < end:
             raise RecordingError("its summary names chunks that are not there")
         for op, place, size in heads(source, end, at):
@@ -287,9 +277,8 @@ class _Walk:
             self.damaged = True
             content, counts = memoryview(b""), named
             first, last = head.first, head.last
-        for (op, _, data), _ in zip(
-            records.read_records(content), self.room.records(), strict=False
-        ):
+        every = zip(records.read_records(content), self.room.records(), strict=False)
+        for (op, _, data), _ in every:
             if op != MESSAGE_OP:
                 self.facts.add(op, data)
             elif len(data) >= CHANNEL_AND_TIME.size:
@@ -329,12 +318,10 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
             break
     walk.end_of_chunk()
     walk.end_of_loose()
-    if ended:
-        walk.facts.notes.append(f"{reason}: read from its records")
-    else:
-        left = source.size - end
-        rest = f", {left:,} bytes are left out" if left else ""
-        walk.facts.notes.append(f"{reason}: read to its last whole record{rest}")
+    left = source.size - end
+    rest = f", {left:,} bytes are left out" if left else ""
+    extent = "from its records" if ended else f"to its last whole record{rest}"
+    walk.facts.notes.append(f"{reason}: read {extent}")
     return walk.facts
 
 
@@ -351,17 +338,13 @@ class McapFile(File):
         with of_file(self.name):
             self.facts = read_facts(self.source, index, check) if read else Facts()
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
-        self.topics = [(self._topic(number), number) for number in self.facts.channels]
-
-    def _topic(self, number: int) -> Topic:
-        channel = self.facts.channels[number]
-        schema = self.facts.schemas.get(channel.schema)
-        name = schema.name if schema else ""
-        if schema:
-            schema = recorded_schema(name, schema.encoding, schema.text)
-        count = self.facts.counts.get(number, 0)
-        digest = channel.metadata.get("topic_type_hash") or None
-        return Topic(channel.topic, name, count, digest, channel.encoding, schema)
+        self.topics = []
+        for number, channel in self.facts.channels.items():
+            schema, count = self.facts.schemas.get(channel.schema), self.facts.counts.get(number, 0)
+            kind, recorded = (schema.name, recorded_schema(schema)) if schema else ("", None)
+            digest = channel.metadata.get("topic_type_hash") or None
+            topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded)
+            self.topics.append((topic, number))
 
     @property
     def start(self) -> int | None:
@@ -401,7 +384,11 @@ class McapFile(File):
         ]
         if window != (None, None):
             chunks = self._checked(chunks, topics)
-        return [chunk for chunk in chunks if chunk.may_have(window)]
+        return [
+            chunk
+            for chunk in chunks
+            if chunk.compression is None or window.overlaps(chunk.first, chunk.last)
+        ]
 
     @cached_property
     def _indexes(self) -> dict[int, array[int]]:
@@ -439,15 +426,7 @@ class McapFile(File):
         self, topics: Collection[int], window: Window, size: int
     ) -> Iterator[tuple[Chunk, ...]]:
         """Yield neighbours of about `size` bytes."""
-        part: list[Chunk] = []
-        total = 0
-        for chunk in self.pieces(topics, window):
-            if part and total + chunk.size > size:
-                yield tuple(part)
-                part, total = [], 0
-            part.append(chunk)
-            total += chunk.size
-        if part:
+        for part in records.grouped(self.pieces(topics, window), lambda chunk: chunk.size, size):
             yield tuple(part)
 
     def messages(

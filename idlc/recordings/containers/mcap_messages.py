@@ -42,46 +42,44 @@ def in_chunks(
     """Yield the messages of some channels in chunks, adjacent chunks together."""
     with of_file(source.name):
         room = Room(source.size)
-        groups = _groups(source, chunks, room)
+        heads = _heads(source, chunks, room)
+        groups = records.grouped(heads, lambda pair: pair[1].size, records.GROUP)
         while True:
             with source.opened():  # closed while the caller uses the messages
                 group = next(groups, None)
                 if group is None:
                     return
                 ranges = _read(source, group, channels, room, check).within(window)
-            if len(ranges):
-                yield decompress_each(ranges, room)
+            array = np.frombuffer(ranges.buffer, np.uint8)
+            filled = ranges.starts[ranges.stops > ranges.starts]
+            # a message may be compressed by itself: no other begins like a zstd frame
+            if (array[filled] == ZSTD_MAGIC[0]).any():
+                raws = [
+                    zstd_frame(raw, room) if raw[:4] == ZSTD_MAGIC else raw
+                    for raw in ranges.views()
+                ]
+                yield Separate(ranges.log_times, ranges.publish_times, raws)
+            elif len(ranges):
+                yield ranges
 
 
-def _groups(
+def _heads(
     source: Source, chunks: Iterable[Chunk], room: Room
-) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
-    """Yield groups of adjacent chunks that are read together."""
-    group: list[tuple[Chunk, ChunkHead]] = []
-    size = 0
+) -> Iterator[tuple[Chunk, ChunkHead]]:
+    """Yield each chunk with its head, if there is room for its records."""
     for chunk in chunks:
-        head = _head(source, chunk)
+        if chunk.compression is None:
+            yield chunk, ChunkHead(0, 0, chunk.size, 0, "", chunk.at, chunk.size)
+            continue
+        start = source.view(chunk.at, HEAD.size)
+        if HEAD.unpack(start) != (records.CHUNK_OP, chunk.size - HEAD.size):
+            raise RecordingError(f"there is no chunk at byte {chunk.at}, where an index has one")
+        head = records.read_chunk_head(source, chunk.at, chunk.size)
         if head.compression:
             room.reserve(head.size)
         elif head.size != head.stored:
             raise RecordingError("a chunk that is not compressed declares another size")
-        if group and size + head.size > records.GROUP:
-            yield group
-            group, size = [], 0
-        group.append((chunk, head))
-        size += head.size
-    if group:
-        yield group
-
-
-def _head(source: Source, chunk: Chunk) -> ChunkHead:
-    """Return the head of a chunk."""
-    if chunk.compression is None:
-        return ChunkHead(0, 0, chunk.size, 0, "", chunk.at, chunk.size)
-    head = source.view(chunk.at, HEAD.size)
-    if HEAD.unpack(head) != (records.CHUNK_OP, chunk.size - HEAD.size):
-        raise RecordingError(f"there is no chunk at byte {chunk.at}, where an index has one")
-    return records.read_chunk_head(source, chunk.at, chunk.size)
+        yield chunk, head
 
 
 def _read(
@@ -91,34 +89,30 @@ def _read(
     room: Room,
     check: bool,
 ) -> Ranges:
-    """Return the messages of some channels in adjacent chunks."""
+    """Return the messages of some channels in adjacent chunks.
+
+    Of a chunk without compression only these are read, if it has an index.
+    """
     buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
     starts, ends, at = [], [], 0
     for chunk, head in group:
         target = buffer[at : at + head.size]
         places = _indexed(source, chunk, head.size, channels)
-        _fill(source, chunk, head, target, places, check)
+        whole = places is None or (check and head.crc != 0) or not source.is_local
+        if head.compression:
+            decompress(source.view(head.start, head.stored), head.compression, target)
+        elif whole:
+            source.read(head.start, target)
+        else:
+            _read_some(source, head.start, target, places)
+        if check and head.crc and zlib.crc32(target) != head.crc:
+            raise RecordingError(f"the checksum of the chunk at byte {chunk.at} is wrong")
         if places is None:
             places = np.array(_walked(target, chunk, channels, room), np.int64)
         starts.append(places + at)
         at += head.size
         ends.append(np.full(len(places), at))
     return _messages(buffer, np.concatenate(starts), np.concatenate(ends), channels)
-
-
-def _fill(
-    source: Source, chunk: Chunk, head: ChunkHead, target: memoryview, places: Any, check: bool
-) -> None:
-    """Read the records of a chunk into a buffer, or only those at `places` if that suffices."""
-    check = check and head.crc != 0
-    if head.compression:
-        decompress(source.view(head.start, head.stored), head.compression, target)
-    elif places is None or check or not source.is_local:
-        source.read(head.start, target)
-    else:
-        _read_some(source, head.start, target, places)
-    if check and zlib.crc32(target) != head.crc:
-        raise RecordingError(f"the checksum of the chunk at byte {chunk.at} is wrong")
 
 
 def _read_some(source: Source, start: int, target: memoryview, places: Any) -> None:
@@ -191,16 +185,3 @@ def _messages(buffer: memoryview, at: Any, ends: Any, channels: Collection[int])
         raise RecordingError("an index names messages that overlap")
     log, publish = times_of(heads["log"], "log time"), times_of(heads["publish"], "publish time")
     return Ranges(log, publish, buffer, at + MESSAGE.itemsize, stops)
-
-
-def decompress_each(ranges: Ranges, room: Room) -> Messages:
-    """Return messages without the compression that each may have by itself.
-
-    No other message begins like a zstd frame.
-    """
-    array = np.frombuffer(ranges.buffer, np.uint8)
-    candidates = ranges.starts[ranges.stops > ranges.starts]
-    if not (array[candidates] == ZSTD_MAGIC[0]).any():
-        return ranges
-    raws = [zstd_frame(raw, room) if raw[:4] == ZSTD_MAGIC else raw for raw in ranges.views()]
-    return Separate(ranges.log_times, ranges.publish_times, raws)

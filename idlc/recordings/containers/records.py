@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from struct import Struct
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, TypeVar
 
 from idlc.recordings.containers.source import RecordingError, Source
 
-if TYPE_CHECKING:
-    from idlc.recordings.containers.messages import Window
-
+Item = TypeVar("Item")
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = Struct("<BQ")
 #: At the end of a file: the record, and the magic bytes once more.
@@ -40,10 +38,6 @@ class Chunk(NamedTuple):
     compression: str | None
     indexes: bytes | None
     index_size: int = 0
-
-    def may_have(self, window: Window) -> bool:
-        """Return whether messages of a window may be in it."""
-        return self.compression is None or window.overlaps(self.first, self.last)
 
 
 class Fields:
@@ -103,6 +97,23 @@ def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
             return
         yield op, at, HEAD.size + size
         at += HEAD.size + size
+
+
+def grouped(
+    items: Iterable[Item], size_of: Callable[[Item], int], most: int
+) -> Iterator[list[Item]]:
+    """Yield neighbours that together take at most so many bytes, or one that takes more."""
+    group: list[Item] = []
+    total = 0
+    for item in items:
+        size = size_of(item)
+        if group and total + size > most:
+            yield group
+            group, total = [], 0
+        group.append(item)
+        total += size
+    if group:
+        yield group
 
 
 def read_chunk_index(data: memoryview) -> Chunk:
