@@ -17,8 +17,8 @@ from typing import NamedTuple
 class Machine(NamedTuple):
     """A processor and its machine code.
 
-    A function of it ends where the next one begins. `holes` are the places in `code` that depend
-    on where something else is, with its name in the assembler text;
+    `code` is that of functions in hexadecimal digits; `holes` are the places in a function that
+    depend on where something else is, with its name in the assembler text.
     `fill(code, at, address, target)` fills the one at `at`, which will be at `address`.
     """
 
@@ -27,17 +27,9 @@ class Machine(NamedTuple):
     absolute: int
     page: int
     properties: bytes
-    code: bytes
-    entries: Mapping[str, int]
-    holes: Mapping[int, str]
+    code: Mapping[str, str]
+    holes: Mapping[str, Mapping[int, str]]
     fill: Callable[[bytearray, int, int, int], None]
-
-    def function(self, name: str) -> tuple[bytes, dict[int, str]]:
-        """Return the code of a function, and its holes by their places in it."""
-        start = self.entries[name]
-        end = min((at for at in self.entries.values() if at > start), default=len(self.code))
-        holes = {at - start: symbol for at, symbol in self.holes.items() if start <= at < end}
-        return self.code[start:end], holes
 
 
 _WORD = 0xFFFF_FFFF_FFFF_FFFF
@@ -112,8 +104,8 @@ class Image:
         """Return a function of the machine's, with these places for the symbols in its text."""
         key = (name, *((symbol, id(at), offset) for symbol, (at, offset) in symbols.items()))
         if key not in self._functions:
-            code, holes = self.machine.function(name)
-            place = self._functions[key] = self.code.put(code, 16)
+            code, holes = self.machine.code[name], self.machine.holes.get(name, {})
+            place = self._functions[key] = self.code.put(bytes.fromhex(code), 16)
             self.holes += [(place.offset + at, symbols[name]) for at, name in holes.items()]
         return self._functions[key]
 
@@ -270,7 +262,7 @@ class _File:
 
     def _fill_symbols(self) -> None:
         text = 1 + list(self.sections).index(".text")
-        size = len(self.image.machine.function("get")[0])
+        size = len(self.image.machine.code["get"]) // 2
         for index, name in enumerate(self.symbols, 1):
             place = self.image.exports.get(name)
             where = (text, place.address, size) if place else (0, 0, 0)
