@@ -198,6 +198,7 @@ class _File:
         self._relocate()
         self._fill_symbols()
         self._fill_dynamic()
+        kinds = {name: kind for part in KINDS.values() for name, kind in part.items()}
         names = [*self.sections, ".shstrtab"]
         starts, text = _strings(names)
         table = end + len(text) + -(end + len(text)) % 8
@@ -210,7 +211,14 @@ class _File:
         parts += [(self.offsets[name], section.data) for name, section in self.sections.items()]
         for at, data in parts:
             file[at : at + len(data)] = data
-        file += bytes(SECTION) + self._section_headers(starts)
+        file += bytes(SECTION)
+        for start, (name, section) in zip(starts, self.sections.items(), strict=False):
+            kind = kinds[name]
+            where = (section.address, self.offsets[name], len(section.data))
+            link = 1 + names.index(kind.link) if kind.link else 0
+            local = 1 if name == ".dynsym" else 0  # symbols that nobody else sees: the first one
+            refers = (link, local, section.align, kind.entry)
+            file += pack("<2I4Q2I2Q", start, kind.type, kind.flags, *where, *refers)
         file += pack("<2I4Q2I2Q", starts[-1], 3, 0, 0, end, len(text), 0, 0, 1, 0)
         at = self.offsets[".note.gnu.build-id"] + len(NOTE_OF_CONTENT) - 20
         file[at : at + 20] = hashlib.sha256(file).digest()[:20]
@@ -300,18 +308,6 @@ class _File:
             for kind, flags, at, address, size, align in rows
         )
 
-    def _section_headers(self, names: list[int]) -> bytes:
-        kinds = {name: kind for part in KINDS.values() for name, kind in part.items()}
-        rows = b""
-        for start, (name, section) in zip(names, self.sections.items(), strict=False):
-            kind = kinds[name]
-            where = (section.address, self.offsets[name], len(section.data))
-            link = 1 + list(kinds).index(kind.link) if kind.link else 0
-            local = 1 if name == ".dynsym" else 0  # symbols that nobody else sees: the first one
-            refers = (link, local, section.align, kind.entry)
-            rows += pack("<2I4Q2I2Q", start, kind.type, kind.flags, *where, *refers)
-        return rows
-
 
 def _strings(names: list[str]) -> tuple[list[int], bytes]:
     """Return the offset of each name in a string table, and the table."""
@@ -326,15 +322,11 @@ def _hash_table(symbols: list[str]) -> bytes:
     """Return the table by which a loader finds symbols, which count from 1."""
     buckets, chains = [0] * (len(symbols) | 1), [0] * (1 + len(symbols))
     for index, name in enumerate(symbols, 1):
-        bucket = _hash(name) % len(buckets)
+        value = 0
+        for byte in name.encode():
+            value = (value << 4) + byte
+            value = (value ^ (value & 0xF0000000) >> 24) & 0x0FFFFFFF
+        bucket = value % len(buckets)
         chains[index], buckets[bucket] = buckets[bucket], index
     words = (len(buckets), len(chains), *buckets, *chains)
     return pack(f"<{len(words)}I", *words)
-
-
-def _hash(name: str) -> int:
-    value = 0
-    for byte in name.encode():
-        value = (value << 4) + byte
-        value = (value ^ (value & 0xF0000000) >> 24) & 0x0FFFFFFF
-    return value
