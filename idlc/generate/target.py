@@ -16,6 +16,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import catalog, ir
 from idlc.model.ir import TypeName
+from idlc.model.link import Model
 from idlc.project import inputs, prefixes, write
 from idlc.project.files import is_file, is_folder
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
@@ -291,12 +292,6 @@ class Target:
         name = (Path(self.name).parent / package).as_posix()
         return Target(name, package, self._output._replace(runtime=self.runtime))
 
-    def locks_beside(self) -> dict[str, Lock]:
-        """Return the locks of the packages in the folder that this one is in, by their folders."""
-        folders = sorted(path.parent for path in self.path.parent.glob(f"*/{FILE}"))
-        locks = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
-        return {name: lock for name, lock in locks if lock}
-
     @cached_property
     def lock(self) -> Lock | None:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
@@ -424,6 +419,11 @@ class Target:
         if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
             path = f"{self.name}/{self.home}{FILE}"
             self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}", hint=hint))
+
+    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+        """Return the files to write for a model: its modules."""
+        del model
+        return {**modules}
 
     def cause(self, change: Change) -> str:
         """Return why a file is out of date; empty where only locks show it."""
