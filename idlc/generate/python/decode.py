@@ -65,14 +65,13 @@ def decode(
     own: str,
     makers: dict[ir.TypeName, str],
     foreign: Mapping[ir.TypeName, str],
-    *,
-    bulk: bool,
 ) -> tuple[Statement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
     `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
-    packages; `bulk` is the result of `is_bulk`.
+    packages.
     """
+    bulk = is_bulk(steps)
     decoder = _Decoder(tables, makers, foreign, "view" if bulk else "data")
     decoder.line(f"{own}()", "message")
     for step in steps:
