@@ -42,11 +42,7 @@ from idlc.version import __version__
 
 
 def requested_packages(
-    paths: Sequence[str],
-    named: Sequence[inputs.Inputs],
-    out: str,
-    scope: Scope,
-    report: Report,
+    paths: Sequence[str], named: Sequence[inputs.Inputs], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
     """Return the packages at paths, and the named ones; empty after a problem.
 

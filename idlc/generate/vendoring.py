@@ -27,6 +27,7 @@ def planned(
     """Return sound models, and packages to vendor, ready to be written; empty after an error."""
     library = compiler.library
     own = {model.package for model in models}
+    #: Each ready to be written, `None` for one that must not be.
     others: dict[str, Package | None] = {}
     needed: dict[str, set[str]] = {}
 
@@ -100,8 +101,8 @@ def leftovers(packages: Iterable[Package]) -> Iterator[tuple[Target, Plan | None
         if not names or package.target.modules:  # a prefix is for any packages
             continue
         folders = (path.parent for path in package.target.path.parent.glob(f"*/{FILE}"))
-        found = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
-        locks = {name: lock for name, lock in found if lock}
+        records = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
+        locks = {name: record for name, record in records if record}
         locks[package.target.package] = package.lock
         used = [name for name in locks if name not in names]
         while used:

@@ -329,7 +329,7 @@ class _Decoder(Builder):
             self.short_if(f"{self.position.text()} + {needed} > limit")
         else:
             self.short_if(f"{self.position.text(least * step.size)} > limit")
-        empty = Comprehension(f"{self.makers[step.type]}()", (("_", f"range({count})"),))
+        empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
         worded = self.worded

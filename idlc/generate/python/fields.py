@@ -9,7 +9,7 @@ import msgspec
 from idlc.generate.idl import idl_text
 from idlc.generate.python import literals
 from idlc.generate.python.imports import References
-from idlc.model import derive, ir, python_names
+from idlc.model import ir, python_names
 from idlc.model.ir import spell
 from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES
@@ -55,15 +55,16 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
     return Docstring(literals.between_quotes(line), tuple(map(Text, more)))
 
 
-def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
-    """Return what the messages of an interface are for."""
-    if isinstance(interface, ir.Message):
-        return {interface.name: f"{interface.name}."}
-    kind, words = "service", "request response"
-    if isinstance(interface, ir.Action):
-        kind, words = "action", "goal result feedback"
-    sections = zip(derive.sections(interface), words.split(), strict=True)
-    return {own.name: f"The {part} of the {kind} {interface.name}." for own, part in sections}
+def purposes(interface: ir.Interface) -> list[str]:
+    """Return what each section of an interface is for."""
+    match interface:
+        case ir.Message():
+            return [f"{interface.name}."]
+        case ir.Service():
+            kind, sections = "service", ["request", "response"]
+        case ir.Action():
+            kind, sections = "action", ["goal", "result", "feedback"]
+    return [f"The {section} of the {kind} {interface.name}." for section in sections]
 
 
 def attribute(described: ir.Field | ir.Constant, file: str) -> Docstring:

@@ -55,7 +55,17 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     steps = plan.steps(structure, messages, names)
     tables = Tables(names)
     writing = text_of(encode(steps, tables), 8)
-    makers = _makers(structure, steps, references, messages, tables)
+    # The functions that make empty objects of the message and of those in it. They demand that
+    # classes of the package have the fields that the codec was made for.
+    makers: dict[ir.TypeName, str] = {}
+    nested = (step.type for step in plan.walk(steps) if isinstance(step, (plan.Enter, plan.Items)))
+    for type_ in dict.fromkeys((structure.name, *nested)):
+        stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
+        words = ["kind" if type_ == structure.name else references.name(type_)]
+        if type_.package == references.package:
+            held = structure if type_ == structure.name else messages[type_]
+            words.append(f"{_stamp(held):#010x}")
+        makers[type_] = tables.function(stem, call("maker", *words))
     foreign = {
         type_: references.name(type_) for type_ in makers if type_.package != references.package
     }
@@ -79,30 +89,6 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
 
 def _code(lines: Iterable[str]) -> tuple[Code, ...]:
     return tuple(map(Code, lines))
-
-
-def _makers(
-    own: ir.Message,
-    steps: tuple[plan.Step, ...],
-    references: References,
-    messages: Messages,
-    tables: Tables,
-) -> dict[ir.TypeName, str]:
-    """Return the functions that make empty objects of the message and of those in it.
-
-    They demand that classes of the package have the fields that the codec was made for.
-    """
-    makers: dict[ir.TypeName, str] = {}
-    nested = (step.type for step in plan.walk(steps) if isinstance(step, (plan.Enter, plan.Items)))
-    for type_ in (own.name, *nested):
-        if type_ not in makers:
-            name = "kind" if type_ == own.name else references.name(type_)
-            stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
-            words = [name]
-            if type_.package == references.package:
-                words.append(f"{_stamp(own if type_ == own.name else messages[type_]):#010x}")
-            makers[type_] = tables.function(stem, call("maker", *words))
-    return makers
 
 
 def _stamp(message: ir.Message) -> int:
@@ -193,7 +179,7 @@ def module_views(
     every = [field for structure in written for field in structure.fields]
     is_foreign = references.others and not surroundings.vendors
     is_hiding = any(python_names.hides_method(field.name) for field in every)
-    purposes = fields.purposes(interface)
+    purposes = zip(written, fields.purposes(interface), strict=True)
     view = ModuleView(
         origin=Text(f"{name}.{name.kind}"),
         pragmas=(PRAGMAS if is_foreign else ()) + (HIDING_PRAGMAS if is_hiding else ()),
@@ -201,8 +187,8 @@ def module_views(
         runtime=Code(surroundings.runtime),
         imports=_code(_imports(references, written)),
         messages=tuple(
-            classes.message(structure, references, purposes, name.file, converts=converts)
-            for structure in written
+            classes.message(structure, references, purpose, name.file, converts=converts)
+            for structure, purpose in purposes
         ),
         group=None if isinstance(interface, ir.Message) else classes.group(interface),
         converts=converts,
