@@ -121,11 +121,9 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if report.had_errors:
         return ()
     packages = requested_packages(paths, named, options.out, options.scope, report)
-    whole = [
-        each for each in packages if each.is_whole(root) or options.ament or each.package in words
-    ]
-    for package in whole:
-        if names := unread_idl(package.folders, options.scope.exclude):
+    for package in packages:
+        is_whole = options.ament or package.package in words or package.is_whole(root)
+        if is_whole and (names := unread_idl(package.folders, options.scope.exclude)):
             files = first_few((f"`{name}`" for name in names), 3)
             report.notes.append(
                 f"idlc does not compile .idl files, so `{package.package}` lacks what these "

@@ -25,7 +25,6 @@ from idlc.project.library import Library
 from idlc.project.lock import (
     FILE,
     Lock,
-    Obstacle,
     Runtime,
     Tree,
     Vendoring,
@@ -219,11 +218,10 @@ def _dependency(name: str, library: Library) -> str:
 
 def _outputs_stand(out: Path, lock: Lock) -> bool:
     tree = Tree(out)
-    for path, expected in lock.outputs.items():
-        content = tree.read(path)
-        if content is None or isinstance(content, Obstacle) or digest(content) != expected:
-            return False
-    return True
+    contents = ((tree.read(path), expected) for path, expected in lock.outputs.items())
+    return all(
+        isinstance(content, bytes) and digest(content) == expected for content, expected in contents
+    )
 
 
 def _carries_this_runtime(lock: Lock) -> bool:
