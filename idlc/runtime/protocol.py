@@ -142,10 +142,7 @@ class GetResultResponse(Added, Generic[Result]):
     result: Result
 
     def __init__(
-        self,
-        status: int = 0,
-        result: Result | None = None,
-        **options: Unpack[Options],
+        self, status: int = 0, result: Result | None = None, **options: Unpack[Options]
     ) -> None:
         self._fill(options, status, result)
 
