@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,7 +25,6 @@ from idlc.generate.target import (
 from idlc.generate.vendoring import leftovers, planned
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
-from idlc.model.distros import Distro
 from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
@@ -122,10 +121,14 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if report.had_errors:
         return ()
     packages = requested_packages(paths, named, options.out, options.scope, report)
-    whole = [
-        each for each in packages if each.is_whole(root) or options.ament or each.package in words
-    ]
-    _note_idl(whole, options.scope, report)
+    for package in packages:
+        is_whole = options.ament or package.package in words or package.is_whole(root)
+        if is_whole and (names := unread_idl(package.folders, options.scope.exclude)):
+            files = first_few((f"`{name}`" for name in names), 3)
+            report.notes.append(
+                f"idlc does not compile .idl files, so `{package.package}` lacks what these "
+                f"define: {files}"
+            )
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
         return ()
@@ -136,16 +139,6 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
             write_setup_scripts(folders[0])
         return done
-
-
-def _note_idl(packages: Iterable[inputs.Inputs], scope: Scope, report: Report) -> None:
-    for package in packages:
-        if names := unread_idl(package.folders, scope.exclude):
-            files = first_few((f"`{name}`" for name in names), 3)
-            report.notes.append(
-                f"idlc does not compile .idl files, so `{package.package}` lacks what these "
-                f"define: {files}"
-            )
 
 
 def _targets(
@@ -199,7 +192,10 @@ def _compile_and_write(
     report: Report,
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(requested.values()), options.scope, report, texts)
-    refusable = _may_be_refused(requested.values(), library.distro)
+    # files that another distribution accepts may have errors for this one
+    refusable = not library.distro.reads_optional and any(
+        OPTIONAL.encode() in file.data for package in requested.values() for file in package.files
+    )
     if not (options.check or report.had_errors or refusable):
         current = [
             up_to_date(target, package.digests, library, options.vendoring)
@@ -232,13 +228,6 @@ def _compile_and_write(
             return ()
     targets = requested if packages else ()
     return with_needs(map(generated, packages), targets, library.distro, report, options.again)
-
-
-def _may_be_refused(packages: Iterable[inputs.Inputs], distro: Distro) -> bool:
-    """Return whether files that another distribution accepts may have errors for this one."""
-    if distro.reads_optional:
-        return False
-    return any(OPTIONAL.encode() in file.data for package in packages for file in package.files)
 
 
 class Run(NamedTuple):
@@ -277,26 +266,19 @@ def run_for(path: Path, package: str) -> Run | None:
     in the source package, or beside its interfaces.
     """
     for folder in path.parents:
-        if is_file(folder / settings.SETTINGS_FILE) and (run := _by_settings(folder, path)):
-            return run
-    return _by_lock(path, package)
-
-
-def _by_settings(folder: Path, path: Path) -> Run | None:
-    report = Report()
-    root = Root.at(folder)
-    settings = load_settings(root, report)
-    options = with_settings(GenOptions((), scope(settings)), settings)
-    covered = any(path.is_relative_to(root.absolute(each)) for each in options.paths)
-    return Run(folder, options) if options.out and covered and not report.had_errors else None
-
-
-def _by_lock(path: Path, package: str) -> Run | None:
+        if not is_file(folder / settings.SETTINGS_FILE):
+            continue
+        root, report = Root.at(folder), Report()
+        config = load_settings(root, report)
+        options = with_settings(GenOptions((), scope(config)), config)
+        covered = any(path.is_relative_to(root.absolute(each)) for each in options.paths)
+        if options.out and covered and not report.had_errors:
+            return Run(folder, options)
     home = root_of(str(path.parent))
     for out in (home / package, home):
         lock = load_lock(out, "", Report())
         if lock is not None and lock.package == package:
-            settings = scope(load_settings(Root.at(home), Report()), package)
+            chosen = scope(load_settings(Root.at(home), Report()), package)
             name = out.relative_to(home).as_posix()
-            return Run(home, GenOptions((".",), settings, name, vendoring=lock.vendoring))
+            return Run(home, GenOptions((".",), chosen, name, vendoring=lock.vendoring))
     return None

@@ -49,13 +49,13 @@ def _comment(lines: tuple[str, ...]) -> Iterator[str]:
 def _value(value: ir.Value) -> str:
     if not isinstance(value, tuple):
         return _scalar(value)
-    return f"[{', '.join(_element(element) for element in value)}]"
-
-
-def _element(value: ir.Scalar) -> str:
-    if not isinstance(value, str):
-        return _scalar(value)
-    return f'"{_SPECIAL_IN_ARRAYS.sub(_escaped_once, value)}"'
+    elements = (
+        f'"{_SPECIAL_IN_ARRAYS.sub(_escaped_once, element)}"'
+        if isinstance(element, str)
+        else _scalar(element)
+        for element in value
+    )
+    return f"[{', '.join(elements)}]"
 
 
 def _scalar(value: ir.Scalar) -> str:

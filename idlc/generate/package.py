@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from msgspec import UNSET
@@ -68,7 +68,7 @@ def package_of(
             *vendored_files(model.package, copies),
         )
         modules = {file.path: file.text for file in rendered}
-        files = _with_surroundings(model, modules, target)
+        files = target.placed(model, modules)
     plan = target.plan(files, check=check)
     if plan is None:
         return None
@@ -76,6 +76,8 @@ def package_of(
         ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if n.file in digests
     }
     others = {name for each in (model, *copies) for name in each.interfaces if name not in own}
+    references = {name for interface in model.own for name in derive.references(interface)}
+    imports = {f"{n.package}.{n.kind}" for n in references if n.package != model.package}
     return Package(
         target,
         plan,
@@ -87,30 +89,13 @@ def package_of(
             vendor_deps=bool(vendoring),
             converts_values=model.distro.converts_values or UNSET,
             vendored=tuple(beside),
-            imports=() if copies else _imports(model),
+            imports=() if copies else tuple(sorted(imports)),
             inputs=digests,
             dependencies=dependencies(others, library),
             types={n: model.describer.hash(n) for own in model.own for n in derived_names(own)},
             outputs=plan.outputs,
         ),
     )
-
-
-def _with_surroundings(
-    model: Model, modules: Mapping[str, str], target: Target
-) -> dict[str, str | bytes]:
-    """Return the files to write: modules, and in a prefix the files that ROS 2 reads there."""
-    if not target.modules:  # a package folder
-        return {**modules}
-    from idlc.generate.prefix import overlaid
-
-    return overlaid(model, modules, target)
-
-
-def _imports(model: Model) -> tuple[str, ...]:
-    """Return the modules of other packages that the package's own files refer to."""
-    targets = {target for own in model.own for target in derive.references(own)}
-    return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))
 
 
 class Generated(NamedTuple):

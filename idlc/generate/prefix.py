@@ -173,57 +173,42 @@ class Overlay(Target):
             return ""
         return "it is for another distribution of ROS 2"
 
-    def share(self, files: Mapping[str, str]) -> bool:
-        """Write the files for shells; foreign files stay, with a note."""
-        tree, changes = Tree(self.path), []
-        for path, text in files.items():
-            old, new = tree.read(path), text.encode("utf-8")
-            if old is None or (isinstance(old, bytes) and old.startswith(MARK)):
-                changes += [] if old == new else [Change(path, old, new)]
-            else:
-                self.report.notes.append(
-                    f"`{self.name}/{path}` is not idlc's: put `{self.name}` into AMENT_PREFIX_PATH"
-                )
-        plan = Plan(self.path, tuple(changes), {})
-        return write.apply(plan, self.name, self.report)
+    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+        """Return the files of a package by their paths in the prefix.
 
+        They are in the order in which to write them: files come after those that they refer to.
+        """
+        from idlc.project.templates import Code
 
-_SHELLS = ("sh", "bash", "zsh")
-
-
-def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[str, str | bytes]:
-    """Return the files of a package by their paths in the prefix.
-
-    They are in the order in which to write them: files come after those that they refer to.
-    """
-    from idlc.project.templates import Code
-
-    assert isinstance(overlay, Overlay)
-    manifest = overlay.manifest or _rendered(
-        "overlay/package.xml.jinja",
-        name=Code(model.package),
-        depends=[Code(name) for name in dependencies(model)],
-    )
-    libraries = libraries_of(model, overlay.distribution)
-    placed = {f"{overlay.modules}{path}": modules[path] for path in modules}
-    return {**placed, **shared(model, manifest, libraries, overlay.report)}
+        manifest = self.manifest or _rendered(
+            "overlay/package.xml.jinja",
+            name=Code(model.package),
+            depends=[Code(name) for name in dependencies(model)],
+        )
+        libraries = libraries_of(model, self.distribution)
+        files = {f"{self.modules}{path}": text for path, text in modules.items()}
+        return {**files, **shared(model, manifest, libraries, self.report)}
 
 
 def write_setup_scripts(overlay: Target) -> bool:
-    """Write the setup files for shells; return whether that succeeded."""
+    """Write the setup files for shells; foreign files stay, with a note."""
     from idlc.project.templates import Text
 
-    assert isinstance(overlay, Overlay)
-    files = {
-        f"{name}.{shell}": _rendered(
-            # for shells that do not know the path of the file that they source
-            f"overlay/setup.{shell}.jinja",
-            prefix=Text(quote(overlay.path.as_posix())),
-        )
-        for shell in _SHELLS
-        for name in ("local_setup", "setup")
-    }
-    return overlay.share(files)
+    prefix = Text(quote(overlay.path.as_posix()))
+    tree, changes = Tree(overlay.path), []
+    for shell in ("sh", "bash", "zsh"):
+        # for shells that do not know the path of the file that they source
+        new = _rendered(f"overlay/setup.{shell}.jinja", prefix=prefix).encode("utf-8")
+        for path in (f"local_setup.{shell}", f"setup.{shell}"):
+            old = tree.read(path)
+            if old is None or (isinstance(old, bytes) and old.startswith(MARK)):
+                changes += [] if old == new else [Change(path, old, new)]
+            else:
+                overlay.report.notes.append(
+                    f"`{overlay.name}/{path}` is not idlc's: put `{overlay.name}` into "
+                    "AMENT_PREFIX_PATH"
+                )
+    return write.apply(Plan(overlay.path, tuple(changes), {}), overlay.name, overlay.report)
 
 
 def _rendered(template: str, **variables: object) -> str:

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.model import catalog, ir
 from idlc.model.ir import TypeName
+from idlc.model.link import Model
 from idlc.project import inputs, prefixes, write
 from idlc.project.files import is_file, is_folder
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
@@ -24,7 +25,6 @@ from idlc.project.library import Library
 from idlc.project.lock import (
     FILE,
     Lock,
-    Obstacle,
     Runtime,
     Tree,
     Vendoring,
@@ -41,11 +41,7 @@ from idlc.version import __version__
 
 
 def requested_packages(
-    paths: Sequence[str],
-    named: Sequence[inputs.Inputs],
-    out: str,
-    scope: Scope,
-    report: Report,
+    paths: Sequence[str], named: Sequence[inputs.Inputs], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
     """Return the packages at paths, and the named ones; empty after a problem.
 
@@ -68,20 +64,29 @@ def _from_files(
     root = scope.root
     homes = by_home(files, root)
     apart = [] if scope.package else separate_homes(homes, root)
-    if _mixed(apart, root, report):
+    loose = [home for home in apart if not root.manifest(home)]
+    if any(set(home.parents) & set(apart) for home in loose):
+        names = first_few((f"`{root.shown(home)}`" for home in apart), 5)
+        report.add(
+            codes.SEVERAL_PACKAGES.of(
+                root.shown(apart[0]),
+                f"these may be one package or {len(apart)}: {names}",
+                hint="give --package NAME to compile them as one, or each folder a package.xml",
+            )
+        )
         return ()
-    declared = next((path for home in homes if (path := root.manifest(home))), None)
     if apart or not out:
         packages = inputs.packages(files, scope, report)
         folders = (package.home for package in packages)
         origins = ["package.xml" if root.manifest(folder) else "its folder" for folder in folders]
     else:
-        name, origins = scope.package, ["--package"]
+        home, name, origins = min(homes), scope.package, ["--package"]
+        declared = next((path for home in homes if (path := root.manifest(home))), None)
         if name is None and declared:
             name, origins = declared_name(declared, root, report), ["package.xml"]
         if name is None:
             name, origins = root.absolute(out).name, ["the folder given with -o"]
-            if catalog.is_standard(name) and min(homes).name != name:
+            if catalog.is_standard(name) and home.name != name:
                 report.add(
                     codes.UNIMPORTABLE_PACKAGE.of(
                         "",
@@ -89,8 +94,13 @@ def _from_files(
                         hint=f"choose another folder; add `--package {name}` if they are its files",
                     )
                 )
-            _note_name(name, min(homes), out, root, report)
-        packages = (inputs.load(name, files, min(homes), root, report),)
+            # other commands cannot know that name
+            if name != home.name and root.absolute(out).parent not in output_folders(home, root):
+                report.notes.append(
+                    f"the package is called `{name}`, as the folder given with -o; other commands "
+                    f"need `--package {name}`, or a package.xml beside the interfaces"
+                )
+        packages = (inputs.load(name, files, home, root, report),)
     if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
         report.add(
             codes.FOREIGN_FILE.of(
@@ -104,38 +114,13 @@ def _from_files(
     return packages
 
 
-def _note_name(name: str, home: Path, out: str, root: Root, report: Report) -> None:
-    """Note a name that other commands cannot know."""
-    if name != home.name and root.absolute(out).parent not in output_folders(home, root):
-        report.notes.append(
-            f"the package is called `{name}`, as the folder given with -o; other commands need "
-            f"`--package {name}`, or a package.xml beside the interfaces"
-        )
-
-
-def _mixed(homes: Sequence[Path], root: Root, report: Report) -> bool:
-    """Report nested folders of interfaces without a package.xml."""
-    loose = [home for home in homes if not root.manifest(home)]
-    if not any(set(home.parents) & set(homes) for home in loose):
-        return False
-    names = first_few((f"`{root.shown(home)}`" for home in homes), 5)
-    report.add(
-        codes.SEVERAL_PACKAGES.of(
-            root.shown(homes[0]),
-            f"these may be one package or {len(homes)}: {names}",
-            hint="give --package NAME to compile them as one, or each folder a package.xml",
-        )
-    )
-    return True
-
-
 def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:
     """Return types of one package, found in a library, as its input."""
     names = sorted(types)
     home = library.home(names[0].package)
     return inputs.Inputs(
         names[0].package,
-        tuple(_borrowed(name, str(name), library) for name in names),
+        tuple(_borrowed(name, library) for name in names),
         (home,) if home else (),
         borrowed=True,
     )
@@ -151,7 +136,7 @@ def completed(
     extended = []
     for package in packages:
         missing = {name for name in needed if name.package == package.package} - package.names
-        more = (_borrowed(name, str(name), library) for name in missing if package.borrowed)
+        more = (_borrowed(name, library) for name in missing if package.borrowed)
         files = sorted((*package.files, *more), key=lambda each: each.file.key)
         extended.append(msgspec.structs.replace(package, files=tuple(files)))
     return [] if extended == [*packages] else extended
@@ -167,17 +152,20 @@ def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
                 names = {entry.name for entry in os.scandir(inside)}
             except OSError:
                 continue
-            own = (name for name in names if name.endswith(".idl"))
-            alone = (name for name in own if f"{name.removesuffix('.idl')}{kind}" not in names)
-            included = (name for name in alone if not exclude.has(str(inside / name)))
-            unread += [f"{kind[1:]}/{name}" for name in included]
+            unread += [
+                f"{kind[1:]}/{name}"
+                for name in names
+                if name.endswith(".idl")
+                and f"{name.removesuffix('.idl')}{kind}" not in names
+                and not exclude.has(str(inside / name))
+            ]
     return sorted(unread)
 
 
-def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
+def _borrowed(name: ir.TypeName, library: Library) -> inputs.Input:
     source = library.source(name)
     assert source is not None, name
-    file = InterfaceFile(Path(source.path), source.path, name.kind, name.name, word, Path())
+    file = InterfaceFile(Path(source.path), source.path, name.kind, name.name, str(name), Path())
     return inputs.Input(file, source.text.encode())
 
 
@@ -205,8 +193,6 @@ def folder_targets(
 
 
 _PACKAGE = Path(__file__).parents[1]
-#: The folder of a generated package that holds its copy of the runtime.
-_COPY = "_idlc/"
 #: The sources of idlc that affect the output: a change counts although the version stays.
 _ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
 _MAKERS = (
@@ -232,11 +218,10 @@ def _dependency(name: str, library: Library) -> str:
 
 def _outputs_stand(out: Path, lock: Lock) -> bool:
     tree = Tree(out)
-    for path, expected in lock.outputs.items():
-        content = tree.read(path)
-        if content is None or isinstance(content, Obstacle) or digest(content) != expected:
-            return False
-    return True
+    contents = ((tree.read(path), expected) for path, expected in lock.outputs.items())
+    return all(
+        isinstance(content, bytes) and digest(content) == expected for content, expected in contents
+    )
 
 
 def _carries_this_runtime(lock: Lock) -> bool:
@@ -245,9 +230,9 @@ def _carries_this_runtime(lock: Lock) -> bool:
     Its version does not say so: those of two builds between two releases are equal.
     """
     copy = {
-        path.rpartition(_COPY)[2]: content
+        path.rpartition("_idlc/")[2]: content
         for path, content in lock.outputs.items()
-        if f"/{_COPY}" in f"/{path}"
+        if "/_idlc/" in f"/{path}"
     }
     return not copy or copy == _runtime()
 
@@ -301,12 +286,6 @@ class Target:
         name = (Path(self.name).parent / package).as_posix()
         return Target(name, package, self._output._replace(runtime=self.runtime))
 
-    def locks_beside(self) -> dict[str, Lock]:
-        """Return the locks of the packages in the folder that this one is in, by their folders."""
-        folders = sorted(path.parent for path in self.path.parent.glob(f"*/{FILE}"))
-        locks = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
-        return {name: lock for name, lock in locks if lock}
-
     @cached_property
     def lock(self) -> Lock | None:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
@@ -355,8 +334,15 @@ class Target:
 
     def missing(self) -> list[str]:
         """Return the packages that the generated code needs and this Python cannot import."""
-        modules = [name.split(".") for name in (self.lock.imports if self.lock else ())]
-        return sorted({package for package, kind in modules if not self._finds(package, kind)})
+        lacking = set()
+        for name in self.lock.imports if self.lock else ():
+            package, kind = name.split(".")
+            inside = f"{kind}/__init__.py"
+            if not is_file((self.path / self.modules).parent / package / inside) and not any(
+                is_file(place / inside) for place in prefixes.python_folders(package)
+            ):
+                lacking.add(package)
+        return sorted(lacking)
 
     def is_at_home(self) -> bool:
         """Return whether this Python is one that the generated code is imported with.
@@ -365,14 +351,6 @@ class Target:
         """
         needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
         return prefixes.runs_nodes() or any(map(prefixes.python_folders, needed))
-
-    def _finds(self, package: str, kind: str) -> bool:
-        """Return whether a package lies next to this one or could be imported; imports nothing."""
-        inside = f"{kind}/__init__.py"
-        beside = (self.path / self.modules).parent
-        return is_file(beside / package / inside) or any(
-            is_file(place / inside) for place in prefixes.python_folders(package)
-        )
 
     def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not.
@@ -417,41 +395,34 @@ class Target:
             return
         why = _reasons(self.lock, record) or "idlc itself changed"
         for change in changes.changes:
-            self.report.add(self._drifted(change, self.lock, why, again))
+            path = f"{self.name}/{change.path}"
+            wrote = self.lock.outputs.get(change.path)
+            advice = hint
+            if change.new is None:
+                message = f"`{path}` is no longer generated: {why}"
+            elif change.old is None:
+                message = f"`{path}` is missing" + ("" if wrote else f": {why}")
+            elif wrote is None or digest(change.old) not in wrote.split():
+                event = "not written by idlc" if wrote is None else "edited since idlc wrote it"
+                message = f"`{path}` was {event}"
+                advice = f"`{again} --force` replaces it, and keeps a copy"
+            else:
+                message = f"`{path}` is out of date: {self.cause(change) or why}"
+            self.report.add(codes.DRIFT.of(path, message, hint=advice))
         # a dependency found elsewhere that compiles to the same is no drift
         if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
             path = f"{self.name}/{self.home}{FILE}"
             self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}", hint=hint))
 
-    def _drifted(self, change: Change, old: Lock, why: str, again: str) -> Diagnostic:
-        path = f"{self.name}/{change.path}"
-        wrote = old.outputs.get(change.path)
-        hint = f"run `{again}`"
-        if change.new is None:
-            message = f"`{path}` is no longer generated: {why}"
-        elif change.old is None:
-            message = f"`{path}` is missing" + ("" if wrote else f": {why}")
-        elif wrote is not None and digest(change.old) not in wrote.split():
-            message = f"`{path}` was edited since idlc wrote it"
-            hint = f"`{again} --force` replaces it, and keeps a copy"
-        elif wrote is None:
-            message = f"`{path}` was not written by idlc"
-            hint = f"`{again} --force` replaces it, and keeps a copy"
-        else:
-            message = f"`{path}` is out of date: {self.cause(change) or why}"
-        return codes.DRIFT.of(path, message, hint=hint)
+    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+        """Return the files to write for a model: its modules."""
+        del model
+        return {**modules}
 
     def cause(self, change: Change) -> str:
         """Return why a file is out of date; empty where only locks show it."""
         del change
         return ""
-
-
-_MODES: dict[Vendoring, str] = {
-    "": "without `--vendor-deps`",
-    "private": "with `--vendor-deps`",
-    "beside": "with `--vendor-deps=beside`",
-}
 
 
 def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
@@ -469,7 +440,12 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
     if old.vendoring != new.vendoring:
-        reasons.append(f"it was written {_MODES[old.vendoring]}")
+        modes = {
+            "": "without `--vendor-deps`",
+            "private": "with `--vendor-deps`",
+            "beside": "with `--vendor-deps=beside`",
+        }
+        reasons.append(f"it was written {modes[old.vendoring]}")
     for before, after in pairs:
         reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
         reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]

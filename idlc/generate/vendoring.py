@@ -12,7 +12,7 @@ from idlc.model import derive
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.inputs import accept_name
-from idlc.project.lock import Vendoring
+from idlc.project.lock import FILE, Vendoring, load_lock
 from idlc.project.write import Plan
 
 
@@ -25,7 +25,33 @@ def planned(
     vendoring: Vendoring,
 ) -> list[Package]:
     """Return sound models, and packages to vendor, ready to be written; empty after an error."""
-    beside = _Beside({model.package for model in models}, compiler, check=check)
+    library = compiler.library
+    own = {model.package for model in models}
+    #: Each ready to be written, `None` for one that must not be.
+    others: dict[str, Package | None] = {}
+    needed: dict[str, set[str]] = {}
+
+    def beside(model: Model, target: Target) -> list[str]:
+        """Add the packages that a model depends on, whole, to `others`, and return their names."""
+        names: set[str] = set()
+        waiting = _needed(model) - own
+        while waiting:
+            package = waiting.pop()
+            names.add(package)
+            if package not in others:
+                interfaces, report = library.interfaces(package), Report()
+                sources = [(name, text) for name in interfaces if (text := library.source(name))]
+                whole = compiler.model(package, compiler.add(sources, report), report)
+                target.report.extend(report.errors)
+                needed[package] = _needed(whole)
+                others[package] = None
+                is_accepted = accept_name(package, "what is depended on", target.report)
+                if is_accepted and not report.had_errors:
+                    place, digests = target.beside(package), as_inputs(interfaces, library)
+                    others[package] = package_of(whole, place, digests, library, check=check)
+            waiting |= needed[package] - own - names
+        return sorted(names)
+
     packages: list[Package | None] = []
     for model, (target, package) in zip(models, requested.items(), strict=True):
         packages.append(
@@ -33,14 +59,14 @@ def planned(
                 model,
                 target,
                 package.digests,
-                compiler.library,
+                library,
                 check=check,
                 vendoring=vendoring,
                 copies=_copies(model, compiler, target.report) if vendoring == "private" else (),
-                beside=beside.add(model, target) if vendoring == "beside" else (),
+                beside=beside(model, target) if vendoring == "beside" else (),
             )
         )
-    packages += [beside.packages[name] for name in sorted(beside.packages)]
+    packages += [others[name] for name in sorted(others)]
     return [] if None in packages else [package for package in packages if package]
 
 
@@ -55,42 +81,6 @@ def _copies(model: Model, compiler: Compiler, report: Report) -> list[Model]:
     copies = compiler.models(others, problems)
     report.extend(problems.errors)
     return [*copies.values()]
-
-
-class _Beside:
-    """The packages that others depend on, whole, to be written beside them."""
-
-    def __init__(self, own: set[str], compiler: Compiler, *, check: bool) -> None:
-        self._own = own
-        self._compiler = compiler
-        self._check = check
-        self._needed: dict[str, set[str]] = {}
-        #: Each ready to be written, `None` for one that must not be.
-        self.packages: dict[str, Package | None] = {}
-
-    def add(self, model: Model, target: Target) -> list[str]:
-        """Add the packages that a model depends on, and return their names."""
-        names: set[str] = set()
-        waiting = _needed(model) - self._own
-        while waiting:
-            package = waiting.pop()
-            names.add(package)
-            if package not in self.packages:
-                self.packages[package] = self._whole(package, target)
-            waiting |= self._needed[package] - self._own - names
-        return sorted(names)
-
-    def _whole(self, package: str, target: Target) -> Package | None:
-        library, report = self._compiler.library, Report()
-        names = library.interfaces(package)
-        sources = [(name, source) for name in names if (source := library.source(name))]
-        whole = self._compiler.model(package, self._compiler.add(sources, report), report)
-        target.report.extend(report.errors)
-        self._needed[package] = _needed(whole)
-        if not accept_name(package, "what is depended on", target.report) or report.had_errors:
-            return None
-        beside, digests = target.beside(package), as_inputs(names, library)
-        return package_of(whole, beside, digests, library, check=self._check)
 
 
 def _needed(model: Model) -> set[str]:
@@ -110,7 +100,10 @@ def leftovers(packages: Iterable[Package]) -> Iterator[tuple[Target, Plan | None
         names = {*(old.vendored if old else ())} - {*package.lock.vendored}
         if not names or package.target.modules:  # a prefix is for any packages
             continue
-        locks = {**package.target.locks_beside(), package.target.package: package.lock}
+        folders = (path.parent for path in package.target.path.parent.glob(f"*/{FILE}"))
+        records = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
+        locks = {name: record for name, record in records if record}
+        locks[package.target.package] = package.lock
         used = [name for name in locks if name not in names]
         while used:
             record = locks.get(used.pop())

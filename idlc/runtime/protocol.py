@@ -142,10 +142,7 @@ class GetResultResponse(Added, Generic[Result]):
     result: Result
 
     def __init__(
-        self,
-        status: int = 0,
-        result: Result | None = None,
-        **options: Unpack[Options],
+        self, status: int = 0, result: Result | None = None, **options: Unpack[Options]
     ) -> None:
         self._fill(options, status, result)
 
@@ -269,10 +266,20 @@ class _Composition:
         fields = self.types[f"{self.kind}/{name}"].fields
         defaults = shape.__init__.__defaults__
         hints = {field.name: self.hint(field) for field in fields}
+        values = [None if self.converts else value for value in defaults]
+        # a constructor as if it were of the module, where its annotations are
+        code = shape.__init__.__code__
+        constructor: Any = FunctionType(code, self.scope, "__init__", tuple(values))
+        constructor.__qualname__ = f"{public_name(name)}.__init__"
+        constructor.__module__ = __name__  # where its source is
+        constructor.__annotations__ = {
+            field: hint.replace("ListOf", "Iterable") + " | None" * (value is None)
+            for (field, hint), value in zip(hints.items(), values, strict=True)
+        } | {"options": "_idlc.Unpack[_idlc.Options]", "return": "None"}
         parts: dict[str, Any] = {
             "__match_args__": tuple(hints),
             "__annotations__": hints,
-            "__init__": self.constructor(shape.__init__, name, hints),
+            "__init__": constructor,
             "__eq__": equal,
             "_fill": _fill,
             "_usual": type(defaults[0]),
@@ -295,18 +302,6 @@ class _Composition:
         entries = [f"        {field.name}: {_spell(field)}\n" for field in fields]
         doc = f"{purpose}\n\n    Attributes:\n{''.join(entries)}    "
         return self.add(type(Message), name, Message, doc, parts)
-
-    def constructor(self, function: Any, name: str, hints: dict[str, str]) -> Any:
-        """Return a constructor as if it were of the module, where its annotations are."""
-        defaults = [None if self.converts else value for value in function.__defaults__]
-        bound = FunctionType(function.__code__, self.scope, "__init__", tuple(defaults))
-        bound.__qualname__ = f"{public_name(name)}.__init__"
-        bound.__module__ = __name__  # where its source is
-        bound.__annotations__ = {
-            field: hint.replace("ListOf", "Iterable") + " | None" * (value is None)
-            for (field, hint), value in zip(hints.items(), defaults, strict=True)
-        } | {"options": "_idlc.Unpack[_idlc.Options]", "return": "None"}
-        return bound
 
     def hint(self, field: FieldInfo) -> str:
         if field.nested is None:

@@ -213,8 +213,8 @@ def steps(structure: Structure) -> tuple[Step, ...]:
     return tuple(joined)
 
 
-def _converter(cls: Any, structure: Structure) -> object:
-    """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
+def message(cls: Any, structure: Structure) -> tuple[int, ...]:
+    """Return the addresses that rclpy reads from a message class, in their order."""
     encode = cls._codec_(NATIVE).encode
     _, decode = functions(cls)
     parts = steps(structure)
@@ -231,19 +231,15 @@ def _converter(cls: Any, structure: Structure) -> object:
         _move(side, parts, range(address, address + 1))
         return decode(side.out)
 
+    # messages at addresses: `converter[address] = message` and `converter[address]`
     methods = {
         "__setitem__": staticmethod(store),
         "__getitem__": staticmethod(c.taking(structure.name, fetch)),
     }
-    return type("Converter", (), methods)()
-
-
-def message(cls: Any, structure: Structure) -> tuple[int, ...]:
-    """Return the addresses that rclpy reads from a message class, in their order."""
+    converter: object = type("Converter", (), methods)()
     size = ctypes.sizeof(c_structure(structure))
     content = introspection.content(structure)
     try:
-        converter = _converter(cls, structure)
         addresses = introspection.memory_functions(size, content, converter)
         handle = introspection.handle(structure, functional=True)
     except RefusedError as error:

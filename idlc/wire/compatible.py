@@ -172,7 +172,9 @@ class _Follower:
     def _read(self, old: Leaf, new: Leaf, start: int, *, at_end: bool) -> set[_Offset]:
         """Return the offsets after one value that both versions read at the same position."""
         match old.type, new.type:
-            case ir.Primitive(), ir.Primitive() if _primitive_alike(old.type.name, new.type.name):
+            case ir.Primitive(name), ir.Primitive(later) if (
+                name == later or {name, later} <= _OCTET or (name == "bool" and later in _ONE_BYTE)
+            ):
                 return {_Offset((start + old.least) % 8)}
             case None, ir.Primitive() if new.type.name in _ONE_BYTE:
                 return {_Offset((start + 1) % 8)}
@@ -237,12 +239,6 @@ def _behind(rest: Iterable[Leaf], place: _Offset, *, at_end: bool) -> _Offset:
     if at_end and lead > 0:
         raise _MisreadError
     return _Offset(at % 8, lead)
-
-
-def _primitive_alike(old: str, new: str) -> bool:
-    if old == new or {old, new} <= _OCTET:
-        return True
-    return old == "bool" and new in _ONE_BYTE
 
 
 def _fits(old: int | None, new: int | None) -> bool:

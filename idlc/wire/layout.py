@@ -134,15 +134,12 @@ class _Layouts:
             case ir.Array():
                 return self._repeated(type_.element, type_.size, at)
             case ir.Ref():
-                return self._structure(type_.target, at % _WIDEST)
+                key = type_.target, at % _WIDEST
+                if key not in self._sizes:
+                    fields = self._messages[type_.target].wire_fields
+                    self._sizes[key] = self.fields(fields, at % _WIDEST)[1]
+                return self._sizes[key]
         return Extent(_COUNT, exact=False)
-
-    def _structure(self, name: ir.TypeName, residue: int) -> Extent:
-        extent = self._sizes.get((name, residue))
-        if extent is None:
-            extent = self.fields(self._messages[name].wire_fields, residue)[1]
-            self._sizes[name, residue] = extent
-        return extent
 
     def _repeated(self, element: ir.Element, count: int, at: int) -> Extent:
         """Return the size of an array: all its elements but the first are at the same distance."""
@@ -178,8 +175,21 @@ def oversized(model: Model, sizes: ContentSizes | None = None) -> Iterator[Diagn
     Packages that were compiled together share `sizes`, so that each structure is measured once.
     """
     sizes = {} if sizes is None else sizes
-    for interface in model.own:
-        _measure(interface, model, sizes)
+    own = {message.name: message for each in model.own for message in derive.messages(each)}
+    waiting = list(own)
+    while waiting:  # each structure after its parts; with a stack, so depth is no limit
+        name = waiting[-1]
+        structure = own[name] if name in own else model.interfaces[name]
+        assert isinstance(structure, ir.Message)
+        held = structure.references
+        if missing := [reference for reference in held if reference not in sizes]:
+            waiting += missing
+            continue
+        del waiting[-1]
+        sizes[name] = _ContentSize(
+            len(structure.wire_fields) + sum(sizes[reference].fields for reference in held),
+            1 + max((sizes[reference].depth for reference in held), default=0),
+        )
     total, refused = 0, False
     for interface in model.own:
         parts = [sizes[message.name] for message in derive.messages(interface)]
@@ -201,23 +211,3 @@ def oversized(model: Model, sizes: ContentSizes | None = None) -> Iterator[Diagn
         message = f"`{model.package}` has {total:,} fields, nested ones included"
         hint = f"split it into packages; code is generated for at most {MAX_PACKAGE_FIELDS:,}"
         yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)
-
-
-def _measure(interface: ir.Interface, model: Model, contents: ContentSizes) -> None:
-    """Measure each structure after its parts; with a stack, so depth is no limit."""
-    parts = {message.name: message for message in derive.messages(interface)}
-    waiting = list(parts)
-    while waiting:
-        name = waiting[-1]
-        message = parts[name] if name in parts else model.interfaces[name]
-        assert isinstance(message, ir.Message)
-        held = message.references
-        missing = [reference for reference in held if reference not in contents]
-        if missing:
-            waiting += missing
-            continue
-        del waiting[-1]
-        contents[name] = _ContentSize(
-            len(message.wire_fields) + sum(contents[reference].fields for reference in held),
-            1 + max((contents[reference].depth for reference in held), default=0),
-        )

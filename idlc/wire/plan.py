@@ -164,20 +164,19 @@ LARGE = 1024
 FEW = 4
 
 
-def steps(message: ir.Message, messages: Messages, names: python_names.Locals) -> tuple[Step, ...]:
-    """Return the steps of a structure whose object is in the variable `message`."""
-    return tuple(_steps(message, messages, names, "message", ""))
-
-
-def _steps(
+def steps(
     message: ir.Message,
     messages: Messages,
     names: python_names.Locals,
-    owner: str,
-    path: str,
-) -> list[Step]:
+    owner: str = "message",
+    path: str = "",
+) -> tuple[Step, ...]:
+    """Return the steps of a structure whose object is in the variable `owner`.
+
+    `path` has the names of the fields that lead to it.
+    """
     if not message.fields:
-        return [Dummy()]
+        return (Dummy(),)
     plan: list[Step] = []
     for field in message.fields:
         inner = f"{path}_{field.name}" if path else field.name
@@ -186,10 +185,10 @@ def _steps(
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             plan.append(Enter(place, field.type.target, not nested.fields))
-            plan += _steps(nested, messages, names, place.local, inner)
+            plan += steps(nested, messages, names, place.local, inner)
         else:
             plan.append(_step(field.type, place, messages, names))
-    return plan
+    return tuple(plan)
 
 
 def _step(
@@ -212,28 +211,27 @@ def _step(
                 return Texts(place, element.wide, length, bound)
             if isinstance(element, ir.Ref):
                 item = names.new(f"{place.path}_item")
-                body = _steps(messages[element.target], messages, names, item, item)
-                return Items(place, element.target, item, tuple(body), length, bound)
+                body = steps(messages[element.target], messages, names, item, item)
+                return Items(place, element.target, item, body, length, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
 
 
 def smallest(body: tuple[Step, ...]) -> int:
     """Return the least number of bytes that steps can take, padding not counted."""
-    return sum(map(_least, body))
-
-
-def _least(step: Step) -> int:
-    match step:
-        case Number() | Dummy() | Block():
-            return step.size
-        case Texts(size=int(size)):
-            return 4 * size
-        case Items(size=int(size)):
-            return size * smallest(step.body)
-        case Enter():
-            return 0
-        case _:
-            return 4
+    least = 0
+    for step in body:
+        match step:
+            case Number() | Dummy() | Block():
+                least += step.size
+            case Texts(size=int(size)):
+                least += 4 * size
+            case Items(size=int(size)):
+                least += size * smallest(step.body)
+            case Enter():
+                pass
+            case _:
+                least += 4
+    return least
 
 
 def walk(body: tuple[Step, ...]) -> Iterator[Step]:

@@ -73,7 +73,7 @@ def page(text, *more):
         constants=(ir.Constant(name="C", type=string, value=text, comment=lines, unit=text),),
     )
     model = link.Model("hostile_msgs", (message,), {message.name: message})
-    return next(render.module_files(message, model, {message.name: "_it"})).text
+    return next(render.interface_files(model, imports.ALONE)).text
 
 
 def shape(code):

@@ -17,8 +17,8 @@ from typing import NamedTuple
 class Machine(NamedTuple):
     """A processor and its machine code.
 
-    A function of it ends where the next one begins. `holes` are the places in `code` that depend
-    on where something else is, with its name in the assembler text;
+    `code` is that of functions in hexadecimal digits; `holes` are the places in a function that
+    depend on where something else is, with its name in the assembler text.
     `fill(code, at, address, target)` fills the one at `at`, which will be at `address`.
     """
 
@@ -27,17 +27,9 @@ class Machine(NamedTuple):
     absolute: int
     page: int
     properties: bytes
-    code: bytes
-    entries: Mapping[str, int]
-    holes: Mapping[int, str]
+    code: Mapping[str, str]
+    holes: Mapping[str, Mapping[int, str]]
     fill: Callable[[bytearray, int, int, int], None]
-
-    def function(self, name: str) -> tuple[bytes, dict[int, str]]:
-        """Return the code of a function, and its holes by their places in it."""
-        start = self.entries[name]
-        end = min((at for at in self.entries.values() if at > start), default=len(self.code))
-        holes = {at - start: symbol for at, symbol in self.holes.items() if start <= at < end}
-        return self.code[start:end], holes
 
 
 _WORD = 0xFFFF_FFFF_FFFF_FFFF
@@ -112,8 +104,8 @@ class Image:
         """Return a function of the machine's, with these places for the symbols in its text."""
         key = (name, *((symbol, id(at), offset) for symbol, (at, offset) in symbols.items()))
         if key not in self._functions:
-            code, holes = self.machine.function(name)
-            place = self._functions[key] = self.code.put(code, 16)
+            code, holes = self.machine.code[name], self.machine.holes.get(name, {})
+            place = self._functions[key] = self.code.put(bytes.fromhex(code), 16)
             self.holes += [(place.offset + at, symbols[name]) for at, name in holes.items()]
         return self._functions[key]
 
@@ -206,6 +198,7 @@ class _File:
         self._relocate()
         self._fill_symbols()
         self._fill_dynamic()
+        kinds = {name: kind for part in KINDS.values() for name, kind in part.items()}
         names = [*self.sections, ".shstrtab"]
         starts, text = _strings(names)
         table = end + len(text) + -(end + len(text)) % 8
@@ -218,7 +211,14 @@ class _File:
         parts += [(self.offsets[name], section.data) for name, section in self.sections.items()]
         for at, data in parts:
             file[at : at + len(data)] = data
-        file += bytes(SECTION) + self._section_headers(starts)
+        file += bytes(SECTION)
+        for start, (name, section) in zip(starts, self.sections.items(), strict=False):
+            kind = kinds[name]
+            where = (section.address, self.offsets[name], len(section.data))
+            link = 1 + names.index(kind.link) if kind.link else 0
+            local = 1 if name == ".dynsym" else 0  # symbols that nobody else sees: the first one
+            refers = (link, local, section.align, kind.entry)
+            file += pack("<2I4Q2I2Q", start, kind.type, kind.flags, *where, *refers)
         file += pack("<2I4Q2I2Q", starts[-1], 3, 0, 0, end, len(text), 0, 0, 1, 0)
         at = self.offsets[".note.gnu.build-id"] + len(NOTE_OF_CONTENT) - 20
         file[at : at + 20] = hashlib.sha256(file).digest()[:20]
@@ -270,7 +270,7 @@ class _File:
 
     def _fill_symbols(self) -> None:
         text = 1 + list(self.sections).index(".text")
-        size = len(self.image.machine.function("get")[0])
+        size = len(self.image.machine.code["get"]) // 2
         for index, name in enumerate(self.symbols, 1):
             place = self.image.exports.get(name)
             where = (text, place.address, size) if place else (0, 0, 0)
@@ -308,18 +308,6 @@ class _File:
             for kind, flags, at, address, size, align in rows
         )
 
-    def _section_headers(self, names: list[int]) -> bytes:
-        kinds = {name: kind for part in KINDS.values() for name, kind in part.items()}
-        rows = b""
-        for start, (name, section) in zip(names, self.sections.items(), strict=False):
-            kind = kinds[name]
-            where = (section.address, self.offsets[name], len(section.data))
-            link = 1 + list(kinds).index(kind.link) if kind.link else 0
-            local = 1 if name == ".dynsym" else 0  # symbols that nobody else sees: the first one
-            refers = (link, local, section.align, kind.entry)
-            rows += pack("<2I4Q2I2Q", start, kind.type, kind.flags, *where, *refers)
-        return rows
-
 
 def _strings(names: list[str]) -> tuple[list[int], bytes]:
     """Return the offset of each name in a string table, and the table."""
@@ -334,15 +322,11 @@ def _hash_table(symbols: list[str]) -> bytes:
     """Return the table by which a loader finds symbols, which count from 1."""
     buckets, chains = [0] * (len(symbols) | 1), [0] * (1 + len(symbols))
     for index, name in enumerate(symbols, 1):
-        bucket = _hash(name) % len(buckets)
+        value = 0
+        for byte in name.encode():
+            value = (value << 4) + byte
+            value = (value ^ (value & 0xF0000000) >> 24) & 0x0FFFFFFF
+        bucket = value % len(buckets)
         chains[index], buckets[bucket] = buckets[bucket], index
     words = (len(buckets), len(chains), *buckets, *chains)
     return pack(f"<{len(words)}I", *words)
-
-
-def _hash(name: str) -> int:
-    value = 0
-    for byte in name.encode():
-        value = (value << 4) + byte
-        value = (value ^ (value & 0xF0000000) >> 24) & 0x0FFFFFFF
-    return value

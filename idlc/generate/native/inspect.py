@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from struct import error, unpack_from
 from typing import NamedTuple
 
@@ -28,19 +27,6 @@ class Inspected(NamedTuple):
     stamp: bytes | None
 
 
-def inspect(data: bytes) -> Inspected | None:
-    """Return the content of a file; `None` if it is no shared library for Linux, or truncated."""
-    try:
-        kind, machine = unpack_from("<2H", data, 16)
-        if not data.startswith(_HEADER) or kind != _SHARED:
-            return None
-        sections = list(_sections(data))
-        symbols = frozenset(_symbols(data, sections))
-        return Inspected(machine, symbols, _identity_stamp(data, sections))
-    except (error, ValueError, IndexError, OverflowError):
-        return None
-
-
 class _SectionHeader(NamedTuple):
     type: int
     flags: int
@@ -49,29 +35,30 @@ class _SectionHeader(NamedTuple):
     link: int
 
 
-def _sections(data: bytes) -> Iterator[_SectionHeader]:
-    (table,) = unpack_from("<Q", data, 40)
-    (count,) = unpack_from("<H", data, 60)
-    if table + count * SECTION > len(data):
-        raise ValueError("torn")
-    for index in range(count):
-        yield _SectionHeader(*unpack_from("<4xIQ8x2QI", data, table + index * SECTION))
-
-
-def _symbols(data: bytes, sections: list[_SectionHeader]) -> Iterator[str]:
-    (table, *_) = (part for part in sections if part.type == _SYMBOLS)
-    if table.at + table.size > len(data):
-        raise ValueError("torn")
-    names = sections[table.link]
-    for at in range(table.at, table.at + table.size - SYMBOL + 1, SYMBOL):
-        name, defined = unpack_from("<I2xH", data, at)
-        text = data[names.at + name : names.at + name + LONGEST].partition(b"\0")[0]
-        if defined and text:
-            yield text.decode("ascii", "replace")
-
-
-def _identity_stamp(data: bytes, sections: list[_SectionHeader]) -> bytes | None:
+def inspect(data: bytes) -> Inspected | None:
+    """Return the content of a file; `None` if it is no shared library for Linux, or truncated."""
+    try:
+        kind, machine = unpack_from("<2H", data, 16)
+        (start,), (count,) = unpack_from("<Q", data, 40), unpack_from("<H", data, 60)
+        end = start + count * SECTION
+        if not data.startswith(_HEADER) or kind != _SHARED or end > len(data):
+            return None
+        rows = range(start, end, SECTION)
+        sections = [_SectionHeader(*unpack_from("<4xIQ8x2QI", data, row)) for row in rows]
+        (table, *_) = (part for part in sections if part.type == _SYMBOLS)
+        if table.at + table.size > len(data):
+            return None
+        names = sections[table.link].at
+        symbols = set()
+        for at in range(table.at, table.at + table.size - SYMBOL + 1, SYMBOL):
+            name, is_defined = unpack_from("<I2xH", data, at)
+            text = data[names + name : names + name + LONGEST].partition(b"\0")[0]
+            if is_defined and text:
+                symbols.add(text.decode("ascii", "replace"))
+    except (error, ValueError, IndexError, OverflowError):
+        return None
     size = len(identity_stamp(LAYOUTS["jazzy"]))
-    starts = (part.at for part in sections if (part.type, part.flags) == _CONSTANTS)
-    texts = (data[start : start + size] for start in starts)
-    return next((text for text in texts if text.startswith(AUTHOR)), None)
+    constants = (part.at for part in sections if (part.type, part.flags) == _CONSTANTS)
+    stamps = (data[at : at + size] for at in constants)
+    stamp = next((stamp for stamp in stamps if stamp.startswith(AUTHOR)), None)
+    return Inspected(machine, frozenset(symbols), stamp)

@@ -47,29 +47,21 @@ class Descriptions:
         self._model = model
         self._image = image
         self._individuals: dict[str, Words] = {}
-        self._about: dict[str, tuple[Place, Place, Place]] = {}
+        self._about: dict[str, tuple[Place, ...]] = {}
 
-    def functions(self, name: str) -> tuple[Place, Place, Place]:
+    def functions(self, name: str) -> tuple[Place, ...]:
         """Return functions that return a type's hash, description and sources."""
         if name not in self._about:
-            places = (self._hash(name), *self._description(name))
-            hash_, description, sources = (
-                self._image.function("get", target=place) for place in places
-            )
-            self._about[name] = (hash_, description, sources)
+            image, describer = self._image, self._model.describer
+            hash_ = image.constants.put(hash_bytes(describer.hash(name)))
+            full = describer.description(name)
+            individuals = (full["type_description"], *full["referenced_type_descriptions"])
+            own, *others = map(self._individual, individuals)
+            description = image.tables.words(*own, *self._sequence(others))
+            rows = [self._source(individual["type_name"]) for individual in individuals]
+            places = (hash_, description, image.tables.words(*self._sequence(rows)))
+            self._about[name] = tuple(image.function("get", target=place) for place in places)
         return self._about[name]
-
-    def _hash(self, name: str) -> Place:
-        return self._image.constants.put(hash_bytes(self._model.describer.hash(name)))
-
-    def _description(self, name: str) -> tuple[Place, Place]:
-        full = self._model.describer.description(name)
-        referenced = full["referenced_type_descriptions"]
-        own, *others = map(self._individual, (full["type_description"], *referenced))
-        description = self._image.tables.words(*own, *self._sequence(others))
-        names = (name, *(individual["type_name"] for individual in referenced))
-        sources = [self._source(type_name) for type_name in names]
-        return description, self._image.tables.words(*self._sequence(sources))
 
     def _individual(self, individual: IndividualDict) -> Words:
         name = individual["type_name"]
@@ -173,8 +165,16 @@ class _TypeSupport:
 
     def resolving_handle(self, name: ir.TypeName, fields: Place) -> Place:
         """Return the handle that answers for all others."""
-        image = self.image
-        answers = {FASTRTPS: self._fastrtps(name), FIELDS: fields}
+        image, refuse = self.image, self.refuse
+        fastrtps = image.tables.words(
+            image.string(f"{name.package}::{name.kind}"),
+            image.string(name.name),
+            *(refuse, refuse, refuse),  # serialize, deserialize, size
+            image.function("unbounded"),
+            None,  # no key
+            *[0] * (ROOM // 8),
+        )
+        answers = {FASTRTPS: self._single(FASTRTPS, fastrtps, name), FIELDS: fields}
         rows = [word for key, handle in answers.items() for word in (image.string(key), handle)]
         # the table holds the handle itself, which follows: its place is known before
         handle = Place(image.data, len(image.data.data))
@@ -190,18 +190,6 @@ class _TypeSupport:
         image = self.image
         places = {"identifier": image.string(identifier), "function": image.function("same")}
         return self._handle(identifier, data, image.function("knows", **places), name)
-
-    def _fastrtps(self, name: ir.TypeName) -> Place:
-        string, refuse = self.image.string, self.refuse
-        data = self.image.tables.words(
-            string(f"{name.package}::{name.kind}"),
-            string(name.name),
-            *(refuse, refuse, refuse),  # serialize, deserialize, size
-            self.image.function("unbounded"),
-            None,  # no key
-            *[0] * (ROOM // 8),
-        )
-        return self._single(FASTRTPS, data, name)
 
     def _fields(self, message: ir.Message) -> Place:
         image, name = self.image, message.name
@@ -271,14 +259,12 @@ def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
 
 def _reached(model: Model) -> list[ir.Message]:
     """Return a package's messages and all that they refer to, nested ones first."""
-    held: dict[str, int] = {}
+    describe = model.describer.description
+    reached: set[str] = set()
     for interface in model.own:
         for message in derive.messages(interface):
-            full = model.describer.description(str(message.name))
-            referenced = full["referenced_type_descriptions"]
-            names = (individual["type_name"] for individual in referenced)
-            held.update(dict.fromkeys((str(message.name), *names), 0))
-    for name in held:
-        held[name] = len(model.describer.description(name)["referenced_type_descriptions"])
-    ordered = sorted(held, key=lambda name: (held[name], name))
+            referenced = describe(str(message.name))["referenced_type_descriptions"]
+            reached |= {str(message.name), *(part["type_name"] for part in referenced)}
+    held = {name: len(describe(name)["referenced_type_descriptions"]) for name in reached}
+    ordered = sorted(reached, key=lambda name: (held[name], name))
     return [model.messages[ir.TypeName.parse(name)] for name in ordered]

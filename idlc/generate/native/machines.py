@@ -1,48 +1,10 @@
-"""AArch64: the machine code of a library (the ABI's calling convention)."""
+"""The machine code of libraries, for each processor (by its ABI's calling convention)."""
 
 from __future__ import annotations
 
 from struct import pack, pack_into, unpack_from
 
 from idlc.generate.native.elf import Machine
-
-#: Assembled from tests/generate/native/code_x86_64.s.
-X86_64_CODE = bytes.fromhex(
-    # resolve
-    "f30f1efa4c8b4708498b104885d274214889f18a023a01751248ffc248ffc184"
-    "c075f0498b4008488930c34983c010ebd731c0c366662e0f1f84000000000090"
-    # same
-    "4889f18a023a01751148ffc248ffc184c075f04889374889f8c331c0c30f1f00"
-    # knows
-    "f30f1efa488d1500000000e900000000"
-    # get
-    "f30f1efa488d0500000000c30f1f4000"
-    # refuse
-    "f30f1efa31c0c3660f1f840000000000"
-    # unbounded
-    "f30f1efac6070031c0c3660f1f440000"
-    # throw
-    "f30f1efa488d3d00000000ff250000000066662e0f1f8400000000000f1f4000"
-    # nothing
-    "f30f1efac366662e0f1f840000000000"
-)
-
-#: Where each function begins.
-X86_64_ENTRIES = {
-    "resolve": 0x0,
-    "same": 0x40,
-    "knows": 0x60,
-    "get": 0x70,
-    "refuse": 0x80,
-    "unbounded": 0x90,
-    "throw": 0xA0,
-    "nothing": 0xC0,
-}
-
-#: Where an address is missing, and of what.
-X86_64_HOLES = {
-    0x67: "identifier", 0x6C: "function", 0x77: "target", 0xA7: "message", 0xAD: "function",
-}  # fmt: skip
 
 
 def _fill_x86_64(code: bytearray, at: int, address: int, target: int) -> None:
@@ -57,53 +19,28 @@ X86_64 = Machine(
     page=0x1000,
     # NT_GNU_PROPERTY_TYPE_0: GNU_PROPERTY_X86_FEATURE_1_AND is IBT and SHSTK
     properties=pack("<3I4s4I", 4, 16, 5, b"GNU", 0xC0000002, 4, 3, 0),
-    code=X86_64_CODE,
-    entries=X86_64_ENTRIES,
-    holes=X86_64_HOLES,
+    # Assembled from tests/generate/native/code_x86_64.s.
+    code={
+        "resolve": (
+            "f30f1efa4c8b4708498b104885d274214889f18a023a01751248ffc248ffc184"
+            "c075f0498b4008488930c34983c010ebd731c0c366662e0f1f84000000000090"
+        ),
+        "same": "4889f18a023a01751148ffc248ffc184c075f04889374889f8c331c0c30f1f00",
+        "knows": "f30f1efa488d1500000000e900000000",
+        "get": "f30f1efa488d0500000000c30f1f4000",
+        "refuse": "f30f1efa31c0c3660f1f840000000000",
+        "unbounded": "f30f1efac6070031c0c3660f1f440000",
+        "throw": "f30f1efa488d3d00000000ff250000000066662e0f1f8400000000000f1f4000",
+        "nothing": "f30f1efac366662e0f1f840000000000",
+    },
+    # Where an address is missing in them, and of what.
+    holes={
+        "knows": {7: "identifier", 12: "function"},
+        "get": {7: "target"},
+        "throw": {7: "message", 13: "function"},
+    },
     fill=_fill_x86_64,
 )
-
-
-#: Assembled from tests/generate/native/code_aarch64.s.
-AARCH64_CODE = bytes.fromhex(
-    # resolve
-    "5f2403d5020440f9430040f9830100b4e40301aa6514403886144038bf00066b"
-    "a100005485ffff35400440f9010000f9c0035fd642400091f4ffff17000080d2"
-    "c0035fd61f2003d51f2003d51f2003d5"
-    # same
-    "e40301aa4514403886144038bf00066b8100005485ffff35010000f9c0035fd6"
-    "000080d2c0035fd61f2003d51f2003d5"
-    # knows
-    "5f2403d5020000904200009100000014"
-    # get
-    "5f2403d50000009000000091c0035fd6"
-    # refuse
-    "5f2403d5000080d2c0035fd61f2003d5"
-    # unbounded
-    "5f2403d51f000039000080d2c0035fd6"
-    # throw
-    "5f2403d5000000900000009110000090100240f900021fd61f2003d51f2003d5"
-    # nothing
-    "5f2403d5c0035fd61f2003d51f2003d5"
-)
-
-#: Where each function begins.
-AARCH64_ENTRIES = {
-    "resolve": 0x0,
-    "same": 0x50,
-    "knows": 0x80,
-    "get": 0x90,
-    "refuse": 0xA0,
-    "unbounded": 0xB0,
-    "throw": 0xC0,
-    "nothing": 0xE0,
-}
-
-#: Where an address is missing, and of what.
-AARCH64_HOLES = {
-    0x84: "identifier", 0x88: "identifier", 0x8C: "function", 0x94: "target", 0x98: "target",
-    0xC4: "message", 0xC8: "message", 0xCC: "function", 0xD0: "function",
-}  # fmt: skip
 
 
 def _fill_aarch64(code: bytearray, at: int, address: int, target: int) -> None:
@@ -128,8 +65,29 @@ AARCH64 = Machine(
     page=0x10000,
     # NT_GNU_PROPERTY_TYPE_0: GNU_PROPERTY_AARCH64_FEATURE_1_AND is BTI
     properties=pack("<3I4s4I", 4, 16, 5, b"GNU", 0xC0000000, 4, 1, 0),
-    code=AARCH64_CODE,
-    entries=AARCH64_ENTRIES,
-    holes=AARCH64_HOLES,
+    # Assembled from tests/generate/native/code_aarch64.s.
+    code={
+        "resolve": (
+            "5f2403d5020440f9430040f9830100b4e40301aa6514403886144038bf00066b"
+            "a100005485ffff35400440f9010000f9c0035fd642400091f4ffff17000080d2"
+            "c0035fd61f2003d51f2003d51f2003d5"
+        ),
+        "same": (
+            "e40301aa4514403886144038bf00066b8100005485ffff35010000f9c0035fd6"
+            "000080d2c0035fd61f2003d51f2003d5"
+        ),
+        "knows": "5f2403d5020000904200009100000014",
+        "get": "5f2403d50000009000000091c0035fd6",
+        "refuse": "5f2403d5000080d2c0035fd61f2003d5",
+        "unbounded": "5f2403d51f000039000080d2c0035fd6",
+        "throw": "5f2403d5000000900000009110000090100240f900021fd61f2003d51f2003d5",
+        "nothing": "5f2403d5c0035fd61f2003d51f2003d5",
+    },
+    # Where an address is missing in them, and of what.
+    holes={
+        "knows": {4: "identifier", 8: "identifier", 12: "function"},
+        "get": {4: "target", 8: "target"},
+        "throw": {4: "message", 8: "message", 12: "function", 16: "function"},
+    },
     fill=_fill_aarch64,
 )

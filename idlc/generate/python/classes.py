@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import msgspec
 
@@ -50,23 +50,18 @@ class GroupView(msgspec.Struct, frozen=True):
     stem: Code
 
 
-Purposes = Mapping[ir.TypeName, str]
-
-
 def message(
-    structure: ir.Message,
-    references: References,
-    purposes: Purposes,
-    file: str,
-    *,
-    converts: bool,
+    structure: ir.Message, references: References, purpose: str, file: str, *, converts: bool
 ) -> MessageView:
-    """Return the view of a structure's class; `file` is the one that defines it."""
+    """Return the view of a structure's class.
+
+    `purpose` is its docstring without a comment, `file` the one that defines it.
+    """
     naming = Naming.of(structure)
     usual = [fields.usual_class(field, references, naming) for field in structure.fields[:1]]
     return MessageView(
         name=Code(references.name(structure.name)),
-        docstring=fields.message(structure, purposes[structure.name], file),
+        docstring=fields.message(structure, purpose, file),
         constants=tuple(_constants(structure, file)),
         fields=tuple(
             fields.view(field, references, naming, file, converts=converts)

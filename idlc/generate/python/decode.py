@@ -65,14 +65,13 @@ def decode(
     own: str,
     makers: dict[ir.TypeName, str],
     foreign: Mapping[ir.TypeName, str],
-    *,
-    bulk: bool,
 ) -> tuple[Statement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
     `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
-    packages; `bulk` is the result of `is_bulk`.
+    packages.
     """
+    bulk = is_bulk(steps)
     decoder = _Decoder(tables, makers, foreign, "view" if bulk else "data")
     decoder.line(f"{own}()", "message")
     for step in steps:
@@ -330,7 +329,7 @@ class _Decoder(Builder):
             self.short_if(f"{self.position.text()} + {needed} > limit")
         else:
             self.short_if(f"{self.position.text(least * step.size)} > limit")
-        empty = Comprehension(f"{self.makers[step.type]}()", (("_", f"range({count})"),))
+        empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
         worded = self.worded

@@ -329,7 +329,7 @@ class _Encoder(Builder):
         lines.append(Line(Group("", tuple(parts)), rows, "+="))
         loop = f"for {step.item} in {local}"
         values = flat(Group("", tuple(place.text for place in places)))
-        texts = Comprehension("each", ((step.item, local), ("each", values)))
+        texts = Comprehension("each", (loop, f"for each in {values}"))
         unsized = call(self.tables.function("unsized", "unsized"), flat(texts))
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
@@ -383,7 +383,7 @@ class _Encoder(Builder):
         row = Group(writer, tuple(inner.run.values))
         block = self.tables.local(f"{step.place.path}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
-        blocks = Comprehension(row, ((step.item, local),))
+        blocks = Comprehension(row, (f"for {step.item} in {local}",))
         self.line(Group(f'b"{gap}".join', (blocks,)), block)
         self.elements(block, f"len({local})", repeat, unless=local if step.size is None else "")
 

@@ -27,63 +27,44 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
 
     `file` is the one that defines it, within its package.
     """
-    place, hidden = _place(structure, file), _hidden(structure)
+    described: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
+    spans = [definition.name_span for definition in described if definition.name_span]
+    place = ""
+    if spans:  # somebody wrote some of it
+        source, start, _ = min(spans, key=lambda span: span.start)
+        # The line of a later section would change with each field of those before, and people
+        # review what one more field changes.
+        is_later = "\n---" in f"\n{source.text[:start]}"
+        place = file if is_later else f"{file}:{source.position(start)[0]}"
     comment = _lines(structure.comment)
-    if not comment and not hidden and place:
+    names = [field.name for field in structure.fields if python_names.hides_method(field.name)]
+    if not comment and not names and place:
         purpose, place = f"{purpose.removesuffix('.')}, defined in {place}.", ""
     line, *more = comment or [purpose]
     if more and not more[0]:
         del more[0]
-    for paragraph in (hidden, [f"Defined in {place}"] if place else []):
+    class_ = python_names.class_(structure.name)
+    methods = f"super({class_}, message)", f"super({class_}, {class_})"
+    hidden = [
+        f"Fields hide the methods of the same name ({', '.join(names)}):",
+        f"`{methods[0]}` still has them, and `{methods[1]}` those of the class.",
+    ]
+    for paragraph in (hidden if names else [], [f"Defined in {place}"] if place else []):
         if paragraph:
             more += ["", *paragraph] if more else paragraph
     return Docstring(literals.between_quotes(line), tuple(map(Text, more)))
 
 
-def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
-    """Return what the messages of an interface are for."""
+def purposes(interface: ir.Interface) -> list[str]:
+    """Return what each section of an interface is for."""
     match interface:
         case ir.Message():
-            return {interface.name: f"{interface.name}."}
+            return [f"{interface.name}."]
         case ir.Service():
-            return {
-                interface.request.name: f"The request of the service {interface.name}.",
-                interface.response.name: f"The response of the service {interface.name}.",
-            }
+            kind, sections = "service", ["request", "response"]
         case ir.Action():
-            return {
-                interface.goal.name: f"The goal of the action {interface.name}.",
-                interface.result.name: f"The result of the action {interface.name}.",
-                interface.feedback.name: f"The feedback of the action {interface.name}.",
-            }
-
-
-def _hidden(structure: ir.Message) -> list[str]:
-    """Return how to call the methods that fields hide."""
-    hidden = [field.name for field in structure.fields if python_names.hides_method(field.name)]
-    if not hidden:
-        return []
-    name = python_names.class_(structure.name)
-    return [
-        f"Fields hide the methods of the same name ({', '.join(hidden)}):",
-        f"`super({name}, message)` still has them, and `super({name}, {name})` those of the class.",
-    ]
-
-
-def _place(structure: ir.Message, file: str) -> str:
-    """Return the file and line in which a structure begins; empty if nobody wrote any of it.
-
-    Later sections have no line: it would change with each field of those before, and people review
-    what one more field changes.
-    """
-    described: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
-    spans = [definition.name_span for definition in described if definition.name_span]
-    if not spans:
-        return ""
-    first = min(spans, key=lambda span: span.start)
-    if "\n---" in f"\n{first.source.text[: first.start]}":
-        return file
-    return f"{file}:{first.source.position(first.start)[0]}"
+            kind, sections = "action", ["goal", "result", "feedback"]
+    return [f"The {section} of the {kind} {interface.name}." for section in sections]
 
 
 def attribute(described: ir.Field | ir.Constant, file: str) -> Docstring:
@@ -110,6 +91,7 @@ def _lines(comment: tuple[str, ...]) -> list[str]:
 
 
 ANNOTATIONS = {"bool": "bool", "byte": "bytes", "float32": "float", "float64": "float"}
+ZEROS = {"bool": "False", "byte": 'b"\\x00"', "float32": "0.0", "float64": "0.0"}
 BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "locals", "object", "str"})
 
 
@@ -264,25 +246,9 @@ def _scalar_default(field: ir.Field) -> str:
 
 def zero(element: ir.Element) -> str:
     """Return the literal of the value without a declared default."""
-    match element:
-        case ir.Primitive("bool"):
-            return "False"
-        case ir.Primitive("byte"):
-            return 'b"\\x00"'
-        case ir.Primitive("float32" | "float64"):
-            return "0.0"
-        case ir.String():
-            return '""'
-        case _:
-            return "0"
-
-
-def _values(field: ir.Field) -> tuple[Code, ...]:
-    if field.default is None:
-        return ()
-    values = field.default.value
-    assert isinstance(values, tuple)
-    return tuple(Code(literals.scalar(ir.element_of(field.type), value)) for value in values)
+    if isinstance(element, ir.Primitive):
+        return ZEROS.get(element.name, "0")
+    return '""'
 
 
 def _fresh_list(field: ir.Field, references: References) -> str:
@@ -315,7 +281,11 @@ def default(field: ir.Field) -> tuple[Code, tuple[Code, ...]]:
     """Return the value of a field's declared default: an expression, or a function's arguments."""
     if isinstance(field.type, (ir.Primitive, ir.String)):
         return Code(_scalar_default(field)), ()
-    values = _values(field)
+    values: tuple[Code, ...] = ()
+    if field.default is not None:
+        assert isinstance(field.default.value, tuple)
+        element = ir.element_of(field.type)
+        values = tuple(Code(literals.scalar(element, value)) for value in field.default.value)
     if support(field.type):
         assert isinstance(field.type, (ir.Sequence, ir.Array))
         return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type)}.of"), *values)

@@ -21,24 +21,23 @@ def natural(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
 
 
-def _order(name: str) -> tuple[bool, list[tuple[int, str]]]:
-    is_constant = name.isupper() and len(name) > 1  # as linters see it
-    return not is_constant, natural(name)
-
-
 def statements(module: str, names: Collection[str], indent: int = 0) -> list[str]:
     """Return the lines that import names from a module; `X as Y` has a statement of its own."""
-    statements = [(name,) for name in names if " as " in name]
-    plain = sorted((name for name in names if " as " not in name), key=_order)
-    ordered = sorted([*statements, *([tuple(plain)] if plain else [])])
-    return [line for group in ordered for line in _import_from(module, group, " " * indent)]
 
+    def order(name: str) -> tuple[bool, list[tuple[int, str]]]:
+        is_constant = name.isupper() and len(name) > 1  # as linters see it
+        return not is_constant, natural(name)
 
-def _import_from(module: str, names: tuple[str, ...], margin: str) -> list[str]:
-    if len(names) == 1:
-        return [f"{margin}from {module} import {names[0]}"]
-    items = (f"{margin}    {name}," for name in names)
-    return [f"{margin}from {module} import (", *items, f"{margin})"]
+    groups = [(name,) for name in names if " as " in name]
+    plain = tuple(sorted((name for name in names if " as " not in name), key=order))
+    start, lines = f"{' ' * indent}from {module} import ", list[str]()
+    for group in sorted([*groups, plain] if plain else groups):
+        if len(group) == 1:
+            lines.append(f"{start}{group[0]}")
+        else:
+            items = (f"{' ' * indent}    {name}," for name in group)
+            lines += [f"{start}(", *items, f"{' ' * indent})"]
+    return lines
 
 
 #: Classes of Python that generated modules name.
@@ -99,24 +98,18 @@ class References:
         named = {name for message in structures for name in message.references}
         self.direct = named - self.own
         self.others = {name for name in self.direct if name.package != self.package}
-        groups = {interface.name, *(service.name for service in derive.services(interface))}
+        defined = {interface.name, *(service.name for service in derive.services(interface))}
+        defined |= self.own
         direct = (target for name in self.own for target in messages[name].references)
         reached = derive.closure(direct, lambda name: messages[name].references)
-        self._names = self._named(self.own | groups, reached)
-
-    def _named(
-        self, own: set[ir.TypeName], others: set[ir.TypeName]
-    ) -> dict[ir.TypeName, python_names.ClassName]:
-        """Return each structure's class; classes that the module defines keep their plain name.
-
-        Others get another name if theirs is taken: by an exception of Python, for example.
-        """
         by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
-        for name in own | others:
+        for name in defined | reached:
             by_class[python_names.class_(name)].append(name)
-        return {
+        # classes that the module defines keep their plain name, others get another one if theirs
+        # is taken: by an exception of Python, for example
+        self._names = {
             name: python_names.class_(name)
-            if name in own or (len(same) == 1 and class_ not in _TAKEN)
+            if name in defined or (len(same) == 1 and class_ not in _TAKEN)
             else python_names.qualified_class(name)
             for class_, same in by_class.items()
             for name in same
@@ -144,23 +137,15 @@ class References:
                 inside[f".{self._modules[type_]}"].add(name)
             else:
                 inside[f"..{type_.kind}.{self._modules[type_]}"].add(name)
+        near = sorted(inside, key=lambda module: (len(module.lstrip(".")) - len(module), module))
         return (
+            [line for module in near for line in statements(module, inside[module], indent)],
             [
                 line
-                for module, names in sorted(inside.items(), key=_nearness)
-                for line in statements(module, names, indent)
-            ],
-            [
-                line
-                for module, names in sorted(outside.items())
-                for line in statements(module, names, indent + 4)
+                for module in sorted(outside)
+                for line in statements(module, outside[module], indent + 4)
             ],
         )
-
-
-def _nearness(statement: tuple[str, set[str]]) -> tuple[int, str]:
-    module, _ = statement
-    return len(module.lstrip(".")) - len(module), module
 
 
 TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "Actions"}

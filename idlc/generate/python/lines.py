@@ -19,15 +19,10 @@ class Group(msgspec.Struct, frozen=True):
 
 
 class Comprehension(msgspec.Struct, frozen=True):
-    """A list comprehension: its element; the targets and iterable of each `for`."""
+    """A list comprehension: its element, and each `for` that follows."""
 
     element: Node
-    loops: tuple[tuple[str, str], ...]
-
-    @property
-    def clauses(self) -> list[str]:
-        """All that follows the element."""
-        return [f"for {targets} in {values}" for targets, values in self.loops]
+    clauses: tuple[str, ...]
 
 
 Node: TypeAlias = str | Group | Comprehension

@@ -14,7 +14,8 @@ def string_literal(value: str) -> str:
     quote = '"' if value.count('"') <= value.count("'") else "'"
     if value.isascii() and value.isprintable():
         return quote + value.replace("\\", "\\\\").replace(quote, "\\" + quote) + quote
-    return quote + "".join(_escaped(c, quote) for c in value) + quote
+    escaped = (f"\\{c}" if c in {quote, "\\"} else printable(c) for c in value)
+    return quote + "".join(escaped) + quote
 
 
 def octet(value: int) -> str:
@@ -41,12 +42,6 @@ def scalar(type_: ir.Element, value: ir.Scalar) -> str:
     if isinstance(type_, ir.Primitive) and type_.name.startswith("float"):
         return number(float(value))
     return number(value)
-
-
-def _escaped(character: str, quote: str) -> str:
-    if character == quote or character == "\\":
-        return "\\" + character
-    return printable(character)
 
 
 def printable(character: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
 
 import msgspec
 from msgspec.structs import replace
@@ -146,13 +145,6 @@ class Builder:
         self.position = first
 
 
-class Mark(NamedTuple):
-    """A snapshot of the names defined so far."""
-
-    definitions: dict[tuple[str, str], str]
-    names: frozenset[str]
-
-
 class Tables:
     """Gives each distinct expression one name, in order of first use.
 
@@ -174,14 +166,14 @@ class Tables:
         """Return a free local variable."""
         return self._names.new(name)
 
-    def mark(self) -> Mark:
-        """Return a snapshot for `reset`."""
-        return Mark(self._definitions.copy(), self._names.mark())
+    def mark(self) -> tuple[dict[tuple[str, str], str], frozenset[str]]:
+        """Return a snapshot for `reset`: the definitions and names so far."""
+        return self._definitions.copy(), self._names.mark()
 
-    def reset(self, mark: Mark) -> None:
+    def reset(self, mark: tuple[dict[tuple[str, str], str], frozenset[str]]) -> None:
         """Forget everything named since `mark`."""
-        self._definitions = mark.definitions
-        self._names.reset(mark.names)
+        self._definitions, names = mark
+        self._names.reset(names)
 
     def define(self, name: str, expression: str) -> str:
         """Return the name of an expression: `name`, or one like it that is free."""

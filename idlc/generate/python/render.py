@@ -55,12 +55,21 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     steps = plan.steps(structure, messages, names)
     tables = Tables(names)
     writing = text_of(encode(steps, tables), 8)
-    makers = _makers(structure, steps, references, messages, tables)
+    # The functions that make empty objects of the message and of those in it. They demand that
+    # classes of the package have the fields that the codec was made for.
+    makers: dict[ir.TypeName, str] = {}
+    nested = (step.type for step in plan.walk(steps) if isinstance(step, (plan.Enter, plan.Items)))
+    for type_ in dict.fromkeys((structure.name, *nested)):
+        stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
+        words = ["kind" if type_ == structure.name else references.name(type_)]
+        if type_.package == references.package:
+            held = structure if type_ == structure.name else messages[type_]
+            words.append(f"{_stamp(held):#010x}")
+        makers[type_] = tables.function(stem, call("maker", *words))
     foreign = {
         type_: references.name(type_) for type_ in makers if type_.package != references.package
     }
-    bulk = is_bulk(steps)
-    reading = text_of(decode(steps, tables, makers[structure.name], makers, foreign, bulk=bulk), 8)
+    reading = text_of(decode(steps, tables, makers[structure.name], makers, foreign), 8)
     inside, outside = references.imports(set(makers) - {structure.name}, 4)
     if tables.has_arrays:
         runtime = references.surroundings.runtime
@@ -73,37 +82,13 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
         constants=_code(text_of(tables.definitions, 4)),
         encode=_code(writing),
         decode=_code(reading),
-        is_bulk=bulk,
+        is_bulk=is_bulk(steps),
         has_texts=tables.has_texts,
     )
 
 
 def _code(lines: Iterable[str]) -> tuple[Code, ...]:
     return tuple(map(Code, lines))
-
-
-def _makers(
-    own: ir.Message,
-    steps: tuple[plan.Step, ...],
-    references: References,
-    messages: Messages,
-    tables: Tables,
-) -> dict[ir.TypeName, str]:
-    """Return the functions that make empty objects of the message and of those in it.
-
-    They demand that classes of the package have the fields that the codec was made for.
-    """
-    makers: dict[ir.TypeName, str] = {}
-    nested = (step.type for step in plan.walk(steps) if isinstance(step, (plan.Enter, plan.Items)))
-    for type_ in (own.name, *nested):
-        if type_ not in makers:
-            name = "kind" if type_ == own.name else references.name(type_)
-            stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
-            words = [name]
-            if type_.package == references.package:
-                words.append(f"{_stamp(own if type_ == own.name else messages[type_]):#010x}")
-            makers[type_] = tables.function(stem, call("maker", *words))
-    return makers
 
 
 def _stamp(message: ir.Message) -> int:
@@ -189,54 +174,38 @@ def module_views(
 
     With `converts`, classes convert values as Lyrical's do.
     """
-    home, written = names[interface.name], derive.sections(interface)
+    name, home, written = interface.name, names[interface.name], derive.sections(interface)
     references = References(interface, written, messages, names, surroundings)
-    view = _classes(interface, written, references, converts)
-    yield Module(interface.name.kind, f"{interface.name.kind}/{home}.py", view)
-    sent = written + derive.composites(interface)
-    references = References(interface, sent, messages, names, surroundings)
-    codecs = tuple(codec(structure, references, messages) for structure in sent)
+    every = [field for structure in written for field in structure.fields]
+    is_foreign = references.others and not surroundings.vendors
+    is_hiding = any(python_names.hides_method(field.name) for field in every)
+    purposes = zip(written, fields.purposes(interface), strict=True)
     view = ModuleView(
-        origin=Text(f"{interface.name}.{interface.name.kind}"),
-        pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
-        title=Text(f"The codecs of {interface.name}."),
-        runtime=Code(surroundings.runtime),
-        codecs=codecs,
-        has_texts=any(codec.has_texts for codec in codecs),
-    )
-    path = f"{interface.name.kind}/{python_names.codec_module(home)}.py"
-    yield Module("codec", path, view)
-
-
-def _classes(
-    interface: ir.Interface,
-    structures: tuple[ir.Message, ...],
-    references: References,
-    converts: bool,
-) -> ModuleView:
-    name = interface.name
-    purposes = fields.purposes(interface)
-    file = name.file
-    return ModuleView(
         origin=Text(f"{name}.{name.kind}"),
-        pragmas=(
-            *(PRAGMAS if references.others and not references.surroundings.vendors else ()),
-            *(HIDING_PRAGMAS if any(map(_hides_methods, structures)) else ()),
-        ),
+        pragmas=(PRAGMAS if is_foreign else ()) + (HIDING_PRAGMAS if is_hiding else ()),
         title=Text(f"The classes of {name}."),
-        runtime=Code(references.surroundings.runtime),
-        imports=_code(_imports(references, structures)),
+        runtime=Code(surroundings.runtime),
+        imports=_code(_imports(references, written)),
         messages=tuple(
-            classes.message(structure, references, purposes, file, converts=converts)
-            for structure in structures
+            classes.message(structure, references, purpose, name.file, converts=converts)
+            for structure, purpose in purposes
         ),
         group=None if isinstance(interface, ir.Message) else classes.group(interface),
         converts=converts,
     )
-
-
-def _hides_methods(structure: ir.Message) -> bool:
-    return any(python_names.hides_method(field.name) for field in structure.fields)
+    yield Module(name.kind, f"{name.kind}/{home}.py", view)
+    sent = written + derive.composites(interface)
+    references = References(interface, sent, messages, names, surroundings)
+    codecs = tuple(codec(structure, references, messages) for structure in sent)
+    view = ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
+        pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
+        title=Text(f"The codecs of {name}."),
+        runtime=Code(surroundings.runtime),
+        codecs=codecs,
+        has_texts=any(codec.has_texts for codec in codecs),
+    )
+    yield Module("codec", f"{name.kind}/{python_names.codec_module(home)}.py", view)
 
 
 def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
@@ -286,20 +255,6 @@ def installed_runtime(package: str) -> tuple[RenderedFile]:
     return (RenderedFile("_idlc.py", text),)
 
 
-def module_files(
-    interface: ir.Interface,
-    model: link.Model,
-    modules: python_names.Modules,
-    surroundings: Surroundings = ALONE,
-) -> Iterator[RenderedFile]:
-    """Yield the modules of one interface."""
-    converts = model.distro.converts_values
-    views = module_views(interface, model.messages, modules, surroundings, converts=converts)
-    for module in views:
-        text = template(f"message/{module.template}.py.jinja").render(module=module.view)
-        yield RenderedFile(module.path, text)
-
-
 def render_package(
     model: link.Model,
     surroundings: Surroundings = ALONE,
@@ -324,7 +279,10 @@ def interface_files(model: link.Model, surroundings: Surroundings) -> Iterator[R
     """Yield the modules of a package's interfaces and the description of their types."""
     modules = python_names.modules(interface.name for interface in model.own)
     for own in model.own:
-        yield from module_files(own, model, modules, surroundings)
+        converts = model.distro.converts_values
+        for module in module_views(own, model.messages, modules, surroundings, converts=converts):
+            text = template(f"message/{module.template}.py.jinja").render(module=module.view)
+            yield RenderedFile(module.path, text)
     for kind in model.kinds:
         page = imports.package(model, kind, modules, surroundings)
         text = template("message/package_init.py.jinja").render(package=page)

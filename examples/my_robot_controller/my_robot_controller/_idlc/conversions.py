@@ -15,7 +15,6 @@ from .typeinfo import FieldInfo, Structure, inner_path, spelling_hint, structure
 
 if TYPE_CHECKING:
     import dataclasses
-    from collections.abc import Iterator
 else:
     import typing
 
@@ -134,8 +133,24 @@ def dataclass_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
     if "__dataclass_fields__" in kind.__dict__:  # the base of all messages
         return {}
     owner = owner_of(kind)
+    defaults = owner.__init__.__defaults__ or ()
+    wire_names = owner._fields_and_field_types
+    try:
+        types = get_type_hints(owner)
+    except ImportError:  # of another package, whose classes only these fields need
+        types = owner.__annotations__
+    parts: list[Any] = []
+    for name, wire, default in zip(
+        owner.__match_args__, wire_names, defaults, strict=True
+    ):
+        field: Any = (
+            dataclasses.field(default_factory=partial(_fresh, owner, slot_name(wire)))
+            if default is None
+            else dataclasses.field(default=default)
+        )
+        parts.append((name, types[name], field))
     plain = dataclasses.make_dataclass(
-        owner.__name__, _fields(owner), init=False, repr=False, eq=False
+        owner.__name__, parts, init=False, repr=False, eq=False
     )
     fields: dict[str, Any] = plain.__dataclass_fields__  # type: ignore[attr-defined]
     owner.__dataclass_fields__ = fields
@@ -144,26 +159,6 @@ def dataclass_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
         code = owner.__eq__.__code__
         owner.__eq__.__code__ = code.replace(co_filename="<string>")
     return fields
-
-
-def _fields(owner: Any) -> Iterator[tuple[str, Any, dataclasses.Field[Any]]]:
-    import dataclasses
-
-    defaults = owner.__init__.__defaults__ or ()
-    names = zip(
-        owner.__match_args__, owner._fields_and_field_types, defaults, strict=True
-    )
-    try:
-        types = get_type_hints(owner)
-    except ImportError:  # of another package, whose classes only these fields need
-        types = owner.__annotations__
-    for name, wire, default in names:
-        field: Any = (
-            dataclasses.field(default_factory=partial(_fresh, owner, slot_name(wire)))
-            if default is None
-            else dataclasses.field(default=default)
-        )
-        yield name, types[name], field
 
 
 def _fresh(owner: Any, slot: str) -> Any:

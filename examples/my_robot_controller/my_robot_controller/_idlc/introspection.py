@@ -207,30 +207,22 @@ def _offsets(
         reader.read(code, 1)
     table = reader.read(rows, member * len(fields))
     parts = [table[at : at + member] for at in range(0, len(table), member)]
-    for part, field in zip(parts, fields.items(), strict=True):
-        _check_member(reader, part, *field, is_array)
+    for part, (field, (type_id, width)) in zip(parts, fields.items(), strict=True):
+        label, _, text_bound, nested = unpack_from("=4Q", part)
+        reader.demand_text(label, field)
+        flags = bytearray(8)
+        flags[is_array - 32] = not width
+        bound, is_bounded = unpack_from("=QB", part, 40)
+        default, *functions = unpack_from("=7Q", part, 56)
+        actual = (part[8], text_bound, nested, part[32:40], bound, is_bounded, default)
+        _demand(actual, (type_id, 0, 0, bytes(flags), 0, 0, 0), f"member {field!r}")
+        if width:
+            _demand(any(functions), False, f"whether {field!r} has functions")
+        for function in filter(None, functions):
+            reader.read(function, 1)
+        if len(part) > 112:  # whether it may be a buffer of another kind
+            _demand(part[112] in (0, 1), True, f"whether {field!r} has a flag")
     return [*(unpack_from("=I", part, 52)[0] for part in parts), size]
-
-
-def _check_member(
-    reader: _Reader, part: bytes, field: bytes, kind: tuple[int, int], is_array: int
-) -> None:
-    """Raise _UnknownError unless a member says what is known of its field."""
-    type_id, size = kind
-    name, _, text_bound, nested = unpack_from("=4Q", part)
-    reader.demand_text(name, field)
-    flags = bytearray(8)
-    flags[is_array - 32] = not size
-    bound, is_bounded = unpack_from("=QB", part, 40)
-    default, *functions = unpack_from("=7Q", part, 56)
-    actual = (part[8], text_bound, nested, part[32:40], bound, is_bounded, default)
-    _demand(actual, (type_id, 0, 0, bytes(flags), 0, 0, 0), f"member {field!r}")
-    if size:
-        _demand(any(functions), False, f"whether {field!r} has functions")
-    for function in filter(None, functions):
-        reader.read(function, 1)
-    if len(part) > 112:  # whether it may be a buffer of another kind
-        _demand(part[112] in (0, 1), True, f"whether {field!r} has a flag")
 
 
 def _sequences(offsets: list[list[int]]) -> tuple[int, int]:
