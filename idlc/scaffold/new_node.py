@@ -22,15 +22,10 @@ from idlc.scaffold.changes import (
     Project,
     Result,
     Settings,
-    accepted,
     find_package,
-    generation,
-    keys_of,
-    library_around,
     rendering,
     templates,
     type_name,
-    write,
 )
 from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
@@ -128,34 +123,47 @@ def _launch_file(package: str, names: Iterable[str]) -> str:
 
 def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
-    located = find_package(settings, report)
-    if located is None:
+    project = find_package(settings, report)
+    if project is None:
         return None
-    project, own = located
+    own, name = project.package, requested.name
     used = templates(settings, report)
-    planned = _planned(requested._replace(package=own), project, settings, report)
+    planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
         return None
     entry = Entry({}, {})
-    with rendering(requested.name, report):
-        entry = _entry(planned, project, used, launch=settings.launch)
-    edited = accepted(project, entry.edits, report)
-    result = None if edited is None else write(project, entry.added, edited, settings, report)
+    with rendering(name, report):
+        files = {
+            f"{own}/{name}.py": render(planned, used),
+            f"test/test_{name}.py": render_test(planned, used),
+        }
+        for path, text in files.items():
+            compile(text, path, "exec", dont_inherit=True)
+        read = {path: project.text(path) for path in paths(own, project.names("launch"))}
+        texts = {path: text for path, text in read.items() if text is not None}
+        keys, present = project.keys(), folders(project.path)
+        entry = node_entry(planned, texts, used, launch=settings.launch, keys=keys, folders=present)
+        entry = entry._replace(added={**files, **entry.added})
+    edited = project.accepted(entry.edits)
+    result = None if edited is None else project.write(entry.added, edited)
     if result is None:
         return None
-    missing = not project.has(f"{own}/_type_data.py")
+    notes = [f"`{project.shown(path)}` {text}" for path, text in entry.notes]
+    absent = [package for package in planned.packages if not python_folders(package)]
+    if absent and python_folders("rclpy"):
+        listed = ", ".join(f"`{package}`" for package in absent)
+        distro = BY_NAME.get(distribution().name, DEFAULT)
+        notes.append(f"{listed} cannot be imported here: {distro.installing(absent)}")
     used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
-    compiled = any(name.package == own for name in used_names)
-    after = generation(project, own, settings) if missing and compiled else ()
-    notes = (f"`{project.shown(path)}` {text}" for path, text in entry.notes)
-    return result._replace(notes=(*notes, *_absent(planned)), following=after)
+    compiled = any(interface.package == own for interface in used_names)
+    missing = not project.has(f"{own}/_type_data.py")
+    after = project.generation() if missing and compiled else ()
+    return result._replace(notes=tuple(notes), following=after)
 
 
-def _planned(
-    requested: spec.Node, project: Project, settings: Settings, report: Report
-) -> Plan | None:
+def _planned(requested: spec.Node, project: Project, report: Report) -> Plan | None:
     """Return the node with the interfaces of its endpoints; report missing ones."""
-    library = library_around(requested.package, project, settings, report)
+    library = project.library()
     interfaces: list[ir.Interface | None] = []
     messages: dict[ir.TypeName, ir.Message] = {}
     for endpoint in requested.endpoints:
@@ -172,29 +180,3 @@ def _planned(
             interfaces.append(model.interfaces[name])
             messages.update(model.messages)
     return None if report.had_errors else plan(requested, interfaces, messages)
-
-
-def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) -> Entry:
-    """Return the files of a node, and the edits that list it in its package."""
-    own, name = planned.node.package, planned.node.name
-    files = {
-        f"{own}/{name}.py": render(planned, used),
-        f"test/test_{name}.py": render_test(planned, used),
-    }
-    for path, text in files.items():
-        compile(text, path, "exec", dont_inherit=True)
-    read = {path: project.text(path) for path in paths(own, project.names("launch"))}
-    texts = {path: text for path, text in read.items() if text is not None}
-    keys, present = keys_of(project), folders(project.path)
-    entry = node_entry(planned, texts, used, launch=launch, keys=keys, folders=present)
-    return entry._replace(added={**files, **entry.added})
-
-
-def _absent(planned: Plan) -> list[str]:
-    """Return a note if ROS 2 is installed, but not all packages that the node imports."""
-    absent = [name for name in planned.packages if not python_folders(name)]
-    if not absent or not python_folders("rclpy"):
-        return []
-    names = ", ".join(f"`{name}`" for name in absent)
-    distro = BY_NAME.get(distribution().name, DEFAULT)
-    return [f"{names} cannot be imported here: {distro.installing(absent)}"]

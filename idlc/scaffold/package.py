@@ -16,7 +16,7 @@ from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import Code, Text
-from idlc.scaffold.changes import Project, Result, Settings, rendering, templates, write
+from idlc.scaffold.changes import Project, Result, Settings, rendering, templates
 from idlc.scaffold.templates import Templates
 
 VERSION = "0.1.0"
@@ -176,7 +176,7 @@ def package(
     where files that stay as they are contradict them.
     """
     name = requested.name if folder in ("", ".") else f"{folder}/{requested.name}"
-    project = Project(name, settings.root, report, force=settings.force)
+    project = Project(name, settings, report)
     used = templates(settings, report)
     if report.had_errors:
         return None
@@ -201,7 +201,7 @@ def package(
         if text is not None:
             source = Source(project.shown(path), text)
             report.extend(look(source, requested, {*chosen, "build_type"}))
-    return write(project, new, {}, settings, report)
+    return project.write(new)
 
 
 def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnostic]:
