@@ -63,23 +63,6 @@ class PackageView(NamedTuple):
         return self.build_type == PYTHON
 
 
-def _view(package: Package) -> PackageView:
-    return PackageView(
-        name=Code(package.name),
-        version=Code(VERSION),
-        license=Code(package.license),
-        build_type=Code(package.build_type),
-        description=Text(package.description),
-        xml_description=Text(escape(package.description)),
-        xml_maintainer=Text(escape(package.maintainer)),
-        xml_email=Text(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
-        py_description=Code(repr(package.description)),
-        py_maintainer=Code(repr(package.maintainer)),
-        py_email=Code(repr(package.email)),
-        depends=tuple(map(Code, package.depends)),
-    )
-
-
 #: Files of a package of nodes, each with its template; NAME stands for the package.
 _PYTHON_FILES = {
     "package.xml": "package/package.xml.jinja",
@@ -128,7 +111,8 @@ def package_files(package: Package, templates: Templates) -> dict[str, str]:
         path.replace("NAME", package.name): rendered(template, package, templates)
         for path, template in listed.items()
     }
-    files["LICENSE"] = license_text(package)
+    text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
+    files["LICENSE"] = text.replace("(c) HOLDER", f"(c) {package.maintainer}")
     if package.build_type == PYTHON:
         files[f"resource/{package.name}"] = ""
         files[f"{package.name}/__init__.py"] = f'"""Nodes and interfaces of {package.name}."""\n'
@@ -137,18 +121,26 @@ def package_files(package: Package, templates: Templates) -> dict[str, str]:
 
 def rendered(template: str, package: Package, templates: Templates) -> str:
     """Return the text of one of a package's files."""
-    return templates.render(template, package=_view(package))
+    view = PackageView(
+        name=Code(package.name),
+        version=Code(VERSION),
+        license=Code(package.license),
+        build_type=Code(package.build_type),
+        description=Text(package.description),
+        xml_description=Text(escape(package.description)),
+        xml_maintainer=Text(escape(package.maintainer)),
+        xml_email=Text(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
+        py_description=Code(repr(package.description)),
+        py_maintainer=Code(repr(package.maintainer)),
+        py_email=Code(repr(package.email)),
+        depends=tuple(map(Code, package.depends)),
+    )
+    return templates.render(template, package=view)
 
 
 def rendered_for(name: str, template: str, templates: Templates) -> str:
     """Return the text of a file of which only the package's name matters."""
     return rendered(template, Package(name, "", "", "", LICENSES[0]), templates)
-
-
-def license_text(package: Package) -> str:
-    """Return the text of a licence, with the maintainer as the holder where it names one."""
-    text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
-    return text.replace("(c) HOLDER", f"(c) {package.maintainer}")
 
 
 #: Where the choices of a package are: in elements of package.xml, and arguments of setup().
@@ -224,17 +216,15 @@ def _other_manifest(
     declared = statements(source)
     for field, tag in _TAGS.items():
         lines = [statement for statement in declared if statement.tag == tag]
-        emails = field == "email"
-        texts = (line.attributes.get("email", "") if emails else line.text for line in lines)
+        emails = [line.attributes.get("email", "") for line in lines]
+        texts = emails if field == "email" else [line.text for line in lines]
         values = [" ".join(text.split()) for text in texts]
         value = getattr(requested, field)
         if field in chosen and lines and value not in values:
             line = f"<{tag}>{escape(value)}</{tag}>"
             if tag == "maintainer":
                 name = requested.maintainer if "maintainer" in chosen else lines[0].text
-                email = (
-                    requested.email if "email" in chosen else lines[0].attributes.get("email", "")
-                )
+                email = requested.email if "email" in chosen else emails[0]
                 line = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
             yield codes.EXISTING_FILE.at(
                 lines[0].span,

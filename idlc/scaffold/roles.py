@@ -39,10 +39,9 @@ QOS_NAMES = tuple(preset.name for preset in QOS_PRESETS)
 
 def qos_preset(name: str) -> Qos:
     """Return the preset of a name; raise ValueError if there is none."""
-    for preset in QOS_PRESETS:
-        if preset.name == name:
-            return preset
-    raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
+    if name not in QOS_NAMES:
+        raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
+    return QOS_PRESETS[QOS_NAMES.index(name)]
 
 
 #: The imports of a module: the names from each other module.

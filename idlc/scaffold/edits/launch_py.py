@@ -72,26 +72,18 @@ def add_node(text: str, node: Started) -> Outcome:
     if imported is None:
         return Refused(f"`{node.action}` is something else in this file", node.line, WHERE)
     called, imports = imported
-    descriptions = [*file.calls_of("LaunchDescription")]
-    edits = _in_description(file, descriptions[0], node, called) if len(descriptions) == 1 else ()
-    if not edits:
-        return Refused("its nodes are not written out in one place", node.line, WHERE)
-    return Edited(apply(text, (*imports, *edits))[0])
-
-
-def _in_description(
-    file: Setup, description: ast.Call, node: Started, called: str
-) -> tuple[Edit, ...]:
-    """Return the edits that add a node to a description; empty if that is not possible."""
-    match description:
-        case ast.Call(args=[ast.List() as listed], keywords=[]):
+    edits: tuple[Edit, ...] = ()
+    match [*file.calls_of("LaunchDescription")]:
+        case [ast.Call(args=[ast.List() as listed], keywords=[])]:
             margin = margin_of(file.source, listed)
             before = margin if is_spread(file.source, listed) else "    "
             new = _call(called, node, margin, before, ",")
-            return append_element(file.source, listed, new)
-        case ast.Call(args=[], keywords=[]):
-            return tuple(_additions(file, description, node, called))
-    return ()
+            edits = append_element(file.source, listed, new)
+        case [ast.Call(args=[], keywords=[]) as description]:
+            edits = tuple(_additions(file, description, node, called))
+    if not edits:
+        return Refused("its nodes are not written out in one place", node.line, WHERE)
+    return Edited(apply(text, (*imports, *edits))[0])
 
 
 def _additions(file: Setup, description: ast.Call, node: Started, called: str) -> Iterator[Edit]:
