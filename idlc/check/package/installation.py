@@ -48,8 +48,8 @@ class _Package(NamedTuple):
 
 def _built_by_setup(facts: Facts) -> Setup | None:
     """Return the parsed setup.py, if it builds the package."""
-    is_python = facts.setup_py is not None and facts.build_type == "ament_python"
-    return _read(facts.setup_py) if facts.setup_py is not None and is_python else None
+    is_python = facts.build_type == "ament_python"
+    return _read(facts.setup_py) if facts.setup_py and is_python else None
 
 
 def check_setup(
@@ -106,25 +106,21 @@ def _missing_interfaces(package: _Package, keys: Mapping[str, str]) -> Iterator[
         return
     subjects = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
     subjects += ["the index entry of the interfaces"] if index else []
-    patterns = sorted({_pattern(key, file) for key, file in keys.items()})
+    patterns = set()
+    for key, file in keys.items():
+        folder, kind = file.rpartition("/")[0], key.split("/")[0]
+        is_plain = re.fullmatch(r"[\w./ -]+", folder)  # it becomes part of a program
+        patterns.add(f"{folder if is_plain else kind}/*.{kind}")
     lines = [
         f"('{share}/{kind}', glob('{pattern}'))"
         for kind in missing
-        for pattern in patterns
+        for pattern in sorted(patterns)
         if pattern.endswith(f".{kind}")
     ]
     if index:
         lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
     message = f"{enumerated(subjects)} {'are' if missing else 'is'} not among the `data_files`"
     yield _data_files_problem(codes.INTERFACES_NOT_INSTALLED, message, setup, lines, uses_glob=True)
-
-
-def _pattern(key: str, file: str) -> str:
-    """Return the pattern for all interface files of one kind and folder."""
-    folder, kind = file.rpartition("/")[0], key.split("/")[0]
-    if not re.fullmatch(r"[\w./ -]+", folder):  # it becomes part of a program
-        folder = kind
-    return f"{folder}/*.{kind}"
 
 
 def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind: str = "") -> bool:
@@ -214,7 +210,15 @@ def _packages_problem(place: Span, message: str, package: _Package, view: Layout
     root = view.roots.get("", "")
     where = f"'{root}', " if root not in ("", ".") else ""
     if place.source is not setup.source:
-        return code.at(place, message, hint=_config_hint(place, view, root))
+        if view.installed and view.installed.finders:
+            hint = "make its `where`, `include` and `exclude` match these packages"
+        elif place.source.path.endswith(".toml"):
+            folders = f'["{root or "."}"]'
+            hint = f"write `packages.find = {{ where = {folders} }}` in [tool.setuptools]"
+        else:
+            also = f", and `where = {root}` in [options.packages.find]" if root else ""
+            hint = f"write `packages = find:`{also}"
+        return code.at(place, message, hint=hint)
     find, imports = imported(setup, "setuptools", "find_packages")
     call = f"{find}({where}exclude=['test'])"
     hint = f"write `packages={call}`"
@@ -243,17 +247,6 @@ def _packages_problem(place: Span, message: str, package: _Package, view: Layout
     return code.at(place, message, hint=hint, edits=(*imports, *edits) if edits else ())
 
 
-def _config_hint(place: Span, view: Layout, root: str) -> str:
-    """Return the hint for packages that setup.cfg or pyproject.toml lists."""
-    if view.installed and view.installed.finders:
-        return "make its `where`, `include` and `exclude` match these packages"
-    if place.source.path.endswith(".toml"):
-        where = f'["{root or "."}"]'
-        return f"write `packages.find = {{ where = {where} }}` in [tool.setuptools]"
-    also = f", and `where = {root}` in [options.packages.find]" if root else ""
-    return f"write `packages = find:`{also}"
-
-
 def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """The package's marker, which `ros2 run` needs to find it, exists and is installed."""
     setup = _built_by_setup(facts)
@@ -278,36 +271,31 @@ def entry_points(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     setup = _read(facts.setup_py)
     view = _layout(facts, setup)
     elsewhere = view is None or bool(view.roots) or "py_modules" in setup.arguments
+    tops = {name.partition(".")[0] for name in facts.modules}
     for text, node in setup.scripts:
-        problem = _problem(text, facts, elsewhere=elsewhere)
-        if problem:
-            place = span_of(facts.setup_py, node)
-            yield codes.BAD_ENTRY_POINT.at(place, problem[0], hint=problem[1])
-
-
-def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | None:
-    """Return the problem of an entry point, and a hint.
-
-    `elsewhere`: modules may be in folders that were not searched.
-    """
-    script, equals, target = text.partition("=")
-    module, colon, function = (part.strip() for part in target.partition(":"))
-    if not equals or not colon or not function:
-        message = f"`{text}` is not an entry point"
-        return message, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
-    if elsewhere:
-        return None
-    if module.partition(".")[0] not in {name.partition(".")[0] for name in facts.modules}:
-        return (
-            f"there is no Python package `{module.partition('.')[0]}` here",
-            f"it is `{facts.name}` by the package.xml",
-        )
-    source = facts.modules.get(module) or facts.modules.get(f"{module}.__init__")
-    if source is None:
-        return f"there is no module `{module}`", "name the file that holds the function"
-    if not defines(source, function.partition(".")[0]):
-        return f"`{source.path}` has no `{function}`", f"define it: `def {function}() -> None:`"
-    return None
+        script, equals, target = text.partition("=")
+        module, colon, function = (part.strip() for part in target.partition(":"))
+        top = module.partition(".")[0]
+        source = facts.modules.get(module) or facts.modules.get(f"{module}.__init__")
+        if not equals or not colon or not function:
+            message = f"`{text}` is not an entry point"
+            hint = f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
+        elif elsewhere:  # modules may be in folders that were not searched
+            continue
+        elif top not in tops:
+            message = f"there is no Python package `{top}` here"
+            hint = f"it is `{facts.name}` by the package.xml"
+        elif source is None:
+            message, hint = (
+                f"there is no module `{module}`",
+                "name the file that holds the function",
+            )
+        elif not defines(source, function.partition(".")[0]):
+            message = f"`{source.path}` has no `{function}`"
+            hint = f"define it: `def {function}() -> None:`"
+        else:
+            continue
+        yield codes.BAD_ENTRY_POINT.at(span_of(facts.setup_py, node), message, hint=hint)
 
 
 def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
@@ -338,11 +326,14 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     for output in facts.outputs:
         if output.package != facts.name or not facts.whole:
             continue
-        changed = [
-            f"`{name}` {_changed(output.inputs.get(name), facts.inputs.get(name))}"
-            for name in sorted(output.inputs.keys() | facts.inputs.keys())
-            if output.inputs.get(name) != facts.inputs.get(name)
-        ]
+        changed = []
+        for name in sorted(output.inputs.keys() | facts.inputs.keys()):
+            before, now = output.inputs.get(name), facts.inputs.get(name)
+            if before != now:
+                what = (
+                    "was added" if before is None else "was removed" if now is None else "changed"
+                )
+                changed.append(f"`{name}` {what}")
         if changed:
             folder = facts.manifest.path.rpartition("/")[0] or "."
             words = ("gen", folder, "-o", output.path.rpartition("/")[0])
@@ -351,7 +342,3 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
                 f"the generated code is out of date: {first_few(changed, 3)}",
                 hint=f"run `idlc {shlex.join(words)}`",
             )
-
-
-def _changed(before: str | None, now: str | None) -> str:
-    return "was added" if before is None else "was removed" if now is None else "changed"
