@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from idlc.check.package.manifest import GENERATE, calls
@@ -49,7 +49,12 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
     checked = {entry.file.path.resolve() for entry in package.files}
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
-    modules = dict(_modules(folder, files, generated, root))
+    modules = {}  # nodes may be in the folder of generated classes
+    for file in files:
+        parts = file.relative_to(folder).parts
+        is_code = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
+        if is_code and file not in generated and (module := _optional(file, root)):
+            modules[".".join((*parts[:-1], file.stem))] = module
     return Facts(
         name=package.package,
         manifest=source,
@@ -77,14 +82,21 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
             for entry in package.files
             if (place := root.absolute(entry.file.path)).is_relative_to(folder)
         },
-        folders=_by_name(folder, files),
+        folders=folders(folder, files),
         available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
     )
 
 
-def folders(folder: Path) -> dict[str, bool]:
+def folders(folder: Path, files: Iterable[Path] | None = None) -> dict[str, bool]:
     """Return the folders with files, by dotted name, and whether each is a Python package."""
-    return _by_name(folder, _files(folder))
+    is_package: dict[str, bool] = {}
+    for file in _files(folder) if files is None else files:
+        parts = file.relative_to(folder).parts[:-1]
+        for end in range(1, len(parts) + 1):
+            is_package.setdefault(".".join(parts[:end]), False)
+        if file.name == "__init__.py" and parts:
+            is_package[".".join(parts)] = True
+    return is_package
 
 
 def home_of(folder: Path, package: str, root: Root) -> Path:
@@ -106,17 +118,6 @@ def home_of(folder: Path, package: str, root: Root) -> Path:
     return homes[not homes[0].is_dir() and homes[1].is_dir()]
 
 
-def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
-    is_package: dict[str, bool] = {}
-    for file in files:
-        parts = file.relative_to(folder).parts[:-1]
-        for end in range(1, len(parts) + 1):
-            is_package.setdefault(".".join(parts[:end]), False)
-        if file.name == "__init__.py" and parts:
-            is_package[".".join(parts)] = True
-    return is_package
-
-
 def _files(folder: Path) -> Iterator[Path]:
     """Yield every file below a package's folder that may be a source, other packages' excluded."""
     for place, folders, names in os.walk(folder):
@@ -130,20 +131,6 @@ def _files(folder: Path) -> Iterator[Path]:
         for name in sorted(names):
             if name[0] != "." and name not in SKIPPED and (file := current / name).is_file():
                 yield file
-
-
-def _modules(
-    folder: Path, files: Iterable[Path], generated: Container[Path], root: Root
-) -> Iterator[tuple[str, Source]]:
-    """Yield a package's own Python files by their dotted names, without tests and the like.
-
-    Nodes may be in the folder of generated classes.
-    """
-    for file in files:
-        parts = file.relative_to(folder).parts
-        ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if ours and file not in generated and (source := _optional(file, root)):
-            yield ".".join((*parts[:-1], file.stem)), source
 
 
 def _optional(path: Path, root: Root) -> Source | None:
