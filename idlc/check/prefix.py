@@ -9,7 +9,7 @@ from idlc.check.compiler import models_of, stage
 from idlc.check.run import CheckResult
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.native.inspect import Inspected, inspect
+from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS
 from idlc.generate.native.library import (
     FIELDS_CPP,
@@ -60,7 +60,7 @@ def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
             name = f"lib{owner.package}__{identifier}.so"
             files.append(owner.library(name))
             with stage("check library", files[-1]):
-                why = _problem(owner, name, identifier, model)
+                why = next(_problems(owner, name, identifier, model), "")
             if why:
                 message = f"`{name}` {why}: C++ tools fail at the types of `{owner.package}`"
                 report.add(codes.UNUSABLE_LIBRARY.of(files[-1], message, hint=_AGAIN))
@@ -83,26 +83,24 @@ def _model(package: InstalledPackage) -> Model | None:
     return None if dropped.had_errors or not files else models[0][1]
 
 
-def _problem(package: InstalledPackage, name: str, identifier: str, model: Model | None) -> str:
-    """Return the problem of a library, in words that follow its name; empty if there is none."""
+def _problems(
+    package: InstalledPackage, name: str, identifier: str, model: Model | None
+) -> Iterator[str]:
+    """Yield the problems of a library, the gravest first, in words that follow its name."""
     data = package.content(name)
+    library = data and inspect(data)
     if data is None:
-        return "is missing" if identifier == OWN else ""
-    library = inspect(data)
-    if library is None:
-        return "is no shared library, or a part of one"
+        if identifier == OWN:
+            yield "is missing"
+        return
+    if not library:
+        yield "is no shared library, or a part of one"
+        return
     own = MACHINES.get(machine())
     if own is not None and library.machine != own.number:
-        return f"is for another processor than {machine()}"
+        yield f"is for another processor than {machine()}"
     if model is None:
-        return ""
-    return next(_differences(package, data, library, identifier, model), "")
-
-
-def _differences(
-    package: InstalledPackage, data: bytes, library: Inspected, identifier: str, model: Model
-) -> Iterator[str]:
-    """Yield the differences between a library and the installed interfaces."""
+        return
     messages = [message for own in model.own for message in derive.messages(own)]
     missing = [
         f"`{message.name}`"

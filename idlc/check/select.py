@@ -133,9 +133,8 @@ def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
     if diagnostic.code != codes.UNUSED_IGNORE.id or diagnostic.span is None:
         return False
     code = codes.find(diagnostic.span.text)
-    if code is None or code.severity is Severity.ERROR:
-        return False
-    return not selection.has(code)
+    is_advice = code is not None and code.severity is not Severity.ERROR
+    return code is not None and is_advice and not selection.has(code)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:
