@@ -113,19 +113,15 @@ def without_ignored(
                 hint=f"write the reason after it: `ignore[{remark.code}] REASON`",
             )
         elif at not in used:
-            yield _unused(remark)
-
-
-def _unused(remark: Remark) -> Diagnostic:
-    code = codes.CODES.get(remark.code)
-    if code is None:
-        message = f"there is no code `{remark.code}`"
-    elif code.severity is Severity.ERROR:
-        message = f"`{remark.code}` is an error, which cannot be ignored"
-    else:
-        message = f"there is no `{remark.code}` here to ignore"
-    edits = (remark.edit,) if remark.edit else ()
-    return codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark", edits=edits)
+            code = codes.CODES.get(remark.code)
+            if code is None:
+                message = f"there is no code `{remark.code}`"
+            elif code.severity is Severity.ERROR:
+                message = f"`{remark.code}` is an error, which cannot be ignored"
+            else:
+                message = f"there is no `{remark.code}` here to ignore"
+            hint, edits = "remove the remark", (remark.edit,) if remark.edit else ()
+            yield codes.UNUSED_IGNORE.at(remark.span, message, hint=hint, edits=edits)
 
 
 def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
@@ -165,23 +161,16 @@ def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Ite
     start = line.start + len(line.code)
     listed = re.finditer(r"[^\s,]+", match.group(1))
     names = [(word.group(), start + match.start(1) + word.start()) for word in listed]
-    edit = _removal(source, line, match) if len(names) == 1 else None
+    edit = None
+    if len(names) == 1 and not line.comment[: match.start()].strip("# \t"):  # nothing else is said
+        code_end = len(line.code.rstrip())
+        end = start + len(line.comment) + (0 if code_end else len(line.newline))
+        edit = Edit(Span(source, line.start + code_end, min(end, len(source.text))), "")
     for name, at in names:
         span = Span(source, at, at + len(name))
         named = codes.find(name)
         code = named.id if named else name
         yield Remark(code, match.group(2).strip(), span, None if in_head else number, edit)
-
-
-def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | None:
-    """Return the edit that removes a comment that holds only the remark."""
-    if line.comment[: match.start()].strip("# \t"):
-        return None
-    code = len(line.code.rstrip())
-    end = line.start + len(line.code) + len(line.comment)
-    if not code:
-        end += len(line.newline)
-    return Edit(Span(source, line.start + code, min(end, len(source.text))), "")
 
 
 class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 from xml.sax.saxutils import escape, quoteattr
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.diagnostics.source import Source
+from idlc.diagnostics.source import Source, Span
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
@@ -154,6 +154,10 @@ _ARGUMENTS = {
 }
 
 
+#: A field of a package, the range that sets it, the values there, and the code that would do.
+_Stated: TypeAlias = tuple[str, Span, list[str], str]
+
+
 def package(
     requested: Package,
     folder: str,
@@ -188,11 +192,17 @@ def package(
         for path, text in files.items()
         if path not in growing or settings.force or not project.has(path)
     }
-    for path, look in (("package.xml", _other_manifest), ("setup.py", _other_setup)):
+    chosen = {*chosen, "build_type"}
+    for path, stated in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
         text = project.text(path) if path in files and path not in new else None
-        if text is not None:
-            source = Source(project.shown(path), text)
-            report.extend(look(source, requested, {*chosen, "build_type"}))
+        source = Source(project.shown(path), text or "")
+        for field, span, values, line in stated(source, requested, chosen) if text else ():
+            value = getattr(requested, field)
+            if field in chosen and value not in values:
+                shown = f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`"
+                hint = "choose another name" if field == "build_type" else f"write `{line}`"
+                message = f"{shown}; the file was not changed"
+                report.add(codes.EXISTING_FILE.at(span, message, hint=hint))
     return project.write(new)
 
 
@@ -209,44 +219,31 @@ def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnosti
             )
 
 
-def _other_manifest(
-    source: Source, requested: Package, chosen: Collection[str]
-) -> Iterator[Diagnostic]:
-    """Yield a problem for each choice that a package.xml contradicts."""
+def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) -> Iterator[_Stated]:
+    """Yield what a package.xml says of each choice, and the element to write in its place."""
     declared = statements(source)
     for field, tag in _TAGS.items():
         lines = [statement for statement in declared if statement.tag == tag]
+        if not lines:
+            continue
         emails = [line.attributes.get("email", "") for line in lines]
         texts = emails if field == "email" else [line.text for line in lines]
-        values = [" ".join(text.split()) for text in texts]
-        value = getattr(requested, field)
-        if field in chosen and lines and value not in values:
-            line = f"<{tag}>{escape(value)}</{tag}>"
-            if tag == "maintainer":
-                name = requested.maintainer if "maintainer" in chosen else lines[0].text
-                email = requested.email if "email" in chosen else emails[0]
-                line = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
-            yield codes.EXISTING_FILE.at(
-                lines[0].span,
-                f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`; "
-                "the file was not changed",
-                hint=f"write `{line}`" if field != "build_type" else "choose another name",
-            )
+        new = f"<{tag}>{escape(getattr(requested, field))}</{tag}>"
+        if tag == "maintainer":
+            name = requested.maintainer if "maintainer" in chosen else lines[0].text
+            email = requested.email if "email" in chosen else emails[0]
+            new = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
+        yield field, lines[0].span, [" ".join(text.split()) for text in texts], new
 
 
-def _other_setup(
-    source: Source, requested: Package, chosen: Collection[str]
-) -> Iterator[Diagnostic]:
-    """Yield a problem for each choice that a setup.py contradicts."""
+def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Stated]:
+    """Yield what a setup.py says of each choice, and the argument to write in its place."""
     from idlc.check.package.setup_py import Setup, span_of
 
     setup = Setup(source)
     for field, argument in _ARGUMENTS.items():
-        node, value = setup.arguments.get(argument), getattr(requested, field)
+        node = setup.arguments.get(argument)
         text = setup.text(node)
-        if node is not None and field in chosen and text not in (None, value):
-            yield codes.EXISTING_FILE.at(
-                span_of(source, node),
-                f"the {field} is `{text}` here, not `{value}`; the file was not changed",
-                hint=f"write `{argument}={value!r}`",
-            )
+        if node is not None and text is not None:
+            new = f"{argument}={getattr(requested, field)!r}"
+            yield field, span_of(source, node), [text], new

@@ -98,7 +98,9 @@ def sample(
     """
     fields = []
     for field in message.fields:
-        name, comment = Code(python_names.field(field.name)), _comment(message, field, page)
+        name = Code(python_names.field(field.name))
+        explained = _explained(field) if message.name.package == page.own else ""
+        comment = tuple(map(Text, textwrap.wrap(explained, COMMENT)))
         nested = _nested(field, page)
         if field.name in values:
             fields.append(FieldSample(name, (), Code(values[field.name])))
@@ -121,12 +123,6 @@ def logged(message: ir.Message, variable: str) -> Code:
     if short and (len(short) == 1 or len(short) < len(message.fields)):
         return Code(f"{{{variable}.{python_names.field(short[0].name)}=}}")
     return Code(f"{{{variable}=}}")
-
-
-def _comment(message: ir.Message, field: ir.Field, page: Page) -> tuple[Text, ...]:
-    """Return the lines of the interface's comment on a field, if the package is the node's."""
-    is_own = message.name.package == page.own
-    return tuple(map(Text, textwrap.wrap(_explained(field), COMMENT))) if is_own else ()
 
 
 def _explained(field: ir.Field, fallback: str = "") -> str:

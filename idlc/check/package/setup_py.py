@@ -346,14 +346,15 @@ class Setup:
         items = self.items(self.arguments["data_files"])
         if not all(item.is_element for item in items):
             return None
-        return tuple(self._entry(item.node) for item in items)
-
-    def _entry(self, node: ast.expr) -> DataFiles:
-        value = self.value(node)
-        if isinstance(value, (ast.Tuple, ast.List)) and len(value.elts) == 2:
-            folder = self.text(value.elts[0])
-            return DataFiles(value.elts[0], folder, self._files(value.elts[1]))
-        return DataFiles(node, "" if self.text(node) is not None else None, None)
+        entries = []
+        for item in items:
+            match self.value(item.node):
+                case ast.Tuple(elts=[folder, files]) | ast.List(elts=[folder, files]):
+                    entries.append(DataFiles(folder, self.text(folder), self._files(files)))
+                case _:
+                    is_file = self.text(item.node) is not None
+                    entries.append(DataFiles(item.node, "" if is_file else None, None))
+        return tuple(entries)
 
     def _files(self, node: ast.expr) -> tuple[str, ...] | None:
         """Return the files and patterns in a list of data_files; `None` if some are computed."""
