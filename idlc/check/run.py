@@ -162,8 +162,7 @@ class Checker:
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""
         if package.package not in self._facts:
-            new = facts(package, self.library.packages, self._scope)
-            self._facts[package.package] = new
+            self._facts[package.package] = facts(package, self.library.packages, self._scope)
         current = self._facts[package.package]
         if current is None or not current.inputs:
             return current

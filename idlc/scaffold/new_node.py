@@ -35,6 +35,7 @@ from idlc.scaffold.templates import Templates
 
 MANIFEST = "package.xml"
 SETUP = "setup.py"
+SETUP_FILES = ("pyproject.toml", "setup.cfg", SETUP)
 CONFTEST = "test/conftest.py"
 LAUNCH_ENDING = "launch.py"
 
@@ -52,10 +53,11 @@ class Entry(NamedTuple):
 
 def paths(package: str, launch_files: Iterable[str]) -> list[str]:
     """Return the files of a package whose texts decide; `launch_files` are names in `launch/`."""
-    return [
-        *("pyproject.toml", "setup.cfg", SETUP, MANIFEST, CONFTEST),
-        *(f"{package}/__init__.py", _launch_file(package, launch_files)),
-    ]
+    listed = [name for name in launch_files if name.endswith(LAUNCH_ENDING)]
+    usual = [f"{package}_launch.py", f"{package}.launch.py"]
+    chosen = listed if len(listed) == 1 else [name for name in usual if name in listed]
+    launch_file = f"launch/{next(iter(chosen), usual[0])}"
+    return [*SETUP_FILES, MANIFEST, CONFTEST, f"{package}/__init__.py", launch_file]
 
 
 def node_entry(
@@ -75,8 +77,7 @@ def node_entry(
     """
     node = planned.node
     script = Script(node.name, f"{node.package}.{node.name}:main")
-    setup_files = ("pyproject.toml", "setup.cfg", SETUP)
-    described = {name: texts[name] for name in setup_files if name in texts}
+    described = {name: texts[name] for name in SETUP_FILES if name in texts}
     if (own := tuple(keys)) and SETUP in described:
         text = described[SETUP]
         described[SETUP] = setup_py.add_interfaces(text, node.package, own, folders)
@@ -96,29 +97,19 @@ def node_entry(
     if not launch:
         return Entry(added, edits)
     file = next((name for name in texts if name.startswith("launch/")), "")
-    text = texts.get(file) or rendered_for(node.package, "package/launch.py.jinja", templates)
-    started = launch_py.add_node(text, launch_py.Started(node.package, node.name, node.lifecycle))
-    path = file or _launch_file(node.package, ())
+    old = texts.get(file) or rendered_for(node.package, "package/launch.py.jinja", templates)
+    started = launch_py.add_node(old, launch_py.Started(node.package, node.name, node.lifecycle))
+    path = file or f"launch/{node.package}_launch.py"
     if isinstance(started, Refused):
         line = f"add this {started.where}: {started.line.rstrip(',')}"
         note = (path, f"is not edited: {started.why}; {line}")
-        return Entry(added if file else {**added, path: text}, edits, (note,))
+        return Entry(added if file else {**added, path: old}, edits, (note,))
     if file:
         return Entry(added, {**edits, path: started})
     before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
     if SETUP in texts and isinstance(before, Edited):
         edits[SETUP] = setup_py.add_launch(before.text, node.package, path)
     return Entry({**added, path: started.text}, edits)
-
-
-def _launch_file(package: str, names: Iterable[str]) -> str:
-    """Return the launch file that lists the package's nodes, of the names in `launch/`."""
-    launch_files = [name for name in names if name.endswith(LAUNCH_ENDING)]
-    preferred = [f"{package}_launch.py", f"{package}.launch.py"]
-    for name in (*preferred, *(launch_files if len(launch_files) == 1 else ())):
-        if name in launch_files:
-            return f"launch/{name}"
-    return f"launch/{preferred[0]}"
 
 
 def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
@@ -139,8 +130,10 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
         }
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)
-        read = {path: project.text(path) for path in paths(own, project.names("launch"))}
-        texts = {path: text for path, text in read.items() if text is not None}
+        texts = {}
+        for path in paths(own, project.names("launch")):
+            if (content := project.text(path)) is not None:
+                texts[path] = content
         keys, present = project.keys(), folders(project.path)
         entry = node_entry(planned, texts, used, launch=settings.launch, keys=keys, folders=present)
         entry = entry._replace(added={**files, **entry.added})

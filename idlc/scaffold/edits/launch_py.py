@@ -39,18 +39,17 @@ class Started(NamedTuple):
         return "LifecycleNode" if self.lifecycle else "Node"
 
     @property
-    def words(self) -> dict[str, str]:
+    def arguments(self) -> list[str]:
         """The keyword arguments of the class."""
         words = {"package": self.package, "executable": self.executable, "output": "screen"}
         if self.lifecycle:  # these have no defaults
             words |= {"name": self.executable, "namespace": ""}
-        return words
+        return [f"{name}='{word}'" for name, word in words.items()]
 
     @property
     def line(self) -> str:
         """The line for a list of nodes."""
-        arguments = ", ".join(f"{name}='{word}'" for name, word in self.words.items())
-        return f"{self.action}({arguments}),"
+        return f"{self.action}({', '.join(self.arguments)}),"
 
 
 def add_node(text: str, node: Started) -> Outcome:
@@ -120,10 +119,9 @@ def _line_end(source: Source, node: ast.AST) -> int:
 
 def _call(function: str, node: Started, margin: str, before: str, tail: str) -> str:
     """Return the code that starts the node, which stands between others on its line."""
-    arguments = [f"{name}='{word}'" for name, word in node.words.items()]
-    line = f"{function}({', '.join(arguments)})"
+    line = f"{function}({', '.join(node.arguments)})"
     if len(before + line + tail) > WIDTH:
-        lines = "".join(f"{margin}    {argument},\n" for argument in arguments)
+        lines = "".join(f"{margin}    {argument},\n" for argument in node.arguments)
         line = f"{function}(\n{lines}{margin})"
     return line
 
@@ -143,20 +141,16 @@ def _imported(file: Setup, action: str) -> tuple[str, tuple[Edit, ...]] | None:
                 return alias.asname or action, ()
             elif action == (alias.asname or alias.name):
                 return None
-    return action, (_import(file, imports, action),)
-
-
-def _import(file: Setup, imports: list[ast.Import | ast.ImportFrom], action: str) -> Edit:
-    """Return the edit that imports a class of launch_ros, after the other imports."""
     for statement in imports:
         if isinstance(statement, ast.ImportFrom) and statement.module == MODULE:
             code = file.source.text[slice(*range_of(file.source, statement))]
             if code[-1] not in "*)":
-                return added_name(file.source, statement, action)
+                return action, (added_name(file.source, statement, action),)
     new = f"from {MODULE} import {action}"
     if not imports:
-        return insertion(file.source, range_of(file.source, file.tree)[0], f"{new}\n")
+        start = range_of(file.source, file.tree)[0]
+        return action, (insertion(file.source, start, f"{new}\n"),)
     last: ast.stmt = imports[-1]
     for following in file.tree.body:
         last = following if following.lineno == last.end_lineno else last
-    return insertion(file.source, _line_end(file.source, last), f"\n{new}")
+    return action, (insertion(file.source, _line_end(file.source, last), f"\n{new}"),)
