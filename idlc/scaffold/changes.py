@@ -18,7 +18,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.project.edits import Edited, Outcome
-from idlc.project.files import decode, entries, read_bytes
+from idlc.project.files import entries, read_source
 from idlc.project.library import Library
 from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
@@ -83,8 +83,7 @@ class Project:
         """Return a file's text, `None` without one; no byte order mark, which edits keep."""
         if not (self.path / path).is_file():
             return None
-        data = read_bytes(self.path / path, self.shown(path), self._report)
-        source = None if data is None else decode(data, self.shown(path), self._report)
+        source = read_source(self.path / path, self.shown(path), self._report)
         return source.text.removeprefix("\ufeff") if source else None
 
     def names(self, folder: str) -> list[str]:

@@ -200,15 +200,17 @@ def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
     for request, word, interface in planned.asking:
         message = derive.sections(interface)[0]
         prefix = "" if alone else f"{word}_"
+        type_ = Code(page.use(message.name))
         positional = planned.once and alone
+        sample, arguments = samples.request(message, page, prefix, positional=positional)
         yield RequestView(
             title=Code(request.title),
             function=Code(f"{word}_request"),
-            type=Code(page.use(message.name)),
+            type=type_,
             method=Code(request.method.format(word)),
             cancel=Code(request.cancel.format(word)),
-            sample=samples.from_arguments(message, page, prefix),
-            arguments=tuple(samples.arguments(message, page, prefix, positional=positional)),
+            sample=sample,
+            arguments=arguments,
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -220,22 +220,18 @@ class Argument(NamedTuple):
     words: tuple[Code, ...]
 
 
-def from_arguments(message: ir.Message, page: Page, prefix: str) -> Sample:
-    """Return a request whose fields come from the command line."""
-    fields = (field for field in message.fields if _type(field) is not None)
-    values = {field.name: f"options.{_destination(field, prefix)}" for field in fields}
-    return sample(message, page, values)
-
-
-def arguments(
+def request(
     message: ir.Message, page: Page, prefix: str, *, positional: bool
-) -> Iterator[Argument]:
-    """Yield the arguments for a request's fields."""
+) -> tuple[Sample, tuple[Argument, ...]]:
+    """Return a request whose fields come from the command line, and its arguments there."""
+    values, arguments = {}, []
     for field in message.fields:
         type_ = _type(field)
         if type_ is None:
             continue
-        destination = _destination(field, prefix)
+        destination: str = python_names.field(f"{prefix}{field.name}")
+        destination += "_" * (destination in _TAKEN)
+        values[field.name] = f"options.{destination}"
         name, words = "--" + destination.replace("_", "-"), [f"type={type_}"]
         if type_ == "bool":
             words = ["action=argparse.BooleanOptionalAction"]
@@ -249,12 +245,8 @@ def arguments(
         text = _explained(field, field.name.replace("_", " "))
         text = textwrap.shorten(text, HELP_WIDTH, placeholder=" ...").replace("%", "%%")
         words += [f"default={field_value(message, field, page)}", f"help={text!r}"]
-        yield Argument(Code(repr(name)), tuple(map(Code, words)))
-
-
-def _destination(field: ir.Field, prefix: str) -> str:
-    name = python_names.field(f"{prefix}{field.name}")
-    return f"{name}_" if name in _TAKEN else name
+        arguments.append(Argument(Code(repr(name)), tuple(map(Code, words))))
+    return sample(message, page, values), tuple(arguments)
 
 
 def _type(field: ir.Field) -> str | None:
