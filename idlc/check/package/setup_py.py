@@ -134,6 +134,8 @@ class Setup:
         self.calls = [*self.calls_of("setup")]
         self.call = self.calls[0] if len(self.calls) == 1 else None
         self.arguments: dict[str, ast.expr] = {}
+        self._texts: dict[str, str | None] = {}
+        self._lists: dict[str, list[Item]] = {}
         self.whole = self.call is not None and not self.call.args
         for keyword in self.call.keywords if self.call else ():
             if keyword.arg:
@@ -142,8 +144,6 @@ class Setup:
                 items = self.pairs(keyword.value)
                 self.whole &= items is not None
                 self.arguments |= items or {}
-        self._texts: dict[str, str | None] = {}
-        self._lists: dict[str, list[Item]] = {}
 
     def calls_of(self, function: str) -> Iterator[ast.Call]:
         """Yield the calls of a function, by any name that it is imported as."""
