@@ -54,9 +54,8 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
             message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
             place.wrong("package", message, report, "remove `package` from [tool.idlc]")
     settings = scope(config, distro=options.distribution and options.distribution.name)
-    where = msgspec.structs.replace(
-        settings, package=None, include=(*settings.include, *_required_prefixes())
-    )
+    include = (*settings.include, *_required_prefixes())
+    where = msgspec.structs.replace(settings, package=None, include=include)
     package = _package(name, where, report)
     if package is None:
         return None

@@ -128,10 +128,7 @@ class Compiler:
 
 
 def compile_package(
-    package: str,
-    sources: Iterable[tuple[ir.TypeName, Source]],
-    library: Library,
-    report: Report,
+    package: str, sources: Iterable[tuple[ir.TypeName, Source]], library: Library, report: Report
 ) -> Model:
     """Return the linked and checked model of one package; every problem is reported."""
     compiler = Compiler(library)
@@ -183,13 +180,12 @@ def sound_models(
     sound_packages, left_out = [], []
     for (package, _), sound in zip(models, without_errors(models, report), strict=True):
         mine = sound.only(package.names).own
-        sound_packages.append(
-            (sound, [name for interface in mine for name in derived_names(interface)])
-        )
+        names = [name for interface in mine for name in derived_names(interface)]
+        sound_packages.append((sound, names))
         left_out += sorted(package.names - {interface.name for interface in mine})
     if left_out:
-        names = first_few((f"`{name}`" for name in left_out), 5)
-        report.notes.append(f"left out, because of errors: {names}")
+        listed = first_few((f"`{name}`" for name in left_out), 5)
+        report.notes.append(f"left out, because of errors: {listed}")
     return sound_packages
 
 

@@ -37,13 +37,13 @@ def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> Iterator[Diag
         yield _breaks_python(span, "a line break or NUL in a value")
     if isinstance(value, str):
         yield from _text_problems(value, span)
-    elif isinstance(value, float) and not math.isfinite(value):
+    elif not isinstance(value, float):
+        return
+    elif not math.isfinite(value):
         message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
         hint = "use a large finite number, or set the value in code"
         yield codes.NON_FINITE_VALUE.at(span, message, hint=hint)
-    elif (
-        element == ir.Primitive("float32") and isinstance(value, float) and abs(value) > FLOAT32_MAX
-    ):
+    elif element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
         message = f"`{span.text}` is beyond what a float32 holds"
         yield codes.FLOAT32_RANGE.at(span, message, hint="use float64")
 

@@ -120,11 +120,10 @@ class Project:
                 if path == "setup.py":
                     edited[path] = wrap_lines(self.text(path) or "", outcome.text)
                 continue
-            message = f"cannot edit `{self.shown(path)}`: {outcome.why}"
+            place = self.shown(path)
+            message = f"cannot edit `{place}`: {outcome.why}"
             hint = f"add this line by hand {outcome.where}, then run the command again"
-            self._report.add(
-                codes.CANNOT_EDIT.of(self.shown(path), message, hint=hint, detail=outcome.line)
-            )
+            self._report.add(codes.CANNOT_EDIT.of(place, message, hint=hint, detail=outcome.line))
         return None if self._report.had_errors else edited
 
     def write(
@@ -153,14 +152,12 @@ class Project:
             else:
                 what = "edited" if path in edited else "replaced"
                 if what == "replaced" and not self._settings.force:
+                    place, detail = self.shown(path), "\n".join(difference(change.old, content))
+                    message = f"`{place}` exists and is not what would be written"
+                    hint = "keep it and choose another name, or run again with --force, "
+                    hint += "which keeps a copy"
                     self._report.add(
-                        codes.EXISTING_FILE.of(
-                            self.shown(path),
-                            f"`{self.shown(path)}` exists and is not what would be written",
-                            hint="keep it and choose another name, or run again with --force, "
-                            "which keeps a copy",
-                            detail="\n".join(difference(change.old, content)),
-                        )
+                        codes.EXISTING_FILE.of(place, message, hint=hint, detail=detail)
                     )
             done.append(FileOutcome(path, what))
         if self._report.had_errors:
@@ -273,13 +270,10 @@ def _hint(name: ir.TypeName, own: str, library: Library) -> str | None:
             options = " or ".join(role.option for role in ROLES if role.kind == kind)
             return f"it is {'an' if what == 'action' else 'a'} {what}: use {options}"
     if name.package == own:
-        elsewhere = [
-            f"`{package}/{name.name}`"
-            for package in library.packages()
-            if ir.TypeName(package, name.kind, name.name) in library.interfaces(package)
-        ]
-        if elsewhere:
-            return f"did you mean {' or '.join(elsewhere)}?"
+        packages = library.packages()
+        others = [p for p in packages if name._replace(package=p) in library.interfaces(p)]
+        if others:
+            return f"did you mean {' or '.join(f'`{package}/{name.name}`' for package in others)}?"
     interfaces = library.interfaces(name.package)
     names_of_kind = [str(other) for other in interfaces if other.kind == name.kind]
     hint = did_you_mean(str(name), names_of_kind)

@@ -17,16 +17,8 @@ from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.project.prefixes import distribution, python_folders
-from idlc.scaffold import spec
-from idlc.scaffold.changes import (
-    Project,
-    Result,
-    Settings,
-    find_package,
-    rendering,
-    templates,
-    type_name,
-)
+from idlc.scaffold import changes, spec
+from idlc.scaffold.changes import Project, Result, Settings
 from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
@@ -114,16 +106,16 @@ def node_entry(
 
 def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
-    project = find_package(settings, report)
+    project = changes.find_package(settings, report)
     if project is None:
         return None
     own, name = project.package, requested.name
-    used = templates(settings, report)
+    used = changes.templates(settings, report)
     planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
         return None
     entry = Entry({}, {})
-    with rendering(name, report):
+    with changes.rendering(name, report):
         files = {
             f"{own}/{name}.py": render(planned, used),
             f"test/test_{name}.py": render_test(planned, used),
@@ -160,7 +152,7 @@ def _planned(requested: spec.Node, project: Project, report: Report) -> Plan | N
     interfaces: list[ir.Interface | None] = []
     messages: dict[ir.TypeName, ir.Message] = {}
     for endpoint in requested.endpoints:
-        name = type_name(endpoint, requested.package, library, report)
+        name = changes.type_name(endpoint, requested.package, library, report)
         source = name and library.source(name)
         if not name or source is None:
             interfaces.append(None)

@@ -143,17 +143,8 @@ def rendered_for(name: str, template: str, templates: Templates) -> str:
     return rendered(template, Package(name, "", "", "", LICENSES[0]), templates)
 
 
-#: Where the choices of a package are: in elements of package.xml, and arguments of setup().
-_TAGS = {
-    **{field: field for field in ("description", "maintainer", "license", "build_type")},
-    "email": "maintainer",
-}
-_ARGUMENTS = {
-    **{field: field for field in ("description", "maintainer", "license")},
-    "email": "maintainer_email",
-}
-
-
+#: The choices that package.xml and setup.py repeat.
+_CHOICES = ("description", "maintainer", "license", "email")
 #: A field of a package, the range that sets it, the values there, and the code that would do.
 _Stated: TypeAlias = tuple[str, Span, list[str], str]
 
@@ -222,7 +213,8 @@ def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnosti
 def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) -> Iterator[_Stated]:
     """Yield what a package.xml says of each choice, and the element to write in its place."""
     declared = statements(source)
-    for field, tag in _TAGS.items():
+    for field in (*_CHOICES, "build_type"):
+        tag = "maintainer" if field == "email" else field
         lines = [statement for statement in declared if statement.tag == tag]
         if not lines:
             continue
@@ -241,7 +233,8 @@ def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterato
     from idlc.check.package.setup_py import Setup, span_of
 
     setup = Setup(source)
-    for field, argument in _ARGUMENTS.items():
+    for field in _CHOICES:
+        argument = "maintainer_email" if field == "email" else field
         node = setup.arguments.get(argument)
         text = setup.text(node)
         if node is not None and text is not None:

@@ -210,10 +210,7 @@ ROLES: tuple[Role, ...] = (
                 "ServerGoalHandle",
             )
         },
-        test_imports={
-            "action_msgs.msg": ("GoalStatus",),
-            "rclpy.action.client": ("ActionClient",),
-        },
+        test_imports={"action_msgs.msg": ("GoalStatus",), "rclpy.action.client": ("ActionClient",)},
         helpers=frozenset({"pause", "retire"}),
     ),
     Role(

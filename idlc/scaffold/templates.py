@@ -77,9 +77,8 @@ class Templates:
         for name, source in self._sources.items():
             if name not in names() and not name.rpartition("/")[2].startswith("_"):
                 message = f"there is no template `{name}` to replace"
-                hint = did_you_mean(name, names()) or (
-                    "begin its name with `_` if only other templates include it"
-                )
+                hint = "begin its name with `_` if only other templates include it"
+                hint = did_you_mean(name, names()) or hint
                 report.add(BROKEN_TEMPLATE.of(source.path, message, hint=hint))
                 continue
             try:

@@ -105,8 +105,7 @@ def home_of(folder: Path, package: str, root: Root) -> Path:
     for home in homes:
         if (home / lock.FILE).is_file():
             return home
-    files = (_optional(folder / name, root) for name in _SETUP_FILES)
-    setup, cfg, pyproject = files
+    setup, cfg, pyproject = (_optional(folder / name, root) for name in _SETUP_FILES)
     if setup is not None:
         from idlc.check.package.python_packages import layout
         from idlc.check.package.setup_py import Setup

@@ -9,14 +9,8 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import NamedTuple
 
+from idlc.check.package import setup_edits
 from idlc.check.package.python_packages import Layout, layout
-from idlc.check.package.setup_edits import (
-    append_elements,
-    argument,
-    imported,
-    quote_of,
-    unusable_entry,
-)
 from idlc.check.package.setup_py import DataFiles, Setup, defines, range_of, span_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
@@ -71,7 +65,7 @@ def check_setup(
     kinds = sorted({key.split("/")[0] for key in keys})
     mine = _Package(read, package, kinds, folders, runtime)
     report.extend(_missing_interfaces(mine, keys))
-    report.extend(unusable_entry(read, package))
+    report.extend(setup_edits.unusable_entry(read, package))
     view = layout(read, *(others or (None, None)), folders)
     if view and (others or "packages" in read.arguments):
         report.extend(_missing_packages(mine, view))
@@ -140,14 +134,14 @@ def _data_files_problem(
     code: codes.Code, message: str, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
 ) -> Diagnostic:
     """Return a problem with the hint and the edits that add entries to `data_files`."""
-    glob, imports = imported(setup, "glob", "glob") if uses_glob else ("glob", ())
+    glob, imports = setup_edits.imported(setup, "glob", "glob") if uses_glob else ("glob", ())
     new = [line.replace("glob(", f"{glob}(") for line in lines]
     listed = setup.list_of("data_files")
     edits: tuple[Edit, ...] = ()
     if listed is not None:
-        edits = append_elements(setup.source, listed, new)
+        edits = setup_edits.append_elements(setup.source, listed, new)
     elif "data_files" not in setup.arguments and uses_glob:  # one problem adds the argument
-        edits = argument(setup, f"data_files=[{', '.join(new)}]")
+        edits = setup_edits.argument(setup, f"data_files=[{', '.join(new)}]")
     text = enumerated([f"`{line}`" for line in new])
     also = ", with `from glob import glob`" if imports else ""
     return code.at(
@@ -196,10 +190,8 @@ def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
         name = setup.text(item.node) if item.is_element else None
         if not name or name.replace("/", ".") in existing:
             continue
-        is_made = name in generated or (
-            support not in existing and f"{name}.".startswith(f"{support}.")
-        )
-        if not (package.kinds and is_made):  # or the build creates it
+        is_support = support not in existing and f"{name}.".startswith(f"{support}.")
+        if not (package.kinds and (is_support or name in generated)):  # or the build creates it
             message = f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`"
             yield _packages_problem(span_of(setup.source, item.node), message, package, view)
 
@@ -219,28 +211,25 @@ def _packages_problem(place: Span, message: str, package: _Package, view: Layout
             also = f", and `where = {root}` in [options.packages.find]" if root else ""
             hint = f"write `packages = find:`{also}"
         return code.at(place, message, hint=hint)
-    find, imports = imported(setup, "setuptools", "find_packages")
+    find, imports = setup_edits.imported(setup, "setuptools", "find_packages")
     call = f"{find}({where}exclude=['test'])"
     hint = f"write `packages={call}`"
     listed = setup.list_of("packages")
     target = setup.value(setup.arguments.get("packages"))
-    items = setup.items(setup.arguments.get("packages"))
-    names = [setup.text(item.node) for item in items if item.is_element]
+    names = setup.texts(setup.arguments.get("packages"))
+    is_own = all(name and name.partition(".")[0] == package.name for name in names)
     existing = view.packages(package.folders)
     tops = {name for name, has_init in existing.items() if has_init and "." not in name}
-    is_own = len(names) == len(items) and all(
-        name and name.partition(".")[0] == package.name for name in names
-    )
     edits: tuple[Edit, ...] = ()
     if "packages" not in setup.arguments:
-        edits = argument(setup, f"packages={call}")
+        edits = setup_edits.argument(setup, f"packages={call}")
     elif view.roots.keys() <= {""} and target is not None:
         if (is_own or listed is None) and tops <= {package.name, "test"}:
-            text = call.replace("'", quote_of(setup.source, target))
+            text = call.replace("'", setup_edits.quote_of(setup.source, target))
             edits = (Edit(Span(setup.source, *range_of(setup.source, target)), text),)
         elif listed is not None:
             own = f"*{find}({where}include=['{package.name}', '{package.name}.*'])"
-            edits = append_elements(setup.source, listed, [own])
+            edits = setup_edits.append_elements(setup.source, listed, [own])
             hint = f"add `{own}` to `packages`"
     hint += ", with `from setuptools import find_packages`" if imports else ""
     hint += "; --fix does" if edits else ""
@@ -286,10 +275,8 @@ def entry_points(facts: Facts, _: Model) -> Iterator[Diagnostic]:
             message = f"there is no Python package `{top}` here"
             hint = f"it is `{facts.name}` by the package.xml"
         elif source is None:
-            message, hint = (
-                f"there is no module `{module}`",
-                "name the file that holds the function",
-            )
+            message = f"there is no module `{module}`"
+            hint = "name the file that holds the function"
         elif not defines(source, function.partition(".")[0]):
             message = f"`{source.path}` has no `{function}`"
             hint = f"define it: `def {function}() -> None:`"

@@ -31,10 +31,8 @@ def _lines(text: str) -> tuple[list[int], list[bytes]]:
     """Return the offsets of Python's lines, and these lines as bytes, which ast counts."""
     starts = [0, *(line_end.end() for line_end in re.finditer(r"\r\n?|\n", text))]
     ends = [*starts[1:], len(text)]
-    lines = [
-        text[start:end].encode("utf-8", "replace") for start, end in zip(starts, ends, strict=True)
-    ]
-    return starts, lines
+    ranges = zip(starts, ends, strict=True)
+    return starts, [text[start:end].encode("utf-8", "replace") for start, end in ranges]
 
 
 def range_of(source: Source, node: ast.AST) -> tuple[int, int]:
@@ -304,6 +302,10 @@ class Setup:
             if len(items) > _MOST:
                 break
         return items if len(items) <= _MOST else [Item(node, False)]
+
+    def texts(self, node: ast.expr | None) -> list[str | None]:
+        """Return the texts in a list, `None` for each part that is computed."""
+        return [self.text(item.node) if item.is_element else None for item in self.items(node)]
 
     def pairs(self, node: ast.expr | None) -> dict[str, ast.expr] | None:
         """Return the values of a dictionary by key, `None` if any of it is computed."""

@@ -7,16 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from idlc.check.package.setup_edits import (
-    WIDTH,
-    added_name,
-    append_element,
-    indent_of,
-    insertion,
-    is_spread,
-    margin_of,
-    quote_of,
-)
+from idlc.check.package import setup_edits
 from idlc.check.package.setup_py import Setup, parse, range_of
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source
@@ -62,10 +53,8 @@ def add_node(text: str, node: Started) -> Outcome:
     file = Setup(Source("launch.py", text))
     for call in (*file.calls_of("Node"), *file.calls_of("LifecycleNode")):
         arguments = {passed.arg: file.text(passed.value) for passed in call.keywords}
-        if arguments.get("executable") == node.executable and arguments.get("package") in (
-            node.package,
-            None,
-        ):
+        is_same = arguments.get("executable") == node.executable
+        if is_same and arguments.get("package") in (node.package, None):
             return Edited(text)
     imported = _imported(file, node.action)
     if imported is None:
@@ -74,10 +63,10 @@ def add_node(text: str, node: Started) -> Outcome:
     edits: tuple[Edit, ...] = ()
     match [*file.calls_of("LaunchDescription")]:
         case [ast.Call(args=[ast.List() as listed], keywords=[])]:
-            margin = margin_of(file.source, listed)
-            before = margin if is_spread(file.source, listed) else "    "
+            margin = setup_edits.margin_of(file.source, listed)
+            before = margin if setup_edits.is_spread(file.source, listed) else "    "
             new = _call(called, node, margin, before, ",")
-            edits = append_element(file.source, listed, new)
+            edits = setup_edits.append_element(file.source, listed, new)
         case [ast.Call(args=[], keywords=[]) as description]:
             edits = tuple(_additions(file, description, node, called))
     if not edits:
@@ -94,12 +83,14 @@ def _additions(file: Setup, description: ast.Call, node: Started, called: str) -
             ) if (last.end_lineno or 0) < end.lineno and any(
                 _names(statement, description, returned) for statement in function.body
             ):
-                margin = indent_of(file.source, range_of(file.source, end)[0])
+                margin = setup_edits.indent_of(file.source, range_of(file.source, end)[0])
                 nodes = next(file.calls_of("Node"), None)
-                quote = quote_of(file.source, nodes) if nodes else "'"
+                quote = setup_edits.quote_of(file.source, nodes) if nodes else "'"
                 before = f"{margin}{returned}.add_action("
                 new = _call(called, node, margin, before, ")").replace("'", quote)
-                yield insertion(file.source, _line_end(file.source, last), f"\n{before}{new})")
+                yield setup_edits.insertion(
+                    file.source, _line_end(file.source, last), f"\n{before}{new})"
+                )
 
 
 def _names(statement: ast.stmt, description: ast.Call, name: str) -> bool:
@@ -120,7 +111,7 @@ def _line_end(source: Source, node: ast.AST) -> int:
 def _call(function: str, node: Started, margin: str, before: str, tail: str) -> str:
     """Return the code that starts the node, which stands between others on its line."""
     line = f"{function}({', '.join(node.arguments)})"
-    if len(before + line + tail) > WIDTH:
+    if len(before + line + tail) > setup_edits.WIDTH:
         lines = "".join(f"{margin}    {argument},\n" for argument in node.arguments)
         line = f"{function}(\n{lines}{margin})"
     return line
@@ -145,12 +136,12 @@ def _imported(file: Setup, action: str) -> tuple[str, tuple[Edit, ...]] | None:
         if isinstance(statement, ast.ImportFrom) and statement.module == MODULE:
             code = file.source.text[slice(*range_of(file.source, statement))]
             if code[-1] not in "*)":
-                return action, (added_name(file.source, statement, action),)
+                return action, (setup_edits.added_name(file.source, statement, action),)
     new = f"from {MODULE} import {action}"
     if not imports:
         start = range_of(file.source, file.tree)[0]
-        return action, (insertion(file.source, start, f"{new}\n"),)
+        return action, (setup_edits.insertion(file.source, start, f"{new}\n"),)
     last: ast.stmt = imports[-1]
     for following in file.tree.body:
         last = following if following.lineno == last.end_lineno else last
-    return action, (insertion(file.source, _line_end(file.source, last), f"\n{new}"),)
+    return action, (setup_edits.insertion(file.source, _line_end(file.source, last), f"\n{new}"),)
