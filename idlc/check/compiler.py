@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import groupby
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -105,10 +106,10 @@ class Compiler:
         self, interfaces: Mapping[ir.TypeName, ir.Interface], report: Report
     ) -> dict[str, Model]:
         """Return the models of interfaces by package; every problem is reported."""
-        packages: dict[str, list[ir.Interface]] = {}
-        for name in sorted(interfaces):
-            packages.setdefault(name.package, []).append(interfaces[name])
-        return {package: self.model(package, own, report) for package, own in packages.items()}
+        return {
+            package: self.model(package, [interfaces[name] for name in names], report)
+            for package, names in groupby(sorted(interfaces), lambda name: name.package)
+        }
 
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
         """Return interfaces and all that they refer to, without missing ones."""

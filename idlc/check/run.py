@@ -177,10 +177,8 @@ def check_all(
     models = {
         distro: checker.check(packages, reports[distro]) for distro, checker in checkers.items()
     }
-    own = (
-        interface.source for some in models.values() for model in some for interface in model.own
-    )
-    sources = {source.path: source for source in own if source}.values()
+    own = (interface for some in models.values() for model in some for interface in model.own)
+    sources = {part.source.path: part.source for part in own if part.source}.values()
     together = merge(reports) if len(reports) > 1 else next(iter(reports.values()))
     selected = [problem for problem in together if selection.wants(problem)]
     problems = [

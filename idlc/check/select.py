@@ -136,21 +136,21 @@ def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
 def _remarks(source: Source) -> Iterator[Remark]:
     if "idlc:" not in source.text:
         return
-    file = parse(source)
-    for number, section in enumerate(file.sections):
+    for number, section in enumerate(parse(source).sections):
         in_head = number == 0
         waiting: list[Remark] = []
         for line in section.lines:
             in_head = in_head and bool(line.comment) and not line.code
             line_number, _ = source.position(line.start)
             in_line = list(_in_line(source, line, line_number, in_head))
-            if not line.definition and not in_head:
-                waiting += in_line
-            else:
-                yield from in_line
             if line.definition:
+                yield from in_line
                 yield from (msgspec.structs.replace(remark, line=line_number) for remark in waiting)
                 waiting = []
+            elif in_head:
+                yield from in_line
+            else:
+                waiting += in_line
         yield from waiting
 
 

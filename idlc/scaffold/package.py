@@ -177,12 +177,9 @@ def package(
     elif "starters" in chosen:
         report.extend(_absent(project, starters or {}))
     # files that later commands add to stay as they are
-    growing = (*GROWING, f"launch/{requested.name}_launch.py")
-    new = {
-        path: text
-        for path, text in files.items()
-        if path not in growing or settings.force or not project.has(path)
-    }
+    growing = () if settings.force else (*GROWING, f"launch/{requested.name}_launch.py")
+    kept = [path for path in growing if project.has(path)]
+    new = {path: text for path, text in files.items() if path not in kept}
     chosen = {*chosen, "build_type"}
     for path, stated in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
         text = project.text(path) if path in files and path not in new else None

@@ -9,10 +9,9 @@ from pathlib import Path
 from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.project import lock
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import load_lock
+from idlc.project.lock import FILE, load_lock
 from idlc.project.package_xml import Facts, GeneratedOutput, statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
@@ -40,15 +39,14 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         return None
     folder = path.parent
     files = list(_files(folder))
-    locks = {
-        file: record
-        for file in files
-        if file.name == lock.FILE and (record := load_lock(file.parent, "", Report()))
-    }
+    records = {file: load_lock(file.parent, "", Report()) for file in files if file.name == FILE}
+    locks = {file: record for file, record in records.items() if record}
     interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
     checked = {entry.file.path.resolve() for entry in package.files}
-    generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
+    generated = {at.parent / path for at, record in locks.items() for path in record.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
+    commands = calls(cmake) if cmake else ()
+    generating = [command for command in commands if command.name == GENERATE]
     modules = {}  # nodes may be in the folder of generated classes
     for file in files:
         parts = file.relative_to(folder).parts
@@ -65,11 +63,8 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         setup_cfg=_optional(folder / "setup.cfg", root),
         pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
-        generates=any(
-            # other interfaces are for tests of the package's own
-            command.name == GENERATE and "SKIP_INSTALL" not in command.words
-            for command in (calls(cmake) if cmake else ())
-        ),
+        # other interfaces are for tests of the package's own
+        generates=any("SKIP_INSTALL" not in command.words for command in generating),
         native=any(file.suffix in _NATIVE for file in files),
         whole=bool(checked) and checked.issuperset(file.resolve() for file in interfaces),
         marker=(folder / "resource" / package.package).is_file(),
@@ -103,7 +98,7 @@ def home_of(folder: Path, package: str, root: Root) -> Path:
     """Return the folder from which setup.py takes a package, or an earlier `idlc gen`'s."""
     homes = (folder / package, folder / "src" / package)
     for home in homes:
-        if (home / lock.FILE).is_file():
+        if (home / FILE).is_file():
             return home
     setup, cfg, pyproject = (_optional(folder / name, root) for name in _SETUP_FILES)
     if setup is not None:

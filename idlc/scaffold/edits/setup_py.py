@@ -235,7 +235,7 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
 
     The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
     """
-    project = _table(files.get(PYPROJECT, ""), "project")
+    project = _project(files.get(PYPROJECT, ""))
     if isinstance(project, Refused):
         return PYPROJECT, project._replace(line=_line(script))
     dynamic = project.get("dynamic", ())
@@ -251,9 +251,9 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
     return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
 
 
-def _table(text: str, name: str) -> dict[str, Any] | Refused:
+def _project(text: str) -> dict[str, Any] | Refused:
     try:
-        table = toml(text).get(name, {})
+        table = toml(text).get("project", {})
     except ValueError:
         return Refused("this is not valid TOML", "", f"to [{TABLE}]")
     return table if isinstance(table, dict) else {}
@@ -279,7 +279,7 @@ def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome
     at, header = (section[1], []) if section else (len(lines), ["", f"[{TABLE}]"])
     edited = _inserted(lines, at, [*header, _line(script)])
     expected = {**project, "scripts": {**scripts, script.name: script.target}}
-    return edited if _table(edited.text, "project") == expected else refused
+    return edited if _project(edited.text) == expected else refused
 
 
 WHERE = "to `data_files` in the call of setup()"
