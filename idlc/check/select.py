@@ -51,10 +51,8 @@ class Selection(msgspec.Struct, frozen=True):
 
     def has(self, code: codes.Code) -> bool:
         """Return whether a code is switched on."""
-        if self.select is None:
-            chosen = code.default
-        else:
-            chosen = any(_means(word, code) for word in self.select)
+        words = self.select
+        chosen = code.default if words is None else any(_means(word, code) for word in words)
         return chosen and not any(_means(word, code) for word in self.ignore)
 
     def wants(self, diagnostic: Diagnostic) -> bool:

@@ -127,8 +127,8 @@ def render(planned: Plan, templates: Templates) -> str:
     parts = [_part(placed, page, placed.endpoint.role.samples) for placed in planned.endpoints]
     page.clock = None  # there is none where the command line is read
     requests = tuple(_requests(planned, page))
-    class_name = spec.class_name(node.name)
-    class_name += "Node" if class_name in page.names or class_name in _TAKEN else ""
+    class_name = "".join(part.capitalize() for part in node.name.split("_"))
+    class_name += "Node" if class_name in page.taken else ""
     does = (
         Code(f"{endpoint.role.summary} {part.title}")
         for endpoint, part in zip(node.endpoints, parts, strict=True)

@@ -30,7 +30,7 @@ class Page:
     """The interfaces that one module of Python imports, and their names in it.
 
     `clock` is the expression of the current time, where there is a clock. `taken` names are used
-    otherwise. Comments are copied from interfaces of the package `own` only.
+    otherwise, or imported. Comments are copied from interfaces of the package `own` only.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Page:
         self.clock = clock
         self.own = own
         self._names: dict[tuple[str, str], str] = {}
-        self._taken = set(taken)
+        self.taken = set(taken)
 
     def use(self, name: ir.TypeName) -> str:
         """Return the name of a class in this module, and import it."""
@@ -54,15 +54,10 @@ class Page:
         base = python_names.class_(name._replace(name=outer) if is_part else name)
         key = (f"{name.package}.{name.kind}", base)
         if key not in self._names:
-            called = base if base not in self._taken else f"{name.package}_{name.kind}_{base}"
+            called = base if base not in self.taken else f"{name.package}_{name.kind}_{base}"
             self._names[key] = called
-            self._taken.add(called)
+            self.taken.add(called)
         return f"{self._names[key]}.{part}" if is_part else self._names[key]
-
-    @property
-    def names(self) -> set[str]:
-        """The names that are imported."""
-        return set(self._names.values())
 
     def imports(self) -> dict[str, set[str]]:
         """Return the imported names by module."""
