@@ -248,10 +248,10 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
             imports["typing"].add("Any")
     else:
         imports["rclpy.node"].add("Node")
-    return _grouped(imports, plain)
+    return _import_groups(imports, plain)
 
 
-def _grouped(
+def _import_groups(
     names_of: Mapping[str, set[str]], plain: Iterable[str]
 ) -> tuple[tuple[Import, ...], ...]:
     """Return imports of names, and of `plain` modules, in the order that ament_flake8 wants."""
@@ -295,7 +295,7 @@ def render_test(planned: Plan, templates: Templates) -> str:
     view = TestView(
         node=Code(node.name),
         module=Code(f"{node.package}.{node.name}"),
-        imports=_grouped(imports, ("pytest", "signal")),
+        imports=_import_groups(imports, ("pytest", "signal")),
         constants=_constants(node),
         offered=tuple(map(Code, sorted({repr(_resolved(each, node.name)) for each in served}))),
         parameters=tuple(map(_parameter, node.parameters)),

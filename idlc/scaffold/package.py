@@ -146,7 +146,7 @@ def rendered_for(name: str, template: str, templates: Templates) -> str:
 #: The choices that package.xml and setup.py repeat.
 _CHOICES = ("description", "maintainer", "license", "email")
 #: A field of a package, the range that sets it, the values there, and the code that would do.
-_Stated: TypeAlias = tuple[str, Span, list[str], str]
+_Choice: TypeAlias = tuple[str, Span, list[str], str]
 
 
 def package(
@@ -181,10 +181,10 @@ def package(
     kept = [path for path in growing if project.has(path)]
     new = {path: text for path, text in files.items() if path not in kept}
     chosen = {*chosen, "build_type"}
-    for path, stated in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
+    for path, choices in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
         text = project.text(path) if path in files and path not in new else None
         source = Source(project.shown(path), text or "")
-        for field, span, values, line in stated(source, requested, chosen) if text else ():
+        for field, span, values, line in choices(source, requested, chosen) if text else ():
             value = getattr(requested, field)
             if field in chosen and value not in values:
                 shown = f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`"
@@ -207,7 +207,7 @@ def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnosti
             )
 
 
-def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) -> Iterator[_Stated]:
+def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) -> Iterator[_Choice]:
     """Yield what a package.xml says of each choice, and the element to write in its place."""
     declared = statements(source)
     for field in (*_CHOICES, "build_type"):
@@ -225,7 +225,7 @@ def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) ->
         yield field, lines[0].span, [" ".join(text.split()) for text in texts], new
 
 
-def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Stated]:
+def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Choice]:
     """Yield what a setup.py says of each choice, and the argument to write in its place."""
     from idlc.check.package.setup_py import Setup, span_of
 

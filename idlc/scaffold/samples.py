@@ -94,8 +94,8 @@ def sample(
     fields = []
     for field in message.fields:
         name = Code(python_names.field(field.name))
-        explained = _explained(field) if message.name.package == page.own else ""
-        comment = tuple(map(Text, textwrap.wrap(explained, COMMENT)))
+        meaning = _meaning(field) if message.name.package == page.own else ""
+        comment = tuple(map(Text, textwrap.wrap(meaning, COMMENT)))
         nested = _nested(field, page)
         if field.name in values:
             fields.append(FieldSample(name, (), Code(values[field.name])))
@@ -120,7 +120,7 @@ def logged(message: ir.Message, variable: str) -> Code:
     return Code(f"{{{variable}=}}")
 
 
-def _explained(field: ir.Field, fallback: str = "") -> str:
+def _meaning(field: ir.Field, fallback: str = "") -> str:
     """Return the comment on a field, or other words, and its unit."""
     text = " ".join(filter(None, map(clean, field.comment))) or fallback
     return " ".join(filter(None, (text, f"[{clean(field.unit)}]" if field.unit else "")))
@@ -237,7 +237,7 @@ def request(
         elif positional:
             name = destination
             words.append("nargs='?'")
-        text = _explained(field, field.name.replace("_", " "))
+        text = _meaning(field, field.name.replace("_", " "))
         text = textwrap.shorten(text, HELP_WIDTH, placeholder=" ...").replace("%", "%%")
         words += [f"default={field_value(message, field, page)}", f"help={text!r}"]
         arguments.append(Argument(Code(repr(name)), tuple(map(Code, words))))
