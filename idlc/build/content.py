@@ -14,14 +14,13 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared
-from idlc.project import settings
 from idlc.project.files import is_folder, read_bytes
 from idlc.project.find import list_files, no_interfaces
-from idlc.project.inputs import Inputs, packages
+from idlc.project.inputs import packages
 from idlc.project.lock import load_lock
 from idlc.project.prefixes import INDEX, Distribution
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import Scope, TableLocation, load_settings, scope
+from idlc.project.settings import SETTINGS_FILE, TableLocation, load_settings, scope
 
 
 class Options(NamedTuple):
@@ -32,12 +31,8 @@ class Options(NamedTuple):
 
 
 class Content(NamedTuple):
-    """The folder with the classes, and the files of the prefix by their paths in it.
+    """The files of the prefix by their paths in it; `libraries` are those among them."""
 
-    `libraries` are those among them.
-    """
-
-    classes: Path
     prefix: Mapping[str, bytes]
     libraries: Libraries
 
@@ -59,13 +54,28 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
             message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
             place.wrong("package", message, report, "remove `package` from [tool.idlc]")
     settings = scope(config, distro=options.distribution and options.distribution.name)
-    where = msgspec.structs.replace(
-        settings, package=None, include=(*settings.include, *_required_prefixes())
-    )
-    package = _package(name, where, report)
-    if package is None:
+    include = (*settings.include, *_required_prefixes())
+    where = msgspec.structs.replace(settings, package=None, include=include)
+    files = list_files((".",), root, report, where.exclude)
+    if files.empty:
+        report.add(no_interfaces(".", root, where.exclude))
+    inputs = () if report.had_errors else packages(files.files, where, report)
+    if inputs and [package.package for package in inputs] != [name]:
+        others = ", ".join(f"`{package.package}`" for package in inputs)
+        message = f"the wheel is of `{name}`, and the interfaces in this folder are of {others}"
+        hint = "build each in its own folder; `exclude` in [tool.idlc] leaves files out"
+        report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
+    if report.had_errors:
         return None
-    _refuse_code(name, root, report)
+    lock = load_lock(Path(name), name, report)
+    # where classes are committed, people describe the package in the first of these
+    kept = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
+    own = sorted({*Path(name).rglob("*.py")} - kept)
+    if own:  # the wheel would not have them
+        listed = first_few((f"`{root.shown(path)}`" for path in own), 3)
+        message = f"idlc.backend builds interfaces alone, and here is {listed}"
+        hint = 'use `build-backend = "setuptools.build_meta"` with the setup.py of a package'
+        report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
     generated = Report()
     runtime, vendoring = config.runtime, config.vendoring
     request = GenOptions((".",), where, str(classes), runtime=runtime, vendoring=vendoring)
@@ -76,25 +86,12 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
     if report.had_errors or manifest is None:
         return None
-    ((_, model),) = models_of((package,), where, Report())
+    ((_, model),) = models_of(inputs, where, Report())
     if options.libraries:
         libraries = libraries_of(model, options.distribution)
     else:
         libraries = Libraries({}, "the build was told `libraries=no`", build_tag(model))
-    return Content(classes, shared(model, manifest, libraries, report), libraries)
-
-
-def _refuse_code(name: str, root: Root, report: Report) -> None:
-    """Report Python modules beside committed classes: the wheel would not have them."""
-    lock = load_lock(Path(name), name, report)
-    # where classes are committed, people describe the package in the first of these
-    generated = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
-    own = sorted({*Path(name).rglob("*.py")} - generated)
-    if own:
-        files = first_few((f"`{root.shown(path)}`" for path in own), 3)
-        message = f"idlc.backend builds interfaces alone, and here is {files}"
-        hint = 'use `build-backend = "setuptools.build_meta"` with the setup.py of a package'
-        report.add(codes.BAD_CONFIG.of(settings.SETTINGS_FILE, message, hint=hint))
+    return Content(shared(model, manifest, libraries, report), libraries)
 
 
 def _required_prefixes() -> list[str]:
@@ -107,17 +104,3 @@ def _required_prefixes() -> list[str]:
     prefixes = [place.parents[2] for place in places if len(place.parents) > 2]
     installed = [path for path in prefixes if is_folder(path / INDEX)]
     return [f"{path}/share" for path in installed if path != Path(sys.prefix)]
-
-
-def _package(name: str, where: Scope, report: Report) -> Inputs | None:
-    """Return the files of the package in the working folder; report IDL606 or IDL608 for none."""
-    files = list_files((".",), where.root, report, where.exclude)
-    if files.empty:
-        report.add(no_interfaces(".", where.root, where.exclude))
-    inputs = () if report.had_errors else packages(files.files, where, report)
-    if inputs and [package.package for package in inputs] != [name]:
-        others = ", ".join(f"`{package.package}`" for package in inputs)
-        message = f"the wheel is of `{name}`, and the interfaces in this folder are of {others}"
-        hint = "build each in its own folder; `exclude` in [tool.idlc] leaves files out"
-        report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
-    return None if report.had_errors else inputs[0]

@@ -30,7 +30,7 @@ from idlc.version import RUNTIME
 if TYPE_CHECKING:
     from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
 
-    from idlc.build.content import Content, Options
+    from idlc.build.content import Options
 
 #: Outputs of a workspace or an earlier build in the folder.
 _NO_SOURCES = ["/build", "/dist", "/install", "/log"]
@@ -110,6 +110,8 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 
 def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
     """Compile the package in the working folder into a wheel."""
+    from hatchling.builders.wheel import WheelBuilder
+
     from idlc.build.content import compile_package
 
     declared, options = _declared(report), _options(settings, report)
@@ -117,10 +119,40 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
         return None
     name, project = declared
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
-        content = compile_package(name, Path(folder) / "classes" / name, options, report)
+        classes, prefix = Path(folder) / "classes" / name, Path(folder) / "prefix"
+        content = compile_package(name, classes, options, report)
         if content is None:
             return None
-        return _packed(name, project, content, Path(folder) / "prefix", directory, report)
+        native, tag = content.libraries.files, content.libraries.build_tag
+
+        class PackageWheel(WheelBuilder):
+            def get_default_build_data(self) -> dict[str, Any]:
+                platform = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
+                return {**super().get_default_build_data(), "tag": platform}
+
+        for path, data in content.prefix.items():
+            (prefix / path).parent.mkdir(parents=True, exist_ok=True)
+            (prefix / path).write_bytes(data)
+        target = _target(
+            "wheel",
+            **{
+                "bypass-selection": True,
+                "exclude": [f"/{name}", f"/src/{name}"],  # committed classes: these are new ones
+                "force-include": {str(classes): name},
+                "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
+            },
+        )
+        builder = PackageWheel(str(Path.cwd()), config={"project": project, **target})
+        # hatchling knows no build tags, and its file must not replace a wheel without one
+        Path(directory).mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".idlc-", dir=directory) as beside:
+            built = _written(builder, beside, report)
+            if built is None:
+                return None
+            stem, python, rest = built.partition("-py3-")
+            archive = f"{stem}-{tag}{python}{rest}" if tag else built
+            Path(beside, built).replace(Path(directory, archive))
+    return archive
 
 
 def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
@@ -161,49 +193,6 @@ def _options(settings: Mapping[str, Any], report: Report) -> Options:
     distro = settings.get("distro")
     distribution = Distribution(distro, f"distro={distro}") if distro else None
     return Options(distribution, settings.get("libraries") != "no")
-
-
-def _packed(
-    name: str,
-    project: dict[str, Any],
-    content: Content,
-    prefix: Path,
-    directory: str,
-    report: Report,
-) -> str | None:
-    """Write the wheel of a compiled package."""
-    from hatchling.builders.wheel import WheelBuilder
-
-    class PackageWheel(WheelBuilder):
-        def get_default_build_data(self) -> dict[str, Any]:
-            native = content.libraries.files
-            tag = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
-            return {**super().get_default_build_data(), "tag": tag}
-
-    for path, data in content.prefix.items():
-        (prefix / path).parent.mkdir(parents=True, exist_ok=True)
-        (prefix / path).write_bytes(data)
-    target = _target(
-        "wheel",
-        **{
-            "bypass-selection": True,
-            "exclude": [f"/{name}", f"/src/{name}"],  # committed classes: these are new ones
-            "force-include": {str(content.classes): name},
-            "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
-        },
-    )
-    builder = PackageWheel(str(Path.cwd()), config={"project": project, **target})
-    # hatchling knows no build tags, and its file must not replace a wheel without one
-    Path(directory).mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".idlc-", dir=directory) as beside:
-        built = _written(builder, beside, report)
-        if built is None:
-            return None
-        stem, python, rest = built.partition("-py3-")
-        tag = content.libraries.build_tag
-        name = f"{stem}-{tag}{python}{rest}" if tag else built
-        Path(beside, built).replace(Path(directory, name))
-    return name
 
 
 def _target(name: str, **settings: Any) -> dict[str, Any]:

@@ -60,7 +60,11 @@ def distribution_class(
         self.sources = list(self.data_files or ())
         listed, added = _merged(self.sources, files, index if files else set())
         if _WHEELS & set(self.commands):
-            added |= _launchers(package, self.entry_points)
+            # where `ros2 run` and launch files look for the commands of a package
+            scripts = (self.entry_points or {}).get("console_scripts", ())
+            lines = scripts.splitlines() if isinstance(scripts, str) else scripts
+            for name in (match[1] for match in map(_COMMAND.match, lines) if match):
+                added[f"lib/{package}/{name}"] = _LAUNCHER.format(name=name).encode()
         if any(path.endswith(".so") for path in files):
             options = self.get_option_dict("bdist_wheel")
             options.setdefault("plat_name", ("idlc", prefixes.wheel_platform()))
@@ -111,14 +115,6 @@ def _merged(
             others.append(path)
         kept.append((entry[0], others))
     return kept, new
-
-
-def _launchers(package: str, entry_points: Any) -> dict[str, bytes]:
-    """Return a file for each command of a package where `ros2 run` and launch files look for it."""
-    scripts = (entry_points or {}).get("console_scripts", ())
-    lines = scripts.splitlines() if isinstance(scripts, str) else scripts
-    names = [match[1] for match in map(_COMMAND.match, lines) if match]
-    return {f"lib/{package}/{name}": _LAUNCHER.format(name=name).encode() for name in names}
 
 
 def _write_files(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]]:

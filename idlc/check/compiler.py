@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import groupby
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -105,10 +106,10 @@ class Compiler:
         self, interfaces: Mapping[ir.TypeName, ir.Interface], report: Report
     ) -> dict[str, Model]:
         """Return the models of interfaces by package; every problem is reported."""
-        packages: dict[str, list[ir.Interface]] = {}
-        for name in sorted(interfaces):
-            packages.setdefault(name.package, []).append(interfaces[name])
-        return {package: self.model(package, own, report) for package, own in packages.items()}
+        return {
+            package: self.model(package, [interfaces[name] for name in names], report)
+            for package, names in groupby(sorted(interfaces), lambda name: name.package)
+        }
 
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
         """Return interfaces and all that they refer to, without missing ones."""
@@ -128,10 +129,7 @@ class Compiler:
 
 
 def compile_package(
-    package: str,
-    sources: Iterable[tuple[ir.TypeName, Source]],
-    library: Library,
-    report: Report,
+    package: str, sources: Iterable[tuple[ir.TypeName, Source]], library: Library, report: Report
 ) -> Model:
     """Return the linked and checked model of one package; every problem is reported."""
     compiler = Compiler(library)
@@ -183,13 +181,12 @@ def sound_models(
     sound_packages, left_out = [], []
     for (package, _), sound in zip(models, without_errors(models, report), strict=True):
         mine = sound.only(package.names).own
-        sound_packages.append(
-            (sound, [name for interface in mine for name in derived_names(interface)])
-        )
+        names = [name for interface in mine for name in derived_names(interface)]
+        sound_packages.append((sound, names))
         left_out += sorted(package.names - {interface.name for interface in mine})
     if left_out:
-        names = first_few((f"`{name}`" for name in left_out), 5)
-        report.notes.append(f"left out, because of errors: {names}")
+        listed = first_few((f"`{name}`" for name in left_out), 5)
+        report.notes.append(f"left out, because of errors: {listed}")
     return sound_packages
 
 

@@ -86,14 +86,10 @@ _CPP = (_C - {"restrict"}) | frozenset(
     "static_cast template this thread_local throw try typeid typename using virtual wchar_t xor "
     "xor_eq".split()
 )
-_MACROS = frozenset(
-    {
-        "NULL",
-        "EOF",
-        "SIZE_MAX",
-        *(f"INT{bits}_{end}" for bits in (8, 16, 32, 64) for end in ("MIN", "MAX")),
-        *(f"UINT{bits}_MAX" for bits in (8, 16, 32, 64)),
-    }
+_BITS = (8, 16, 32, 64)
+_MACROS = frozenset(("NULL", "EOF", "SIZE_MAX")).union(
+    (f"INT{bits}_{end}" for bits in _BITS for end in ("MIN", "MAX")),
+    (f"UINT{bits}_MAX" for bits in _BITS),
 )
 _PYTHON_MEMBERS = frozenset({"get_fields_and_field_types", "check_fields"})
 _PYTHON_SUFFIXES = ("_Goal", "_Result", "_Feedback")

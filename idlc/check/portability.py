@@ -36,43 +36,35 @@ def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> Iterator[Diag
     if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in texts):
         yield _breaks_python(span, "a line break or NUL in a value")
     if isinstance(value, str):
-        yield from _mangled_text(value, span)
-        yield from _odd_text(span)
-    elif isinstance(value, float) and not math.isfinite(value):
+        yield from _text_problems(value, span)
+    elif not isinstance(value, float):
+        return
+    elif not math.isfinite(value):
         message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
         hint = "use a large finite number, or set the value in code"
         yield codes.NON_FINITE_VALUE.at(span, message, hint=hint)
-    elif (
-        element == ir.Primitive("float32") and isinstance(value, float) and abs(value) > FLOAT32_MAX
-    ):
+    elif element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
         message = f"`{span.text}` is beyond what a float32 holds"
         yield codes.FLOAT32_RANGE.at(span, message, hint="use float64")
 
 
-def _mangled_text(value: str, span: Span) -> Iterator[Diagnostic]:
+def _text_problems(value: str, span: Span) -> Iterator[Diagnostic]:
+    """Yield the problems of a text that ROS 2 reads otherwise, or with more than is meant."""
     text = span.text
-    if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
-        text = text[1:-1]
-    if "\\" in text and value != plain_meaning(text):
+    is_closed = len(text) > 1 and text[0] == text[-1]
+    content = text[1:-1] if is_closed and text[0] in "\"'" else text
+    if "\\" in content and value != plain_meaning(content):
         message = f"ROS 2 interprets the backslashes more than once and reads {value!r}"
         yield codes.MANGLED_TEXT.at(span, message, hint=BACKSLASH_HINT)
-
-
-def _odd_text(span: Span) -> Iterator[Diagnostic]:
-    """Yield the problem of quotes or a comment that ROS 2 takes as part of the text."""
-    text = span.text
-    one_sided = text[:1] in ('"', "'") and (len(text) == 1 or text[-1] != text[0])
+    line, column = span.source.position(span.end)
+    one_sided = text[:1] in ('"', "'") and not is_closed
     if lower_types.has_comment(text) and (one_sided or lower_types.is_comment(text)):
         message = "what looks like a comment is part of the text"
         yield codes.ODD_TEXT.at(span, message, hint=lower_types.COMMENT_HINT)
-    elif one_sided and text[0] not in _rest_of_line(span):  # or a `#` is to blame, see IDL109
+    # or a `#` is to blame, see IDL109
+    elif one_sided and text[0] not in span.source.line_text(line)[column - 1 :]:
         message = f"the text is not closed by {text[0]}, which therefore is part of it"
         yield codes.ODD_TEXT.at(span, message, hint="close the quotes, or leave them out")
-
-
-def _rest_of_line(span: Span) -> str:
-    line, column = span.source.position(span.end)
-    return span.source.line_text(line)[column - 1 :]
 
 
 def _breaks_python(span: Span, subject: str) -> Diagnostic:
@@ -109,21 +101,17 @@ def chars(model: Model) -> Iterator[Diagnostic]:
             if _is_char(constant.type) and constant.name_span
         ]
         for span in filter(None, spans):
+            wide = re.compile(r"char(\S*) ( +)").match(span.source.text, span.start)
+            edit = Edit(span, "uint8")
+            if wide:  # there is room to leave the name in its column
+                whole = Span(span.source, span.start, wide.end())
+                edit = Edit(whole, f"uint8{wide[1]}{wide[2]}")
             yield codes.CHAR_TYPE.at(
                 span,
                 "`char` is an unsigned number of one byte in ROS 2, not a character",
                 hint="write `uint8`; bytes, hash and code stay the same",
-                edits=(_as_uint8(span),),
+                edits=(edit,),
             )
-
-
-def _as_uint8(span: Span) -> Edit:
-    """Return the edit of a `char`, which leaves the name in its column if there is room."""
-    source = span.source
-    wide = re.compile(r"char(\S*) ( +)").match(source.text, span.start)
-    if wide is None:
-        return Edit(span, "uint8")
-    return Edit(Span(source, span.start, wide.end()), f"uint8{wide[1]}{wide[2]}")
 
 
 def _is_char(type_: ir.FieldType) -> bool:

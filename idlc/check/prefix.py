@@ -9,16 +9,9 @@ from idlc.check.compiler import models_of, stage
 from idlc.check.run import CheckResult
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.native.inspect import Inspected, inspect
+from idlc.generate.native import library as native
+from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS
-from idlc.generate.native.library import (
-    FIELDS_CPP,
-    MACHINES,
-    OWN,
-    hash_bytes,
-    identity_stamp,
-    symbol,
-)
 from idlc.model import derive
 from idlc.project import inputs
 from idlc.project.find import list_files
@@ -56,11 +49,11 @@ def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
     files = []
     for owner in (owner for prefix in folders for owner in installed_packages(prefix, root)):
         model = _model(owner)
-        for identifier in (OWN, FIELDS_CPP):
+        for identifier in (native.OWN, native.FIELDS_CPP):
             name = f"lib{owner.package}__{identifier}.so"
             files.append(owner.library(name))
             with stage("check library", files[-1]):
-                why = _problem(owner, name, identifier, model)
+                why = next(_problems(owner, name, identifier, model), "")
             if why:
                 message = f"`{name}` {why}: C++ tools fail at the types of `{owner.package}`"
                 report.add(codes.UNUSABLE_LIBRARY.of(files[-1], message, hint=_AGAIN))
@@ -83,32 +76,30 @@ def _model(package: InstalledPackage) -> Model | None:
     return None if dropped.had_errors or not files else models[0][1]
 
 
-def _problem(package: InstalledPackage, name: str, identifier: str, model: Model | None) -> str:
-    """Return the problem of a library, in words that follow its name; empty if there is none."""
-    data = package.content(name)
-    if data is None:
-        return "is missing" if identifier == OWN else ""
-    library = inspect(data)
-    if library is None:
-        return "is no shared library, or a part of one"
-    own = MACHINES.get(machine())
-    if own is not None and library.machine != own.number:
-        return f"is for another processor than {machine()}"
-    if model is None:
-        return ""
-    return next(_differences(package, data, library, identifier, model), "")
-
-
-def _differences(
-    package: InstalledPackage, data: bytes, library: Inspected, identifier: str, model: Model
+def _problems(
+    package: InstalledPackage, name: str, identifier: str, model: Model | None
 ) -> Iterator[str]:
-    """Yield the differences between a library and the installed interfaces."""
+    """Yield the problems of a library, the gravest first, in words that follow its name."""
+    data = package.content(name)
+    library = data and inspect(data)
+    if data is None:
+        if identifier == native.OWN:
+            yield "is missing"
+        return
+    if not library:
+        yield "is no shared library, or a part of one"
+        return
+    own = native.MACHINES.get(machine())
+    if own is not None and library.machine != own.number:
+        yield f"is for another processor than {machine()}"
+    if model is None:
+        return
     messages = [message for own in model.own for message in derive.messages(own)]
     missing = [
         f"`{message.name}`"
         for message in messages
         # older distributions have no events
-        if symbol(identifier, message.name) not in library.symbols
+        if native.symbol(identifier, message.name) not in library.symbols
         and (library.stamp is not None or not message.name.name.endswith("_Event"))
     ]
     if missing:
@@ -116,10 +107,10 @@ def _differences(
     if library.stamp is None:
         return
     hashes = {str(message.name): model.describer.hash(str(message.name)) for message in messages}
-    stale = [f"`{name}`" for name, hash_ in hashes.items() if hash_bytes(hash_) not in data]
+    stale = [f"`{name}`" for name, hash_ in hashes.items() if native.hash_bytes(hash_) not in data]
     if stale:
         yield f"is out of date: {first_few(stale, 3)} changed since"
     local = distribution((package.prefix, *ament_prefixes()))
     layout = LAYOUTS.get(local.name)
-    if layout is not None and library.stamp != identity_stamp(layout):
+    if layout is not None and library.stamp != native.identity_stamp(layout):
         yield f"is for another distribution of ROS 2 than {local.name} ({local.why})"

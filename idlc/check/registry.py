@@ -30,15 +30,12 @@ class IncrementalFindings:
         """Return the findings of a package's unchanged interfaces; the caller adds the others."""
         graph = model.graph()
         before, findings = self._packages.get(model.package, ({}, {}))
-        new = [
-            name
-            for name, (now, _) in graph.items()
-            if name not in before or before[name] is not now
-        ]
+        now = {name: interface for name, (interface, _) in graph.items()}
+        new = [name for name in now if name not in before or before[name] is not now[name]]
         changed = dependents(new, ((name, targets) for name, (_, targets) in graph.items()))
         own = (interface.name for interface in model.own)
         kept = {name: findings[name] for name in own if name in findings and name not in changed}
-        self._packages[model.package] = {name: now for name, (now, _) in graph.items()}, kept
+        self._packages[model.package] = now, kept
         return kept
 
 

@@ -56,21 +56,31 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         if recordings:
             return _with_recordings(recordings, others, options, report)
     fixed = 0
+    scope, selection = options.scope, options.selection
     for rounds_left in reversed(range(_ROUNDS + 1)):
         looked = Report()
-        checked, problems = _check_once(options, looked)
+        listing = list_files(options.paths, scope.root, looked, scope.exclude)
+        packages = inputs.packages(listing.files, scope, looked, listing.packages)
+        for path in listing.empty:
+            folder = scope.root.absolute(path)
+            if not any(package.home.is_relative_to(folder) for package in packages):
+                also = "package.xml and no "
+                looked.add(no_interfaces(path, scope.root, scope.exclude, also=also))
+        problems, models = check_all(checkers(packages, scope), packages, selection)
         edits = [change for problem in problems for change in problem.edits]
         if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
             break
         from idlc.project.write import edit
 
-        done = edit(edits, options.scope.root, report, keep_layout)
+        done = edit(edits, scope.root, report, keep_layout)
         fixed += done
         if not done:
             break
+    files = tuple(file.shown for file in listing.files)
+    distros = tuple(models) if len(models) > 1 else ()
     report.extend((*looked, *problems))
     report.notes += looked.notes
-    return msgspec.structs.replace(checked, fixed=fixed)
+    return CheckResult(files, len(packages), fixed, distros)
 
 
 def _with_recordings(
@@ -102,20 +112,6 @@ def keep_layout(name: str, old: str, new: str) -> str:
     if not is_interface or format_file(parse(Source(name, old))) != old:
         return new
     return format_file(parse(Source(name, new)))
-
-
-def _check_once(options: CheckOptions, report: Report) -> tuple[CheckResult, list[Diagnostic]]:
-    scope = options.scope
-    root = scope.root
-    listing = list_files(options.paths, root, report, scope.exclude)
-    packages = inputs.packages(listing.files, scope, report, listing.packages)
-    for path in listing.empty:
-        if not any(package.home.is_relative_to(root.absolute(path)) for package in packages):
-            report.add(no_interfaces(path, root, scope.exclude, also="package.xml and no "))
-    problems, models = check_all(checkers(packages, scope), packages, options.selection)
-    files = tuple(file.shown for file in listing.files)
-    distros = tuple(models) if len(models) > 1 else ()
-    return CheckResult(files, len(packages), distros=distros), problems
 
 
 def checkers(
@@ -166,8 +162,7 @@ class Checker:
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""
         if package.package not in self._facts:
-            new = facts(package, self.library.packages, self._scope)
-            self._facts[package.package] = new
+            self._facts[package.package] = facts(package, self.library.packages, self._scope)
         current = self._facts[package.package]
         if current is None or not current.inputs:
             return current
@@ -182,10 +177,8 @@ def check_all(
     models = {
         distro: checker.check(packages, reports[distro]) for distro, checker in checkers.items()
     }
-    own = (
-        interface.source for some in models.values() for model in some for interface in model.own
-    )
-    sources = {source.path: source for source in own if source}.values()
+    own = (interface for some in models.values() for model in some for interface in model.own)
+    sources = {part.source.path: part.source for part in own if part.source}.values()
     together = merge(reports) if len(reports) > 1 else next(iter(reports.values()))
     selected = [problem for problem in together if selection.wants(problem)]
     problems = [

@@ -51,10 +51,8 @@ class Selection(msgspec.Struct, frozen=True):
 
     def has(self, code: codes.Code) -> bool:
         """Return whether a code is switched on."""
-        if self.select is None:
-            chosen = code.default
-        else:
-            chosen = any(_means(word, code) for word in self.select)
+        words = self.select
+        chosen = code.default if words is None else any(_means(word, code) for word in words)
         return chosen and not any(_means(word, code) for word in self.ignore)
 
     def wants(self, diagnostic: Diagnostic) -> bool:
@@ -113,19 +111,15 @@ def without_ignored(
                 hint=f"write the reason after it: `ignore[{remark.code}] REASON`",
             )
         elif at not in used:
-            yield _unused(remark)
-
-
-def _unused(remark: Remark) -> Diagnostic:
-    code = codes.CODES.get(remark.code)
-    if code is None:
-        message = f"there is no code `{remark.code}`"
-    elif code.severity is Severity.ERROR:
-        message = f"`{remark.code}` is an error, which cannot be ignored"
-    else:
-        message = f"there is no `{remark.code}` here to ignore"
-    edits = (remark.edit,) if remark.edit else ()
-    return codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark", edits=edits)
+            code = codes.CODES.get(remark.code)
+            if code is None:
+                message = f"there is no code `{remark.code}`"
+            elif code.severity is Severity.ERROR:
+                message = f"`{remark.code}` is an error, which cannot be ignored"
+            else:
+                message = f"there is no `{remark.code}` here to ignore"
+            hint, edits = "remove the remark", (remark.edit,) if remark.edit else ()
+            yield codes.UNUSED_IGNORE.at(remark.span, message, hint=hint, edits=edits)
 
 
 def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
@@ -133,29 +127,28 @@ def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
     if diagnostic.code != codes.UNUSED_IGNORE.id or diagnostic.span is None:
         return False
     code = codes.find(diagnostic.span.text)
-    if code is None or code.severity is Severity.ERROR:
-        return False
-    return not selection.has(code)
+    is_advice = code is not None and code.severity is not Severity.ERROR
+    return code is not None and is_advice and not selection.has(code)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:
     if "idlc:" not in source.text:
         return
-    file = parse(source)
-    for number, section in enumerate(file.sections):
+    for number, section in enumerate(parse(source).sections):
         in_head = number == 0
         waiting: list[Remark] = []
         for line in section.lines:
             in_head = in_head and bool(line.comment) and not line.code
             line_number, _ = source.position(line.start)
             in_line = list(_in_line(source, line, line_number, in_head))
-            if not line.definition and not in_head:
-                waiting += in_line
-            else:
-                yield from in_line
             if line.definition:
+                yield from in_line
                 yield from (msgspec.structs.replace(remark, line=line_number) for remark in waiting)
                 waiting = []
+            elif in_head:
+                yield from in_line
+            else:
+                waiting += in_line
         yield from waiting
 
 
@@ -166,23 +159,16 @@ def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Ite
     start = line.start + len(line.code)
     listed = re.finditer(r"[^\s,]+", match.group(1))
     names = [(word.group(), start + match.start(1) + word.start()) for word in listed]
-    edit = _removal(source, line, match) if len(names) == 1 else None
+    edit = None
+    if len(names) == 1 and not line.comment[: match.start()].strip("# \t"):  # nothing else is said
+        code_end = len(line.code.rstrip())
+        end = start + len(line.comment) + (0 if code_end else len(line.newline))
+        edit = Edit(Span(source, line.start + code_end, min(end, len(source.text))), "")
     for name, at in names:
         span = Span(source, at, at + len(name))
         named = codes.find(name)
         code = named.id if named else name
         yield Remark(code, match.group(2).strip(), span, None if in_head else number, edit)
-
-
-def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | None:
-    """Return the edit that removes a comment that holds only the remark."""
-    if line.comment[: match.start()].strip("# \t"):
-        return None
-    code = len(line.code.rstrip())
-    end = line.start + len(line.code) + len(line.comment)
-    if not code:
-        end += len(line.newline)
-    return Edit(Span(source, line.start + code, min(end, len(source.text))), "")
 
 
 class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):

@@ -109,11 +109,7 @@ def usual_unit(unit: str) -> str | None:
 
 HEADER = ir.Ref(ir.TypeName("std_msgs", "msg", "Header"))
 TIME = ir.Ref(ir.TypeName("builtin_interfaces", "msg", "Time"))
-_SUFFIXES = {
-    "msg": ("Msg", "Message", "Msgs"),
-    "srv": ("Srv", "Service"),
-    "action": ("Action",),
-}
+_SUFFIXES = {"msg": ("Msg", "Message", "Msgs"), "srv": ("Srv", "Service"), "action": ("Action",)}
 
 
 def stamped(model: Model) -> Iterator[Diagnostic]:

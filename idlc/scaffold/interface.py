@@ -13,18 +13,7 @@ from idlc.model import catalog, derive, ir, names
 from idlc.model.link import Model
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused
-from idlc.scaffold.changes import (
-    Result,
-    Settings,
-    accepted,
-    find_package,
-    generation,
-    keys_of,
-    library_around,
-    rendering,
-    templates,
-    write,
-)
+from idlc.scaffold.changes import Result, Settings, find_package, rendering, templates
 from idlc.scaffold.edits import setup_py
 from idlc.scaffold.package import rendered_for
 
@@ -140,16 +129,16 @@ def interface(
     report: Report,
 ) -> Result | None:
     """Write an interface file into the package that the working folder belongs to."""
-    located = find_package(settings, report)
-    if located is None:
+    project = find_package(settings, report)
+    if project is None:
         return None
-    project, own = located
+    own = project.package
     path = f"{kind}/{name}.{kind}"
     text = interface_text(kind, fields, comment)
     used = templates(settings, report)
-    library = library_around(own, project, settings, report)
     source = Source(project.shown(path), text)
-    model = compile_package(own, [(ir.TypeName(own, kind, name), source)], library, report)
+    named = [(ir.TypeName(own, kind, name), source)]
+    model = compile_package(own, named, project.library(), report)
     if report.had_errors:
         return None
     added = {path: text}
@@ -162,18 +151,18 @@ def interface(
     edits: dict[str, Outcome] = {
         MANIFEST: package_xml.add_dependencies(manifest, depends=needed, tests=tests, group=True)
     }
-    keys, setup = {*keys_of(project), path}, project.text(SETUP)
+    keys, setup = {*project.keys(), path}, project.text(SETUP)
     cmake = project.text(CMAKE)
     if cmake is not None:
         edits[CMAKE] = add_cmake_dependencies(cmake, needed)
     elif setup is not None:
         wired = setup_py.add_interfaces(setup, own, keys, folders(project.path))
         edits[SETUP] = Edited(wired)
-    edited = accepted(project, edits, report)
+    edited = project.accepted(edits)
     if edited is None:
         return None
     if cmake is None:  # the file by which ROS 2's tools know a package's interfaces: language 9
         edited[f"resource/rosidl_interfaces/{own}"] = "".join(f"{key}\n" for key in sorted(keys))
-    result = write(project, added, edited, settings, report)
-    after = generation(project, own, settings) if cmake is None else ()
+    result = project.write(added, edited)
+    after = project.generation() if cmake is None else ()
     return result and result._replace(following=after)

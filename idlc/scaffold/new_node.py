@@ -17,21 +17,8 @@ from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.project.prefixes import distribution, python_folders
-from idlc.scaffold import spec
-from idlc.scaffold.changes import (
-    Project,
-    Result,
-    Settings,
-    accepted,
-    find_package,
-    generation,
-    keys_of,
-    library_around,
-    rendering,
-    templates,
-    type_name,
-    write,
-)
+from idlc.scaffold import changes, spec
+from idlc.scaffold.changes import Project, Result, Settings
 from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
@@ -40,6 +27,7 @@ from idlc.scaffold.templates import Templates
 
 MANIFEST = "package.xml"
 SETUP = "setup.py"
+SETUP_FILES = ("pyproject.toml", "setup.cfg", SETUP)
 CONFTEST = "test/conftest.py"
 LAUNCH_ENDING = "launch.py"
 
@@ -57,10 +45,11 @@ class Entry(NamedTuple):
 
 def paths(package: str, launch_files: Iterable[str]) -> list[str]:
     """Return the files of a package whose texts decide; `launch_files` are names in `launch/`."""
-    return [
-        *("pyproject.toml", "setup.cfg", SETUP, MANIFEST, CONFTEST),
-        *(f"{package}/__init__.py", _launch_file(package, launch_files)),
-    ]
+    listed = [name for name in launch_files if name.endswith(LAUNCH_ENDING)]
+    usual = [f"{package}_launch.py", f"{package}.launch.py"]
+    chosen = listed if len(listed) == 1 else [name for name in usual if name in listed]
+    launch_file = f"launch/{next(iter(chosen), usual[0])}"
+    return [*SETUP_FILES, MANIFEST, CONFTEST, f"{package}/__init__.py", launch_file]
 
 
 def node_entry(
@@ -80,8 +69,7 @@ def node_entry(
     """
     node = planned.node
     script = Script(node.name, f"{node.package}.{node.name}:main")
-    setup_files = ("pyproject.toml", "setup.cfg", SETUP)
-    described = {name: texts[name] for name in setup_files if name in texts}
+    described = {name: texts[name] for name in SETUP_FILES if name in texts}
     if (own := tuple(keys)) and SETUP in described:
         text = described[SETUP]
         described[SETUP] = setup_py.add_interfaces(text, node.package, own, folders)
@@ -101,13 +89,13 @@ def node_entry(
     if not launch:
         return Entry(added, edits)
     file = next((name for name in texts if name.startswith("launch/")), "")
-    text = texts.get(file) or rendered_for(node.package, "package/launch.py.jinja", templates)
-    started = launch_py.add_node(text, launch_py.Started(node.package, node.name, node.lifecycle))
-    path = file or _launch_file(node.package, ())
+    old = texts.get(file) or rendered_for(node.package, "package/launch.py.jinja", templates)
+    started = launch_py.add_node(old, launch_py.Started(node.package, node.name, node.lifecycle))
+    path = file or f"launch/{node.package}_launch.py"
     if isinstance(started, Refused):
         line = f"add this {started.where}: {started.line.rstrip(',')}"
         note = (path, f"is not edited: {started.why}; {line}")
-        return Entry(added if file else {**added, path: text}, edits, (note,))
+        return Entry(added if file else {**added, path: old}, edits, (note,))
     if file:
         return Entry(added, {**edits, path: started})
     before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
@@ -116,50 +104,55 @@ def node_entry(
     return Entry({**added, path: started.text}, edits)
 
 
-def _launch_file(package: str, names: Iterable[str]) -> str:
-    """Return the launch file that lists the package's nodes, of the names in `launch/`."""
-    launch_files = [name for name in names if name.endswith(LAUNCH_ENDING)]
-    preferred = [f"{package}_launch.py", f"{package}.launch.py"]
-    for name in (*preferred, *(launch_files if len(launch_files) == 1 else ())):
-        if name in launch_files:
-            return f"launch/{name}"
-    return f"launch/{preferred[0]}"
-
-
 def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
-    located = find_package(settings, report)
-    if located is None:
+    project = changes.find_package(settings, report)
+    if project is None:
         return None
-    project, own = located
-    used = templates(settings, report)
-    planned = _planned(requested._replace(package=own), project, settings, report)
+    own, name = project.package, requested.name
+    used = changes.templates(settings, report)
+    planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
         return None
     entry = Entry({}, {})
-    with rendering(requested.name, report):
-        entry = _entry(planned, project, used, launch=settings.launch)
-    edited = accepted(project, entry.edits, report)
-    result = None if edited is None else write(project, entry.added, edited, settings, report)
+    with changes.rendering(name, report):
+        files = {
+            f"{own}/{name}.py": render(planned, used),
+            f"test/test_{name}.py": render_test(planned, used),
+        }
+        for path, text in files.items():
+            compile(text, path, "exec", dont_inherit=True)
+        texts = {}
+        for path in paths(own, project.names("launch")):
+            if (content := project.text(path)) is not None:
+                texts[path] = content
+        keys, present = project.keys(), folders(project.path)
+        entry = node_entry(planned, texts, used, launch=settings.launch, keys=keys, folders=present)
+        entry = entry._replace(added={**files, **entry.added})
+    edited = project.accepted(entry.edits)
+    result = None if edited is None else project.write(entry.added, edited)
     if result is None:
         return None
-    missing = not project.has(f"{own}/_type_data.py")
+    notes = [f"`{project.shown(path)}` {text}" for path, text in entry.notes]
+    absent = [package for package in planned.packages if not python_folders(package)]
+    if absent and python_folders("rclpy"):
+        listed = ", ".join(f"`{package}`" for package in absent)
+        distro = BY_NAME.get(distribution().name, DEFAULT)
+        notes.append(f"{listed} cannot be imported here: {distro.installing(absent)}")
     used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
-    compiled = any(name.package == own for name in used_names)
-    after = generation(project, own, settings) if missing and compiled else ()
-    notes = (f"`{project.shown(path)}` {text}" for path, text in entry.notes)
-    return result._replace(notes=(*notes, *_absent(planned)), following=after)
+    compiled = any(interface.package == own for interface in used_names)
+    missing = not project.has(f"{own}/_type_data.py")
+    after = project.generation() if missing and compiled else ()
+    return result._replace(notes=tuple(notes), following=after)
 
 
-def _planned(
-    requested: spec.Node, project: Project, settings: Settings, report: Report
-) -> Plan | None:
+def _planned(requested: spec.Node, project: Project, report: Report) -> Plan | None:
     """Return the node with the interfaces of its endpoints; report missing ones."""
-    library = library_around(requested.package, project, settings, report)
+    library = project.library()
     interfaces: list[ir.Interface | None] = []
     messages: dict[ir.TypeName, ir.Message] = {}
     for endpoint in requested.endpoints:
-        name = type_name(endpoint, requested.package, library, report)
+        name = changes.type_name(endpoint, requested.package, library, report)
         source = name and library.source(name)
         if not name or source is None:
             interfaces.append(None)
@@ -172,29 +165,3 @@ def _planned(
             interfaces.append(model.interfaces[name])
             messages.update(model.messages)
     return None if report.had_errors else plan(requested, interfaces, messages)
-
-
-def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) -> Entry:
-    """Return the files of a node, and the edits that list it in its package."""
-    own, name = planned.node.package, planned.node.name
-    files = {
-        f"{own}/{name}.py": render(planned, used),
-        f"test/test_{name}.py": render_test(planned, used),
-    }
-    for path, text in files.items():
-        compile(text, path, "exec", dont_inherit=True)
-    read = {path: project.text(path) for path in paths(own, project.names("launch"))}
-    texts = {path: text for path, text in read.items() if text is not None}
-    keys, present = keys_of(project), folders(project.path)
-    entry = node_entry(planned, texts, used, launch=launch, keys=keys, folders=present)
-    return entry._replace(added={**files, **entry.added})
-
-
-def _absent(planned: Plan) -> list[str]:
-    """Return a note if ROS 2 is installed, but not all packages that the node imports."""
-    absent = [name for name in planned.packages if not python_folders(name)]
-    if not absent or not python_folders("rclpy"):
-        return []
-    names = ", ".join(f"`{name}`" for name in absent)
-    distro = BY_NAME.get(distribution().name, DEFAULT)
-    return [f"{names} cannot be imported here: {distro.installing(absent)}"]

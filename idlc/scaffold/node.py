@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import sys
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from idlc.model import derive, ir
 from idlc.project.templates import Code
 from idlc.scaffold import roles, samples, spec
-from idlc.scaffold.imports import Import, ImportList
 from idlc.scaffold.samples import Page
 from idlc.scaffold.spec import Placed, Plan
 from idlc.scaffold.templates import Templates
@@ -40,6 +41,13 @@ _VARIABLES: Mapping[ir.Kind | None, tuple[str, ...]] = {
     "action": ("goal", "result", "feedback"),
     None: (),
 }
+
+
+class Import(NamedTuple):
+    """An import of a module, or of names from it; several are on a line each."""
+
+    module: Code
+    names: tuple[Code, ...] = ()
 
 
 class Part(NamedTuple):
@@ -114,74 +122,56 @@ class NodeView(NamedTuple):
 
 def render(planned: Plan, templates: Templates) -> str:
     """Return the text of a node's module."""
-    return templates.render("node/module.py.jinja", node=view(planned))
-
-
-def view(planned: Plan) -> NodeView:
-    """Return what a node's module shows."""
     node = planned.node
     page = Page(planned.messages, clock=CLOCK, taken=_TAKEN, own=node.package)
-    parts = tuple(_part(placed, page) for placed in planned.endpoints)
+    parts = [_part(placed, page, placed.endpoint.role.samples) for placed in planned.endpoints]
     page.clock = None  # there is none where the command line is read
     requests = tuple(_requests(planned, page))
-    class_name = spec.class_name(node.name)
-    class_name += "Node" if class_name in page.names or class_name in _TAKEN else ""
+    class_name = "".join(part.capitalize() for part in node.name.split("_"))
+    class_name += "Node" if class_name in page.taken else ""
     does = (
         Code(f"{endpoint.role.summary} {part.title}")
         for endpoint, part in zip(node.endpoints, parts, strict=True)
         if endpoint.role.summary
     )
-    return NodeView(
+    view = NodeView(
         name=Code(node.name),
         class_name=Code(class_name),
         does=tuple(does),
         imports=_imports(planned, page),
         constants=_constants(node),
         parameters=tuple(map(_parameter, node.parameters)),
-        parts=parts,
+        parts=tuple(parts),
         requests=requests,
         helpers=_helpers(node),
         lifecycle=node.lifecycle,
         once=planned.once,
     )
+    return templates.render("node/module.py.jinja", node=view)
 
 
-def _part(placed: Placed, page: Page) -> Part:
-    """Return an endpoint as its node sees it."""
-    sections = dict(_sections(placed))
-    sample = {name: samples.sample(sections[name], page) for name in placed.endpoint.role.samples}
-    return _bare_part(placed, page)._replace(sample=sample)
-
-
-def _bare_part(placed: Placed, page: Page) -> Part:
-    """Return an endpoint without values of messages."""
+def _part(placed: Placed, page: Page, spelled_out: Iterable[str] = ()) -> Part:
+    """Return an endpoint as its node or its test sees it, with values for some sections."""
     endpoint, word, interface = placed
-    sections = _sections(placed)
+    messages = derive.sections(interface) if interface else ()
+    sections = dict(zip(_VARIABLES[endpoint.role.kind], messages, strict=True))
+    sample = {name: samples.sample(sections[name], page) for name in spelled_out}
+    seconds = endpoint.period or 1.0
+    period = repr(round(seconds, 6))
+    if abs(float(period) - seconds) >= seconds * 1e-9:
+        period = f"1.0 / {1.0 / seconds:.6g}"
     return Part(
         template=f"node/{endpoint.role.name}.py.jinja",
         word=Code(word),
         title=Code(endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word),
         name=Code(repr(endpoint.topic)),
         type=Code(page.use(interface.name) if interface else ""),
-        period=_interval(endpoint.period or 1.0),
+        period=Code(period),
         qos=Code(endpoint.qos.source),
         patience=Code(repr(round(PATIENCE + 3 * (endpoint.period or 0.0), 1))),
-        sample={},
-        log={variable: samples.logged(section, variable) for variable, section in sections},
+        sample=sample,
+        log={name: samples.logged(section, name) for name, section in sections.items()},
     )
-
-
-def _sections(placed: Placed) -> tuple[tuple[str, ir.Message], ...]:
-    """Return the messages of an interface by the variables of a node that hold them."""
-    sections = derive.sections(placed.interface) if placed.interface else ()
-    return tuple(zip(_VARIABLES[placed.endpoint.role.kind], sections, strict=True))
-
-
-def _interval(seconds: float) -> Code:
-    """Return a period in seconds as source."""
-    text = repr(round(seconds, 6))
-    exact = abs(float(text) - seconds) < seconds * 1e-9
-    return Code(text if exact else f"1.0 / {1.0 / seconds:.6g}")
 
 
 def _helpers(node: spec.Node) -> frozenset[str]:
@@ -210,15 +200,17 @@ def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
     for request, word, interface in planned.asking:
         message = derive.sections(interface)[0]
         prefix = "" if alone else f"{word}_"
+        type_ = Code(page.use(message.name))
         positional = planned.once and alone
+        sample, arguments = samples.request(message, page, prefix, positional=positional)
         yield RequestView(
             title=Code(request.title),
             function=Code(f"{word}_request"),
-            type=Code(page.use(message.name)),
+            type=type_,
             method=Code(request.method.format(word)),
             cancel=Code(request.cancel.format(word)),
-            sample=samples.from_arguments(message, page, prefix),
-            arguments=tuple(samples.arguments(message, page, prefix, positional=positional)),
+            sample=sample,
+            arguments=arguments,
         )
 
 
@@ -226,36 +218,54 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
     """Return the imports in groups: of the standard library, then all others."""
     node = planned.node
     waits = "pause" in _helpers(node)
-    imports = ImportList(page.imports())
+    imports = defaultdict(set, page.imports())
     plain = ["rclpy"]
     for endpoint in node.endpoints:
-        imports.add_all(endpoint.role.imports)
-        imports.add("rclpy.qos", *endpoint.qos.imports)
-    imports.add("rclpy.executors", "SingleThreadedExecutor")
-    imports.add("rclpy.utilities", "ok")
+        for module, names in endpoint.role.imports.items():
+            imports[module].update(names)
+        imports["rclpy.qos"].update(endpoint.qos.imports)
+    imports["rclpy.executors"].add("SingleThreadedExecutor")
+    imports["rclpy.utilities"].add("ok")
     if waits:
-        imports.add("rclpy.task", "Future")
+        imports["rclpy.task"].add("Future")
     if planned.asking:
-        imports.add("collections.abc", "Callable")
-        imports.add("rclpy.utilities", "remove_ros_args")
+        imports["collections.abc"].add("Callable")
+        imports["rclpy.utilities"].add("remove_ros_args")
         plain += ["argparse", "sys", "time"]
     if planned.once:
-        imports.add("rclpy.signals", "SignalHandlerOptions")
-        imports.add("rclpy.utilities", "try_shutdown")
-        imports.add("threading", "Event")
+        imports["rclpy.signals"].add("SignalHandlerOptions")
+        imports["rclpy.utilities"].add("try_shutdown")
+        imports["threading"].add("Event")
         plain.append("signal")
     else:
-        imports.add("rclpy.executors", "ExternalShutdownException")
+        imports["rclpy.executors"].add("ExternalShutdownException")
     if node.lifecycle:
-        imports.add("contextlib", "ExitStack")
+        imports["contextlib"].add("ExitStack")
         states = ("LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
-        imports.add("rclpy.lifecycle", *states)
+        imports["rclpy.lifecycle"].update(states)
         if waits:
-            imports.add("collections.abc", "Callable", "Coroutine")
-            imports.add("typing", "Any")
+            imports["collections.abc"].update(("Callable", "Coroutine"))
+            imports["typing"].add("Any")
     else:
-        imports.add("rclpy.node", "Node")
-    return imports.groups(plain)
+        imports["rclpy.node"].add("Node")
+    return _import_groups(imports, plain)
+
+
+def _import_groups(
+    names_of: Mapping[str, set[str]], plain: Iterable[str]
+) -> tuple[tuple[Import, ...], ...]:
+    """Return imports of names, and of `plain` modules, in the order that ament_flake8 wants."""
+    imports = [Import(Code(module)) for module in plain]
+    for module, names in names_of.items():
+        renamed = {name for name in names if " as " in name}
+        imports += [Import(Code(module), (Code(name),)) for name in renamed]
+        ordered = sorted(names - renamed, key=lambda name: (name.lower(), name))
+        imports += [Import(Code(module), tuple(map(Code, ordered)))] if ordered else []
+    imports.sort(key=lambda entry: (entry.module.lower(), *map(str.lower, entry.names[:1])))
+    groups: tuple[list[Import], list[Import]] = [], []
+    for entry in imports:
+        groups[entry.module.partition(".")[0] not in sys.stdlib_module_names].append(entry)
+    return tuple(tuple(group) for group in groups if group)
 
 
 class TestView(NamedTuple):
@@ -279,18 +289,13 @@ class TestView(NamedTuple):
 
 def render_test(planned: Plan, templates: Templates) -> str:
     """Return the text of a node's test."""
-    return templates.render("node/test.py.jinja", test=view_of_test(planned))
-
-
-def view_of_test(planned: Plan) -> TestView:
-    """Return what a node's test shows."""
     node = planned.node
     parts, imports = _tested(planned)
     served = (endpoint for endpoint in node.endpoints if endpoint.role.kind and node.lifecycle)
-    return TestView(
+    view = TestView(
         node=Code(node.name),
         module=Code(f"{node.package}.{node.name}"),
-        imports=imports.groups(("pytest", "signal")),
+        imports=_import_groups(imports, ("pytest", "signal")),
         constants=_constants(node),
         offered=tuple(map(Code, sorted({repr(_resolved(each, node.name)) for each in served}))),
         parameters=tuple(map(_parameter, node.parameters)),
@@ -299,6 +304,7 @@ def view_of_test(planned: Plan) -> TestView:
         once=planned.once,
         ends=planned.once and len(planned.asking) == 1,
     )
+    return templates.render("node/test.py.jinja", test=view)
 
 
 def _resolved(endpoint: roles.Endpoint, node: str) -> str:
@@ -310,34 +316,31 @@ def _resolved(endpoint: roles.Endpoint, node: str) -> str:
 
 def test_packages(planned: Plan) -> list[str]:
     """Return the packages that the test needs besides those of the node."""
-    _, imports = _tested(planned)
-    return [
-        "python3-pytest",
-        *sorted(imports.packages() - {*planned.packages, planned.node.package}),
-    ]
+    packages = {module.partition(".")[0] for module in _tested(planned)[1]}
+    others = packages - sys.stdlib_module_names - {*planned.packages, planned.node.package}
+    return ["python3-pytest", *sorted(others)]
 
 
-def _tested(planned: Plan) -> tuple[tuple[Part, ...], ImportList]:
+def _tested(planned: Plan) -> tuple[tuple[Part, ...], Mapping[str, set[str]]]:
     """Return the endpoints as a test sees them, and its imports besides pytest."""
     node = planned.node
     page = Page(planned.messages, taken=_TAKEN_BY_TESTS)
-    parts = tuple(
-        _bare_part(placed, page)._replace(
-            name=Code(repr(placed.endpoint.topic.replace("~", node.name))),
-        )
+    parts = [
+        _part(placed, page)._replace(name=Code(repr(placed.endpoint.topic.replace("~", node.name))))
         for placed in planned.endpoints
-    )
-    imports = ImportList(page.imports())
+    ]
+    imports = defaultdict(set, page.imports())
     for endpoint in node.endpoints:
-        imports.add_all(endpoint.role.test_imports)
-        imports.add("rclpy.qos", *endpoint.qos.imports)
+        for module, names in endpoint.role.test_imports.items():
+            imports[module].update(names)
+        imports["rclpy.qos"].update(endpoint.qos.imports)
     if node.lifecycle:
-        imports.add("lifecycle_msgs.msg", "Transition")
-        imports.add("lifecycle_msgs.srv", "ChangeState")
+        imports["lifecycle_msgs.msg"].add("Transition")
+        imports["lifecycle_msgs.srv"].add("ChangeState")
     if node.parameters:
-        imports.add("rcl_interfaces.srv", "GetParameters")
-        imports.add("rclpy.parameter", "parameter_value_to_python")
-    imports.add("rclpy.node", "Node")
-    imports.add("collections.abc", "Callable")
-    imports.add("typing", "Any")
-    return parts, imports
+        imports["rcl_interfaces.srv"].add("GetParameters")
+        imports["rclpy.parameter"].add("parameter_value_to_python")
+    imports["rclpy.node"].add("Node")
+    imports["collections.abc"].add("Callable")
+    imports["typing"].add("Any")
+    return tuple(parts), imports

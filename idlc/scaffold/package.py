@@ -5,18 +5,18 @@ from __future__ import annotations
 import shlex
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 from xml.sax.saxutils import escape, quoteattr
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.diagnostics.source import Source
+from idlc.diagnostics.source import Source, Span
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import Code, Text
-from idlc.scaffold.changes import Project, Result, Settings, rendering, templates, write
+from idlc.scaffold.changes import Project, Result, Settings, rendering, templates
 from idlc.scaffold.templates import Templates
 
 VERSION = "0.1.0"
@@ -61,23 +61,6 @@ class PackageView(NamedTuple):
     def is_python(self) -> bool:
         """True if the package has nodes."""
         return self.build_type == PYTHON
-
-
-def _view(package: Package) -> PackageView:
-    return PackageView(
-        name=Code(package.name),
-        version=Code(VERSION),
-        license=Code(package.license),
-        build_type=Code(package.build_type),
-        description=Text(package.description),
-        xml_description=Text(escape(package.description)),
-        xml_maintainer=Text(escape(package.maintainer)),
-        xml_email=Text(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
-        py_description=Code(repr(package.description)),
-        py_maintainer=Code(repr(package.maintainer)),
-        py_email=Code(repr(package.email)),
-        depends=tuple(map(Code, package.depends)),
-    )
 
 
 #: Files of a package of nodes, each with its template; NAME stands for the package.
@@ -128,7 +111,8 @@ def package_files(package: Package, templates: Templates) -> dict[str, str]:
         path.replace("NAME", package.name): rendered(template, package, templates)
         for path, template in listed.items()
     }
-    files["LICENSE"] = license_text(package)
+    text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
+    files["LICENSE"] = text.replace("(c) HOLDER", f"(c) {package.maintainer}")
     if package.build_type == PYTHON:
         files[f"resource/{package.name}"] = ""
         files[f"{package.name}/__init__.py"] = f'"""Nodes and interfaces of {package.name}."""\n'
@@ -137,7 +121,21 @@ def package_files(package: Package, templates: Templates) -> dict[str, str]:
 
 def rendered(template: str, package: Package, templates: Templates) -> str:
     """Return the text of one of a package's files."""
-    return templates.render(template, package=_view(package))
+    view = PackageView(
+        name=Code(package.name),
+        version=Code(VERSION),
+        license=Code(package.license),
+        build_type=Code(package.build_type),
+        description=Text(package.description),
+        xml_description=Text(escape(package.description)),
+        xml_maintainer=Text(escape(package.maintainer)),
+        xml_email=Text(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
+        py_description=Code(repr(package.description)),
+        py_maintainer=Code(repr(package.maintainer)),
+        py_email=Code(repr(package.email)),
+        depends=tuple(map(Code, package.depends)),
+    )
+    return templates.render(template, package=view)
 
 
 def rendered_for(name: str, template: str, templates: Templates) -> str:
@@ -145,21 +143,10 @@ def rendered_for(name: str, template: str, templates: Templates) -> str:
     return rendered(template, Package(name, "", "", "", LICENSES[0]), templates)
 
 
-def license_text(package: Package) -> str:
-    """Return the text of a licence, with the maintainer as the holder where it names one."""
-    text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
-    return text.replace("(c) HOLDER", f"(c) {package.maintainer}")
-
-
-#: Where the choices of a package are: in elements of package.xml, and arguments of setup().
-_TAGS = {
-    **{field: field for field in ("description", "maintainer", "license", "build_type")},
-    "email": "maintainer",
-}
-_ARGUMENTS = {
-    **{field: field for field in ("description", "maintainer", "license")},
-    "email": "maintainer_email",
-}
+#: The choices that package.xml and setup.py repeat.
+_CHOICES = ("description", "maintainer", "license", "email")
+#: A field of a package, the range that sets it, the values there, and the code that would do.
+_Choice: TypeAlias = tuple[str, Span, list[str], str]
 
 
 def package(
@@ -176,7 +163,7 @@ def package(
     where files that stay as they are contradict them.
     """
     name = requested.name if folder in ("", ".") else f"{folder}/{requested.name}"
-    project = Project(name, settings.root, report, force=settings.force)
+    project = Project(name, settings, report)
     used = templates(settings, report)
     if report.had_errors:
         return None
@@ -190,18 +177,21 @@ def package(
     elif "starters" in chosen:
         report.extend(_absent(project, starters or {}))
     # files that later commands add to stay as they are
-    growing = (*GROWING, f"launch/{requested.name}_launch.py")
-    new = {
-        path: text
-        for path, text in files.items()
-        if path not in growing or settings.force or not project.has(path)
-    }
-    for path, look in (("package.xml", _other_manifest), ("setup.py", _other_setup)):
+    growing = () if settings.force else (*GROWING, f"launch/{requested.name}_launch.py")
+    kept = [path for path in growing if project.has(path)]
+    new = {path: text for path, text in files.items() if path not in kept}
+    chosen = {*chosen, "build_type"}
+    for path, choices in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
         text = project.text(path) if path in files and path not in new else None
-        if text is not None:
-            source = Source(project.shown(path), text)
-            report.extend(look(source, requested, {*chosen, "build_type"}))
-    return write(project, new, {}, settings, report)
+        source = Source(project.shown(path), text or "")
+        for field, span, values, line in choices(source, requested, chosen) if text else ():
+            value = getattr(requested, field)
+            if field in chosen and value not in values:
+                shown = f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`"
+                hint = "choose another name" if field == "build_type" else f"write `{line}`"
+                message = f"{shown}; the file was not changed"
+                report.add(codes.EXISTING_FILE.at(span, message, hint=hint))
+    return project.write(new)
 
 
 def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnostic]:
@@ -217,46 +207,33 @@ def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnosti
             )
 
 
-def _other_manifest(
-    source: Source, requested: Package, chosen: Collection[str]
-) -> Iterator[Diagnostic]:
-    """Yield a problem for each choice that a package.xml contradicts."""
+def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) -> Iterator[_Choice]:
+    """Yield what a package.xml says of each choice, and the element to write in its place."""
     declared = statements(source)
-    for field, tag in _TAGS.items():
+    for field in (*_CHOICES, "build_type"):
+        tag = "maintainer" if field == "email" else field
         lines = [statement for statement in declared if statement.tag == tag]
-        emails = field == "email"
-        texts = (line.attributes.get("email", "") if emails else line.text for line in lines)
-        values = [" ".join(text.split()) for text in texts]
-        value = getattr(requested, field)
-        if field in chosen and lines and value not in values:
-            line = f"<{tag}>{escape(value)}</{tag}>"
-            if tag == "maintainer":
-                name = requested.maintainer if "maintainer" in chosen else lines[0].text
-                email = (
-                    requested.email if "email" in chosen else lines[0].attributes.get("email", "")
-                )
-                line = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
-            yield codes.EXISTING_FILE.at(
-                lines[0].span,
-                f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`; "
-                "the file was not changed",
-                hint=f"write `{line}`" if field != "build_type" else "choose another name",
-            )
+        if not lines:
+            continue
+        emails = [line.attributes.get("email", "") for line in lines]
+        texts = emails if field == "email" else [line.text for line in lines]
+        new = f"<{tag}>{escape(getattr(requested, field))}</{tag}>"
+        if tag == "maintainer":
+            name = requested.maintainer if "maintainer" in chosen else lines[0].text
+            email = requested.email if "email" in chosen else emails[0]
+            new = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
+        yield field, lines[0].span, [" ".join(text.split()) for text in texts], new
 
 
-def _other_setup(
-    source: Source, requested: Package, chosen: Collection[str]
-) -> Iterator[Diagnostic]:
-    """Yield a problem for each choice that a setup.py contradicts."""
+def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Choice]:
+    """Yield what a setup.py says of each choice, and the argument to write in its place."""
     from idlc.check.package.setup_py import Setup, span_of
 
     setup = Setup(source)
-    for field, argument in _ARGUMENTS.items():
-        node, value = setup.arguments.get(argument), getattr(requested, field)
+    for field in _CHOICES:
+        argument = "maintainer_email" if field == "email" else field
+        node = setup.arguments.get(argument)
         text = setup.text(node)
-        if node is not None and field in chosen and text not in (None, value):
-            yield codes.EXISTING_FILE.at(
-                span_of(source, node),
-                f"the {field} is `{text}` here, not `{value}`; the file was not changed",
-                hint=f"write `{argument}={value!r}`",
-            )
+        if node is not None and text is not None:
+            new = f"{argument}={getattr(requested, field)!r}"
+            yield field, span_of(source, node), [text], new

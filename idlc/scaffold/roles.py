@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
 
@@ -39,10 +39,9 @@ QOS_NAMES = tuple(preset.name for preset in QOS_PRESETS)
 
 def qos_preset(name: str) -> Qos:
     """Return the preset of a name; raise ValueError if there is none."""
-    for preset in QOS_PRESETS:
-        if preset.name == name:
-            return preset
-    raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
+    if name not in QOS_NAMES:
+        raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
+    return QOS_PRESETS[QOS_NAMES.index(name)]
 
 
 #: The imports of a module: the names from each other module.
@@ -70,13 +69,8 @@ class Request(NamedTuple):
     cancel: str = ""
 
 
-class Value(NamedTuple):
-    """The value of an option, taken apart; `period` is in seconds."""
-
-    type: str
-    topic: str
-    period: float | None = None
-
+#: The value of an option, taken apart: type, topic, and period in seconds.
+Value: TypeAlias = tuple[str, str, float | None]
 
 _TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
@@ -91,7 +85,7 @@ def _typed(text: str, shape: str = "TYPE:NAME") -> Value:
             f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
             "and single underscores, parts separated by `/`"
         )
-    return Value(type_, topic)
+    return type_, topic, None
 
 
 class Role(NamedTuple):
@@ -144,13 +138,8 @@ def _published(text: str) -> Value:
     """Return what `TYPE:TOPIC[@HZ]` means."""
     type_, colon, rest = text.partition(":")
     topic, at, hertz = rest.partition("@")
-    value = _typed(f"{type_}{colon}{topic}", "TYPE:TOPIC[@HZ]")
-    rate = _positive(hertz, f"the rate of `{topic}`", "Hz") if at else 1.0
-    return value._replace(period=1.0 / rate)
-
-
-def _timed(text: str) -> Value:
-    return Value("", "tick", _positive(text, "the period of a timer", "seconds"))
+    type_, topic, _ = _typed(f"{type_}{colon}{topic}", "TYPE:TOPIC[@HZ]")
+    return type_, topic, 1.0 / _positive(hertz, f"the rate of `{topic}`", "Hz") if at else 1.0
 
 
 def _positive(text: str, subject: str, unit: str) -> float:
@@ -221,10 +210,7 @@ ROLES: tuple[Role, ...] = (
                 "ServerGoalHandle",
             )
         },
-        test_imports={
-            "action_msgs.msg": ("GoalStatus",),
-            "rclpy.action.client": ("ActionClient",),
-        },
+        test_imports={"action_msgs.msg": ("GoalStatus",), "rclpy.action.client": ("ActionClient",)},
         helpers=frozenset({"pause", "retire"}),
     ),
     Role(
@@ -252,7 +238,7 @@ ROLES: tuple[Role, ...] = (
         kind=None,
         metavar="SECONDS",
         help="Call a method regularly.",
-        read=_timed,
+        read=lambda text: ("", "tick", _positive(text, "the period of a timer", "seconds")),
         answer="timer",
         question=Question("Period in seconds", "1.0"),
         summary="",

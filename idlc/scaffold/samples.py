@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ class Page:
     """The interfaces that one module of Python imports, and their names in it.
 
     `clock` is the expression of the current time, where there is a clock. `taken` names are used
-    otherwise. Comments are copied from interfaces of the package `own` only.
+    otherwise, or imported. Comments are copied from interfaces of the package `own` only.
     """
 
     def __init__(
@@ -45,22 +45,19 @@ class Page:
         self.clock = clock
         self.own = own
         self._names: dict[tuple[str, str], str] = {}
-        self._taken = set(taken)
+        self.taken = set(taken)
 
     def use(self, name: ir.TypeName) -> str:
         """Return the name of a class in this module, and import it."""
-        base, part = _spoken(name)
+        outer, _, part = name.name.rpartition("_")
+        is_part = name.kind != "msg" and outer != ""
+        base = python_names.class_(name._replace(name=outer) if is_part else name)
         key = (f"{name.package}.{name.kind}", base)
         if key not in self._names:
-            called = base if base not in self._taken else f"{name.package}_{name.kind}_{base}"
+            called = base if base not in self.taken else f"{name.package}_{name.kind}_{base}"
             self._names[key] = called
-            self._taken.add(called)
-        return self._names[key] + part
-
-    @property
-    def names(self) -> set[str]:
-        """The names that are imported."""
-        return set(self._names.values())
+            self.taken.add(called)
+        return f"{self._names[key]}.{part}" if is_part else self._names[key]
 
     def imports(self) -> dict[str, set[str]]:
         """Return the imported names by module."""
@@ -69,14 +66,6 @@ class Page:
             what = base if called == base else f"{base} as {called}"
             imported.setdefault(module, set()).add(what)
         return imported
-
-
-def _spoken(name: ir.TypeName) -> tuple[str, str]:
-    """Return the interface's class, and the part of it that a section is."""
-    base, _, part = name.name.rpartition("_")
-    if name.kind != "msg" and base:
-        return python_names.class_(name._replace(name=base)), f".{part}"
-    return python_names.class_(name), ""
 
 
 class FieldSample(NamedTuple):
@@ -105,15 +94,15 @@ def sample(
     fields = []
     for field in message.fields:
         name = Code(python_names.field(field.name))
+        meaning = _meaning(field) if message.name.package == page.own else ""
+        comment = tuple(map(Text, textwrap.wrap(meaning, COMMENT)))
         nested = _nested(field, page)
         if field.name in values:
             fields.append(FieldSample(name, (), Code(values[field.name])))
         elif nested:
-            spelled_out = sample(nested, page)
-            fields.append(FieldSample(name, _comment(message, field, page), Code(), spelled_out))
+            fields.append(FieldSample(name, comment, Code(), sample(nested, page)))
         elif not _has_long_default(field):
-            value = Code(field_value(message, field, page))
-            fields.append(FieldSample(name, _comment(message, field, page), value))
+            fields.append(FieldSample(name, comment, Code(field_value(message, field, page))))
     return Sample(Code(page.use(message.name)), tuple(fields))
 
 
@@ -131,13 +120,10 @@ def logged(message: ir.Message, variable: str) -> Code:
     return Code(f"{{{variable}=}}")
 
 
-def _comment(message: ir.Message, field: ir.Field, page: Page) -> tuple[Text, ...]:
-    """Return the lines of the interface's comment on a field, if the package is the node's."""
-    if message.name.package != page.own:
-        return ()
-    text = " ".join(filter(None, (clean(line) for line in field.comment)))
-    unit = f"[{clean(field.unit)}]" if field.unit else ""
-    return tuple(map(Text, textwrap.wrap(" ".join(filter(None, (text, unit))), COMMENT)))
+def _meaning(field: ir.Field, fallback: str = "") -> str:
+    """Return the comment on a field, or other words, and its unit."""
+    text = " ".join(filter(None, map(clean, field.comment))) or fallback
+    return " ".join(filter(None, (text, f"[{clean(field.unit)}]" if field.unit else "")))
 
 
 def clean(text: str) -> str:
@@ -173,7 +159,9 @@ def field_value(message: ir.Message, field: ir.Field, page: Page) -> str:
         case ir.Sequence():
             return "[]"
         case ir.Array(element, size):
-            return _array(element, size, page)
+            item = _element(element, page, "")
+            is_message = isinstance(element, ir.Ref)
+            return f"[{item} for _ in range({size})]" if is_message else f"[{item}] * {size}"
         case ir.Ref(target) if target == _TIME and page.clock:
             return page.clock
     return _element(ir.element_of(field.type), page, field.name)
@@ -199,13 +187,6 @@ def _element(element: ir.Element, page: Page, name: str) -> str:
         case ir.Primitive(kind):
             return literal(element, False if kind == "bool" else 0)
     return "None"
-
-
-def _array(element: ir.Element, size: int, page: Page) -> str:
-    item = _element(element, page, "")
-    return (
-        f"[{item} for _ in range({size})]" if isinstance(element, ir.Ref) else f"[{item}] * {size}"
-    )
 
 
 def literal(type_: ir.FieldType, value: ir.Value) -> str:
@@ -234,54 +215,33 @@ class Argument(NamedTuple):
     words: tuple[Code, ...]
 
 
-def from_arguments(message: ir.Message, page: Page, prefix: str) -> Sample:
-    """Return a request whose fields come from the command line."""
-    fields = (field for field in message.fields if _type(field) is not None)
-    values = {field.name: f"options.{_destination(field, prefix)}" for field in fields}
-    return sample(message, page, values)
-
-
-def arguments(
+def request(
     message: ir.Message, page: Page, prefix: str, *, positional: bool
-) -> Iterator[Argument]:
-    """Yield the arguments for a request's fields."""
+) -> tuple[Sample, tuple[Argument, ...]]:
+    """Return a request whose fields come from the command line, and its arguments there."""
+    values, arguments = {}, []
     for field in message.fields:
         type_ = _type(field)
-        if type_ is not None:
-            yield _argument(message, field, type_, page, prefix, positional)
-
-
-def _argument(
-    message: ir.Message, field: ir.Field, type_: str, page: Page, prefix: str, positional: bool
-) -> Argument:
-    destination = _destination(field, prefix)
-    simple = isinstance(field.type, (ir.Primitive, ir.String))
-    name = "--" + destination.replace("_", "-")
-    words = []
-    if type_ == "bool":
-        words.append("action=argparse.BooleanOptionalAction")
-    else:
-        words.append(f"type={type_}")
-        if isinstance(field.type, ir.Array):
+        if type_ is None:
+            continue
+        destination: str = python_names.field(f"{prefix}{field.name}")
+        destination += "_" * (destination in _TAKEN)
+        values[field.name] = f"options.{destination}"
+        name, words = "--" + destination.replace("_", "-"), [f"type={type_}"]
+        if type_ == "bool":
+            words = ["action=argparse.BooleanOptionalAction"]
+        elif isinstance(field.type, ir.Array):
             words.append(f"nargs={field.type.size}")
-        elif not simple:
+        elif not isinstance(field.type, (ir.Primitive, ir.String)):
             words.append("nargs='*'")
         elif positional:
             name = destination
             words.append("nargs='?'")
-    text = textwrap.shorten(_help(field), HELP_WIDTH, placeholder=" ...").replace("%", "%%")
-    words += [f"default={field_value(message, field, page)}", f"help={text!r}"]
-    return Argument(Code(repr(name)), tuple(map(Code, words)))
-
-
-def _help(field: ir.Field) -> str:
-    text = " ".join(filter(None, map(clean, field.comment))) or field.name.replace("_", " ")
-    return f"{text} [{clean(field.unit)}]" if field.unit else text
-
-
-def _destination(field: ir.Field, prefix: str) -> str:
-    name = python_names.field(f"{prefix}{field.name}")
-    return f"{name}_" if name in _TAKEN else name
+        text = _meaning(field, field.name.replace("_", " "))
+        text = textwrap.shorten(text, HELP_WIDTH, placeholder=" ...").replace("%", "%%")
+        words += [f"default={field_value(message, field, page)}", f"help={text!r}"]
+        arguments.append(Argument(Code(repr(name)), tuple(map(Code, words))))
+    return sample(message, page, values), tuple(arguments)
 
 
 def _type(field: ir.Field) -> str | None:

@@ -119,25 +119,6 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
     return value
 
 
-def words(endpoints: Iterable[Endpoint]) -> list[str]:
-    """Return a word for each endpoint, different ones within a family."""
-    seen: set[tuple[str, str]] = set()
-    chosen = []
-    for endpoint in endpoints:
-        family, word, count = endpoint.role.family, endpoint.word, 1
-        while (family, word) in seen:
-            count += 1
-            word = f"{endpoint.word}_{count}"
-        seen.add((family, word))
-        chosen.append(word)
-    return chosen
-
-
-def class_name(name: str) -> str:
-    """Return the class of a node: `command_publisher` is a CommandPublisher."""
-    return "".join(part.capitalize() for part in name.split("_"))
-
-
 class Placed(NamedTuple):
     """An endpoint with its interface, if its role has one, and a word for its names."""
 
@@ -191,6 +172,17 @@ def plan(
     interfaces: Iterable[ir.Interface | None],
     messages: Mapping[ir.TypeName, ir.Message],
 ) -> Plan:
-    """Return a node with the interfaces of its endpoints, in their order."""
-    placed = zip(node.endpoints, words(node.endpoints), interfaces, strict=True)
-    return Plan(node, tuple(Placed(*fields) for fields in placed), messages)
+    """Return a node with the interfaces of its endpoints, in their order.
+
+    Endpoints of one family have different words.
+    """
+    placed: list[Placed] = []
+    seen: set[tuple[str, str]] = set()
+    for endpoint, interface in zip(node.endpoints, interfaces, strict=True):
+        word, count = endpoint.word, 1
+        while (endpoint.role.family, word) in seen:
+            count += 1
+            word = f"{endpoint.word}_{count}"
+        seen.add((endpoint.role.family, word))
+        placed.append(Placed(endpoint, word, interface))
+    return Plan(node, tuple(placed), messages)

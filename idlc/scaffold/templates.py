@@ -6,9 +6,9 @@ A user's templates run in a sandbox: they may come with a repository, and must o
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from functools import cache, partial
-from types import TracebackType
+from collections.abc import Mapping
+from functools import cache
+from traceback import walk_tb
 
 import jinja2
 from jinja2.exceptions import SecurityError
@@ -77,9 +77,8 @@ class Templates:
         for name, source in self._sources.items():
             if name not in names() and not name.rpartition("/")[2].startswith("_"):
                 message = f"there is no template `{name}` to replace"
-                hint = did_you_mean(name, names()) or (
-                    "begin its name with `_` if only other templates include it"
-                )
+                hint = "begin its name with `_` if only other templates include it"
+                hint = did_you_mean(name, names()) or hint
                 report.add(BROKEN_TEMPLATE.of(source.path, message, hint=hint))
                 continue
             try:
@@ -89,29 +88,18 @@ class Templates:
 
     def _problem(self, error: Exception, name: str) -> Diagnostic:
         """Return the problem of a template that could not be rendered, at the user's line."""
-        place = self._place(error)
-        if place:
-            return BROKEN_TEMPLATE.at(_line(*place), _message(error))
+        by_path = {source.path: source for source in self._sources.values()}
+        steps = ((frame.f_code.co_filename, line) for frame, line in walk_tb(error.__traceback__))
+        places = [(by_path[path], line) for path, line in steps if path in by_path]
+        if isinstance(error, jinja2.TemplateSyntaxError) and (error.name or "") in self._sources:
+            places = [(self._sources[error.name or ""], error.lineno)]
+        if places:
+            return BROKEN_TEMPLATE.at(_line(*places[-1]), _message(error))
         folder = name.partition("/")[0]
         near = [source for key, source in self._sources.items() if key.startswith(f"{folder}/")]
         replaced = self._sources.get(name) or next(iter([*near, *self._sources.values()]))
         detail = (error.text or "").rstrip() if isinstance(error, SyntaxError) else ""
         return BROKEN_TEMPLATE.of(replaced.path, _message(error), detail=detail)
-
-    def _place(self, error: Exception) -> tuple[Source, int] | None:
-        """Return the user's template and the line that an error comes from."""
-        if isinstance(error, jinja2.TemplateSyntaxError) and (error.name or "") in self._sources:
-            return self._sources[error.name or ""], error.lineno
-        by_path = {source.path: source for source in self._sources.values()}
-        places = [(by_path[path], line) for path, line in _steps(error) if path in by_path]
-        return places[-1] if places else None
-
-
-def _steps(error: Exception) -> Iterator[tuple[str, int]]:
-    traceback: TracebackType | None = error.__traceback__
-    while traceback is not None:
-        yield traceback.tb_frame.f_code.co_filename, traceback.tb_lineno
-        traceback = traceback.tb_next
 
 
 def _message(error: Exception) -> str:
@@ -139,22 +127,21 @@ def _line(source: Source, number: int) -> Span:
 
 def _sandbox(sources: Mapping[str, Source]) -> jinja2.Environment:
     """Return a sandboxed environment with the settings of idlc's own."""
+
+    def load(name: str) -> tuple[str, str, None] | None:
+        source = sources.get(name)
+        return (source.text, source.path, None) if source else None  # tracebacks name the path
+
     own = code()
     assert own.loader is not None
     environment = _Sandbox(
-        loader=jinja2.ChoiceLoader([jinja2.FunctionLoader(partial(_load, sources)), own.loader]),
+        loader=jinja2.ChoiceLoader([jinja2.FunctionLoader(load), own.loader]),
         undefined=own.undefined,
         trim_blocks=own.trim_blocks,
         lstrip_blocks=own.lstrip_blocks,
         keep_trailing_newline=own.keep_trailing_newline,
     )
     return place_only_code(environment)
-
-
-def _load(sources: Mapping[str, Source], name: str) -> tuple[str, str, None] | None:
-    """Return a template's text and the path by which tracebacks name it."""
-    source = sources.get(name)
-    return (source.text, source.path, None) if source else None
 
 
 def read(folder: str, root: Root, report: Report) -> dict[str, Source]:

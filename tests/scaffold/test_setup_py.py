@@ -119,6 +119,7 @@ def test_line_ends_stay():
         ("setup(entry_points={'console_scripts': [f'{n} = d.{n}:main' for n in NODES]})", "list"),
         ("setup(entry_points=points())", "dictionary"),
         ("setup(**metadata)", r"\*\*"),
+        ("KEY = 'url'\nsetup(**{KEY: 'x'})", r"\*\*"),
         ("setup(entry_points={**OTHER})", r"\*\*"),
         ("P = {}\nP = {'console_scripts': []}\nsetup(entry_points=P)", "exactly one place"),
         ("setup(name='a')\nsetup(name='b')", "2 calls"),

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.project import lock
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import load_lock
+from idlc.project.lock import FILE, load_lock
 from idlc.project.package_xml import Facts, GeneratedOutput, statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
@@ -40,16 +39,20 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         return None
     folder = path.parent
     files = list(_files(folder))
-    locks = {
-        file: record
-        for file in files
-        if file.name == lock.FILE and (record := load_lock(file.parent, "", Report()))
-    }
+    records = {file: load_lock(file.parent, "", Report()) for file in files if file.name == FILE}
+    locks = {file: record for file, record in records.items() if record}
     interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
     checked = {entry.file.path.resolve() for entry in package.files}
-    generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
+    generated = {at.parent / path for at, record in locks.items() for path in record.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
-    modules = dict(_modules(folder, files, generated, root))
+    commands = calls(cmake) if cmake else ()
+    generating = [command for command in commands if command.name == GENERATE]
+    modules = {}  # nodes may be in the folder of generated classes
+    for file in files:
+        parts = file.relative_to(folder).parts
+        is_code = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
+        if is_code and file not in generated and (module := _optional(file, root)):
+            modules[".".join((*parts[:-1], file.stem))] = module
     return Facts(
         name=package.package,
         manifest=source,
@@ -60,11 +63,8 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         setup_cfg=_optional(folder / "setup.cfg", root),
         pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
-        generates=any(
-            # other interfaces are for tests of the package's own
-            command.name == GENERATE and "SKIP_INSTALL" not in command.words
-            for command in (calls(cmake) if cmake else ())
-        ),
+        # other interfaces are for tests of the package's own
+        generates=any("SKIP_INSTALL" not in command.words for command in generating),
         native=any(file.suffix in _NATIVE for file in files),
         whole=bool(checked) and checked.issuperset(file.resolve() for file in interfaces),
         marker=(folder / "resource" / package.package).is_file(),
@@ -77,24 +77,30 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
             for entry in package.files
             if (place := root.absolute(entry.file.path)).is_relative_to(folder)
         },
-        folders=_by_name(folder, files),
+        folders=folders(folder, files),
         available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
     )
 
 
-def folders(folder: Path) -> dict[str, bool]:
+def folders(folder: Path, files: Iterable[Path] | None = None) -> dict[str, bool]:
     """Return the folders with files, by dotted name, and whether each is a Python package."""
-    return _by_name(folder, _files(folder))
+    is_package: dict[str, bool] = {}
+    for file in _files(folder) if files is None else files:
+        parts = file.relative_to(folder).parts[:-1]
+        for end in range(1, len(parts) + 1):
+            is_package.setdefault(".".join(parts[:end]), False)
+        if file.name == "__init__.py" and parts:
+            is_package[".".join(parts)] = True
+    return is_package
 
 
 def home_of(folder: Path, package: str, root: Root) -> Path:
     """Return the folder from which setup.py takes a package, or an earlier `idlc gen`'s."""
     homes = (folder / package, folder / "src" / package)
     for home in homes:
-        if (home / lock.FILE).is_file():
+        if (home / FILE).is_file():
             return home
-    files = (_optional(folder / name, root) for name in _SETUP_FILES)
-    setup, cfg, pyproject = files
+    setup, cfg, pyproject = (_optional(folder / name, root) for name in _SETUP_FILES)
     if setup is not None:
         from idlc.check.package.python_packages import layout
         from idlc.check.package.setup_py import Setup
@@ -104,17 +110,6 @@ def home_of(folder: Path, package: str, root: Root) -> Path:
         if view is not None:
             return folder / view.folder(package)
     return homes[not homes[0].is_dir() and homes[1].is_dir()]
-
-
-def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
-    is_package: dict[str, bool] = {}
-    for file in files:
-        parts = file.relative_to(folder).parts[:-1]
-        for end in range(1, len(parts) + 1):
-            is_package.setdefault(".".join(parts[:end]), False)
-        if file.name == "__init__.py" and parts:
-            is_package[".".join(parts)] = True
-    return is_package
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -130,20 +125,6 @@ def _files(folder: Path) -> Iterator[Path]:
         for name in sorted(names):
             if name[0] != "." and name not in SKIPPED and (file := current / name).is_file():
                 yield file
-
-
-def _modules(
-    folder: Path, files: Iterable[Path], generated: Container[Path], root: Root
-) -> Iterator[tuple[str, Source]]:
-    """Yield a package's own Python files by their dotted names, without tests and the like.
-
-    Nodes may be in the folder of generated classes.
-    """
-    for file in files:
-        parts = file.relative_to(folder).parts
-        ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if ours and file not in generated and (source := _optional(file, root)):
-            yield ".".join((*parts[:-1], file.stem)), source
 
 
 def _optional(path: Path, root: Root) -> Source | None:

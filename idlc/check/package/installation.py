@@ -9,14 +9,8 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import NamedTuple
 
+from idlc.check.package import setup_edits
 from idlc.check.package.python_packages import Layout, layout
-from idlc.check.package.setup_edits import (
-    append_elements,
-    argument,
-    imported,
-    quote_of,
-    unusable_entry,
-)
 from idlc.check.package.setup_py import DataFiles, Setup, defines, range_of, span_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
@@ -48,8 +42,8 @@ class _Package(NamedTuple):
 
 def _built_by_setup(facts: Facts) -> Setup | None:
     """Return the parsed setup.py, if it builds the package."""
-    is_python = facts.setup_py is not None and facts.build_type == "ament_python"
-    return _read(facts.setup_py) if facts.setup_py is not None and is_python else None
+    is_python = facts.build_type == "ament_python"
+    return _read(facts.setup_py) if facts.setup_py and is_python else None
 
 
 def check_setup(
@@ -71,7 +65,7 @@ def check_setup(
     kinds = sorted({key.split("/")[0] for key in keys})
     mine = _Package(read, package, kinds, folders, runtime)
     report.extend(_missing_interfaces(mine, keys))
-    report.extend(unusable_entry(read, package))
+    report.extend(setup_edits.unusable_entry(read, package))
     view = layout(read, *(others or (None, None)), folders)
     if view and (others or "packages" in read.arguments):
         report.extend(_missing_packages(mine, view))
@@ -106,25 +100,21 @@ def _missing_interfaces(package: _Package, keys: Mapping[str, str]) -> Iterator[
         return
     subjects = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
     subjects += ["the index entry of the interfaces"] if index else []
-    patterns = sorted({_pattern(key, file) for key, file in keys.items()})
+    patterns = set()
+    for key, file in keys.items():
+        folder, kind = file.rpartition("/")[0], key.split("/")[0]
+        is_plain = re.fullmatch(r"[\w./ -]+", folder)  # it becomes part of a program
+        patterns.add(f"{folder if is_plain else kind}/*.{kind}")
     lines = [
         f"('{share}/{kind}', glob('{pattern}'))"
         for kind in missing
-        for pattern in patterns
+        for pattern in sorted(patterns)
         if pattern.endswith(f".{kind}")
     ]
     if index:
         lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
     message = f"{enumerated(subjects)} {'are' if missing else 'is'} not among the `data_files`"
     yield _data_files_problem(codes.INTERFACES_NOT_INSTALLED, message, setup, lines, uses_glob=True)
-
-
-def _pattern(key: str, file: str) -> str:
-    """Return the pattern for all interface files of one kind and folder."""
-    folder, kind = file.rpartition("/")[0], key.split("/")[0]
-    if not re.fullmatch(r"[\w./ -]+", folder):  # it becomes part of a program
-        folder = kind
-    return f"{folder}/*.{kind}"
 
 
 def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind: str = "") -> bool:
@@ -144,14 +134,14 @@ def _data_files_problem(
     code: codes.Code, message: str, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
 ) -> Diagnostic:
     """Return a problem with the hint and the edits that add entries to `data_files`."""
-    glob, imports = imported(setup, "glob", "glob") if uses_glob else ("glob", ())
+    glob, imports = setup_edits.imported(setup, "glob", "glob") if uses_glob else ("glob", ())
     new = [line.replace("glob(", f"{glob}(") for line in lines]
     listed = setup.list_of("data_files")
     edits: tuple[Edit, ...] = ()
     if listed is not None:
-        edits = append_elements(setup.source, listed, new)
+        edits = setup_edits.append_elements(setup.source, listed, new)
     elif "data_files" not in setup.arguments and uses_glob:  # one problem adds the argument
-        edits = argument(setup, f"data_files=[{', '.join(new)}]")
+        edits = setup_edits.argument(setup, f"data_files=[{', '.join(new)}]")
     text = enumerated([f"`{line}`" for line in new])
     also = ", with `from glob import glob`" if imports else ""
     return code.at(
@@ -200,10 +190,8 @@ def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
         name = setup.text(item.node) if item.is_element else None
         if not name or name.replace("/", ".") in existing:
             continue
-        is_made = name in generated or (
-            support not in existing and f"{name}.".startswith(f"{support}.")
-        )
-        if not (package.kinds and is_made):  # or the build creates it
+        is_support = support not in existing and f"{name}.".startswith(f"{support}.")
+        if not (package.kinds and (is_support or name in generated)):  # or the build creates it
             message = f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`"
             yield _packages_problem(span_of(setup.source, item.node), message, package, view)
 
@@ -214,44 +202,38 @@ def _packages_problem(place: Span, message: str, package: _Package, view: Layout
     root = view.roots.get("", "")
     where = f"'{root}', " if root not in ("", ".") else ""
     if place.source is not setup.source:
-        return code.at(place, message, hint=_config_hint(place, view, root))
-    find, imports = imported(setup, "setuptools", "find_packages")
+        if view.installed and view.installed.finders:
+            hint = "make its `where`, `include` and `exclude` match these packages"
+        elif place.source.path.endswith(".toml"):
+            folders = f'["{root or "."}"]'
+            hint = f"write `packages.find = {{ where = {folders} }}` in [tool.setuptools]"
+        else:
+            also = f", and `where = {root}` in [options.packages.find]" if root else ""
+            hint = f"write `packages = find:`{also}"
+        return code.at(place, message, hint=hint)
+    find, imports = setup_edits.imported(setup, "setuptools", "find_packages")
     call = f"{find}({where}exclude=['test'])"
     hint = f"write `packages={call}`"
     listed = setup.list_of("packages")
     target = setup.value(setup.arguments.get("packages"))
-    items = setup.items(setup.arguments.get("packages"))
-    names = [setup.text(item.node) for item in items if item.is_element]
+    names = setup.texts(setup.arguments.get("packages"))
+    is_own = all(name and name.partition(".")[0] == package.name for name in names)
     existing = view.packages(package.folders)
     tops = {name for name, has_init in existing.items() if has_init and "." not in name}
-    is_own = len(names) == len(items) and all(
-        name and name.partition(".")[0] == package.name for name in names
-    )
     edits: tuple[Edit, ...] = ()
     if "packages" not in setup.arguments:
-        edits = argument(setup, f"packages={call}")
+        edits = setup_edits.argument(setup, f"packages={call}")
     elif view.roots.keys() <= {""} and target is not None:
         if (is_own or listed is None) and tops <= {package.name, "test"}:
-            text = call.replace("'", quote_of(setup.source, target))
+            text = call.replace("'", setup_edits.quote_of(setup.source, target))
             edits = (Edit(Span(setup.source, *range_of(setup.source, target)), text),)
         elif listed is not None:
             own = f"*{find}({where}include=['{package.name}', '{package.name}.*'])"
-            edits = append_elements(setup.source, listed, [own])
+            edits = setup_edits.append_elements(setup.source, listed, [own])
             hint = f"add `{own}` to `packages`"
     hint += ", with `from setuptools import find_packages`" if imports else ""
     hint += "; --fix does" if edits else ""
     return code.at(place, message, hint=hint, edits=(*imports, *edits) if edits else ())
-
-
-def _config_hint(place: Span, view: Layout, root: str) -> str:
-    """Return the hint for packages that setup.cfg or pyproject.toml lists."""
-    if view.installed and view.installed.finders:
-        return "make its `where`, `include` and `exclude` match these packages"
-    if place.source.path.endswith(".toml"):
-        where = f'["{root or "."}"]'
-        return f"write `packages.find = {{ where = {where} }}` in [tool.setuptools]"
-    also = f", and `where = {root}` in [options.packages.find]" if root else ""
-    return f"write `packages = find:`{also}"
 
 
 def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
@@ -278,36 +260,29 @@ def entry_points(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     setup = _read(facts.setup_py)
     view = _layout(facts, setup)
     elsewhere = view is None or bool(view.roots) or "py_modules" in setup.arguments
+    tops = {name.partition(".")[0] for name in facts.modules}
     for text, node in setup.scripts:
-        problem = _problem(text, facts, elsewhere=elsewhere)
-        if problem:
-            place = span_of(facts.setup_py, node)
-            yield codes.BAD_ENTRY_POINT.at(place, problem[0], hint=problem[1])
-
-
-def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | None:
-    """Return the problem of an entry point, and a hint.
-
-    `elsewhere`: modules may be in folders that were not searched.
-    """
-    script, equals, target = text.partition("=")
-    module, colon, function = (part.strip() for part in target.partition(":"))
-    if not equals or not colon or not function:
-        message = f"`{text}` is not an entry point"
-        return message, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
-    if elsewhere:
-        return None
-    if module.partition(".")[0] not in {name.partition(".")[0] for name in facts.modules}:
-        return (
-            f"there is no Python package `{module.partition('.')[0]}` here",
-            f"it is `{facts.name}` by the package.xml",
-        )
-    source = facts.modules.get(module) or facts.modules.get(f"{module}.__init__")
-    if source is None:
-        return f"there is no module `{module}`", "name the file that holds the function"
-    if not defines(source, function.partition(".")[0]):
-        return f"`{source.path}` has no `{function}`", f"define it: `def {function}() -> None:`"
-    return None
+        script, equals, target = text.partition("=")
+        module, colon, function = (part.strip() for part in target.partition(":"))
+        top = module.partition(".")[0]
+        source = facts.modules.get(module) or facts.modules.get(f"{module}.__init__")
+        if not equals or not colon or not function:
+            message = f"`{text}` is not an entry point"
+            hint = f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
+        elif elsewhere:  # modules may be in folders that were not searched
+            continue
+        elif top not in tops:
+            message = f"there is no Python package `{top}` here"
+            hint = f"it is `{facts.name}` by the package.xml"
+        elif source is None:
+            message = f"there is no module `{module}`"
+            hint = "name the file that holds the function"
+        elif not defines(source, function.partition(".")[0]):
+            message = f"`{source.path}` has no `{function}`"
+            hint = f"define it: `def {function}() -> None:`"
+        else:
+            continue
+        yield codes.BAD_ENTRY_POINT.at(span_of(facts.setup_py, node), message, hint=hint)
 
 
 def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
@@ -338,11 +313,14 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     for output in facts.outputs:
         if output.package != facts.name or not facts.whole:
             continue
-        changed = [
-            f"`{name}` {_changed(output.inputs.get(name), facts.inputs.get(name))}"
-            for name in sorted(output.inputs.keys() | facts.inputs.keys())
-            if output.inputs.get(name) != facts.inputs.get(name)
-        ]
+        changed = []
+        for name in sorted(output.inputs.keys() | facts.inputs.keys()):
+            before, now = output.inputs.get(name), facts.inputs.get(name)
+            if before != now:
+                what = (
+                    "was added" if before is None else "was removed" if now is None else "changed"
+                )
+                changed.append(f"`{name}` {what}")
         if changed:
             folder = facts.manifest.path.rpartition("/")[0] or "."
             words = ("gen", folder, "-o", output.path.rpartition("/")[0])
@@ -351,7 +329,3 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
                 f"the generated code is out of date: {first_few(changed, 3)}",
                 hint=f"run `idlc {shlex.join(words)}`",
             )
-
-
-def _changed(before: str | None, now: str | None) -> str:
-    return "was added" if before is None else "was removed" if now is None else "changed"

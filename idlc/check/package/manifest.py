@@ -27,11 +27,22 @@ _RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
 def declared_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """Packages whose messages are used are declared."""
     seen = _may_use(facts)
+    existing = _packages_with_interfaces(model) | facts.available
+    declared = facts.declared(*_NEEDED)
+    unknown = [name for name in declared if name not in existing]
     for package, span in used_packages(model).items():
-        if package not in seen:
-            message = f"`{facts.manifest.path}` does not declare `{package}`"
-            hint, labels, edits = _declaration_of(package, facts, model)
-            yield codes.MISSING_DEPENDENCY.at(span, message, hint=hint, labels=labels, edits=edits)
+        if package in seen:
+            continue
+        labels: tuple[Label, ...] = ()
+        hint, edits = f"add `<depend>{package}</depend>`", _additions(facts, ("depend", package))
+        misspelt = next((name for name in unknown if closest_package(name, [package])), None)
+        if misspelt:
+            tag = declared[misspelt].tag
+            line = f"<{tag}>{package}</{tag}>"
+            hint = f"write `{line}` in place of `{misspelt}`, which is not known here"
+            labels, edits = (Label(declared[misspelt].span, "misspelt?"),), ()
+        message = f"`{facts.manifest.path}` does not declare `{package}`"
+        yield codes.MISSING_DEPENDENCY.at(span, message, hint=hint, labels=labels, edits=edits)
 
 
 def used_packages(model: Model) -> dict[str, Span]:
@@ -47,19 +58,6 @@ def used_packages(model: Model) -> dict[str, Span]:
 def _packages_with_interfaces(model: Model) -> set[str]:
     """Return the packages with interfaces."""
     return {name.package for name in model.interfaces} | {*catalog.packages(model.distro)}
-
-
-def _declaration_of(
-    package: str, facts: Facts, model: Model
-) -> tuple[str, tuple[Label, ...], tuple[Edit, ...]]:
-    """Return the hint and the edit that declare a package, or the misspelt declaration."""
-    existing = _packages_with_interfaces(model) | facts.available
-    for name, statement in facts.declared(*_NEEDED).items():
-        if name not in existing and closest_package(name, [package]):
-            line = f"<{statement.tag}>{package}</{statement.tag}>"
-            hint = f"write `{line}` in place of `{name}`, which is not known here"
-            return hint, (Label(statement.span, "misspelt?"),), ()
-    return f"add `<depend>{package}</depend>`", (), _additions(facts, ("depend", package))
 
 
 def _may_use(facts: Facts) -> set[str]:
@@ -138,12 +136,6 @@ def generators(facts: Facts, model: Model) -> Iterator[Diagnostic]:
         )
 
 
-def needs_runtime(facts: Facts) -> bool:
-    """Return whether the classes import idlc-runtime, and no file of the package names it."""
-    files = (facts.setup_py, facts.setup_cfg, facts.pyproject, facts.manifest)
-    return facts.runtime == "installed" and not names_runtime(file.text for file in files if file)
-
-
 def names_runtime(texts: Iterable[str]) -> bool:
     """Return whether one of some texts, such as requirements, names the distribution."""
     return any(map(re.compile(r"\bidlc[-_.]runtime\b", re.IGNORECASE).search, texts))
@@ -151,7 +143,8 @@ def names_runtime(texts: Iterable[str]) -> bool:
 
 def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """What the nodes and the generated classes import is declared."""
-    if needs_runtime(facts):
+    files = (facts.setup_py, facts.setup_cfg, facts.pyproject, facts.manifest)
+    if facts.runtime == "installed" and not names_runtime(file.text for file in files if file):
         place = facts.setup_py or facts.pyproject or facts.manifest
         setting = "install_requires" if place is facts.setup_py else "dependencies"
         yield codes.UNDECLARED_IMPORT.at(
@@ -223,20 +216,17 @@ def listed_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     if len(generating) != 1:
         return
     (call,) = generating
-    lists = {
-        command.words[0]: command for command in commands if command.name == "set" and command.words
-    }
-    others = {
-        command.words[1]
-        for command in commands
-        if command.name == "list" and len(command.words) > 1
-    }
-    first, end = _dependencies(call)
+    sets = [command for command in commands if command.name == "set" and command.words]
+    lists = {command.words[0]: command for command in sets}
+    grown = [command.words[1:2] for command in commands if command.name == "list"]
+    count = len(call.words)
+    first = call.words.index(_KEYWORD) + 1 if _KEYWORD in call.words else count
+    end = next((at for at in range(first, count) if call.words[at] in _OPTIONS), count)
     words = call.words[first:end]
     named = [variable[1] for word in words if (variable := _VARIABLE.fullmatch(word))]
     seen = {word for word in words if word.isidentifier()}
     for name in named:
-        if name not in lists or name in others:
+        if name not in lists or (name,) in grown:
             return  # computed
         seen |= {*lists[name].words[1:]}
     if any("$" in word for word in seen) or len(seen) < len(words) - len(named):
@@ -254,13 +244,6 @@ def listed_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
                     *_find_package_edits(commands, package),
                 ),
             )
-
-
-def _dependencies(call: Call) -> tuple[int, int]:
-    """Return the range of a call's words that are its dependencies."""
-    count = len(call.words)
-    first = call.words.index(_KEYWORD) + 1 if _KEYWORD in call.words else count
-    return first, next((at for at in range(first, count) if call.words[at] in _OPTIONS), count)
 
 
 def dependency_edit(target: Call, package: str, *, listed: bool) -> Edit:
@@ -281,9 +264,8 @@ def dependency_edit(target: Call, package: str, *, listed: bool) -> Edit:
 def _find_package_edits(commands: list[Call], package: str) -> tuple[Edit, ...]:
     """Return the edit that finds a package, unless a loop or a command does so."""
     finding = [command for command in commands if command.name == "find_package" and command.words]
-    if not finding or any(
-        command.words[0] == package or "$" in command.words[0] for command in finding
-    ):
+    names = {command.words[0] for command in finding}
+    if not names or package in names or "$" in "".join(names):
         return ()
     last = finding[-1].span
     text = last.source.text

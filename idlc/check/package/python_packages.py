@@ -131,8 +131,7 @@ def layout(
         return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
     tops = {name for name in folders if "." not in name} - _NOT_FOUND
     return Layout(
-        roots or {},
-        Installed(place, is_nothing=True) if len(tops) > 1 and not roots else None,
+        roots or {}, Installed(place, is_nothing=True) if len(tops) > 1 and not roots else None
     )
 
 
@@ -174,9 +173,8 @@ def _finder(setup: Setup, node: ast.expr) -> Finder | None:
     where = setup.text(arguments["where"]) if "where" in arguments else "."
     chosen = []
     for name in ("include", "exclude"):
-        items = setup.items(arguments.get(name))
-        texts = [setup.text(item.node) for item in items]
-        if None in texts or not all(item.is_element for item in items):
+        texts = setup.texts(arguments.get(name))
+        if None in texts:
             return None
         chosen.append(tuple(text for text in texts if text is not None))
     return None if where is None else Finder(where, *chosen)

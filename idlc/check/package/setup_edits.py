@@ -255,8 +255,18 @@ COMPILE = "compile_interfaces"
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
     """Yield the problem of a setup.py that registers a package without installing libraries."""
     index = [entry for entry in setup.data_files or () if "/packages" in (entry.folder or "")]
-    if index and not installs(setup):
-        edits = () if KEYWORD in setup.arguments else argument(setup, f"{KEYWORD}=True")
+    if not index:
+        return
+    asked = setup.arguments.get(KEYWORD)
+    # a statement that only calls the function drops its result
+    dropped = {id(node.value) for node in setup.nodes if isinstance(node, ast.Expr)}
+    calls = (node for node in setup.nodes if name_of_call(node) == COMPILE)
+    if asked is None:
+        installs = any(id(call) not in dropped for call in calls)
+    else:
+        installs = not isinstance(asked, ast.Constant) or bool(asked.value)
+    if not installs:
+        edits = () if asked else argument(setup, f"{KEYWORD}=True")
         yield codes.NO_LIBRARY_INSTALLED.at(
             span_of(setup.source, index[0].node),
             f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
@@ -264,13 +274,3 @@ def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
             hint=f"pass `{KEYWORD}=True` to setup()" + ("; --fix does" if edits else ""),
             edits=edits,
         )
-
-
-def installs(setup: Setup) -> bool:
-    """Return whether a setup.py has idlc install what it compiles."""
-    asked = setup.arguments.get(KEYWORD)
-    if asked is not None:
-        return not isinstance(asked, ast.Constant) or bool(asked.value)
-    # a statement that only calls the function drops its result
-    dropped = {id(node.value) for node in setup.nodes if isinstance(node, ast.Expr)}
-    return any(name_of_call(node) == COMPILE and id(node) not in dropped for node in setup.nodes)

@@ -10,7 +10,7 @@ import ast
 import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property, lru_cache
-from typing import NamedTuple, TypeGuard
+from typing import NamedTuple
 
 from idlc.diagnostics.source import Source, Span
 
@@ -31,10 +31,8 @@ def _lines(text: str) -> tuple[list[int], list[bytes]]:
     """Return the offsets of Python's lines, and these lines as bytes, which ast counts."""
     starts = [0, *(line_end.end() for line_end in re.finditer(r"\r\n?|\n", text))]
     ends = [*starts[1:], len(text)]
-    lines = [
-        text[start:end].encode("utf-8", "replace") for start, end in zip(starts, ends, strict=True)
-    ]
-    return starts, lines
+    ranges = zip(starts, ends, strict=True)
+    return starts, [text[start:end].encode("utf-8", "replace") for start, end in ranges]
 
 
 def range_of(source: Source, node: ast.AST) -> tuple[int, int]:
@@ -134,14 +132,16 @@ class Setup:
         self.calls = [*self.calls_of("setup")]
         self.call = self.calls[0] if len(self.calls) == 1 else None
         self.arguments: dict[str, ast.expr] = {}
+        self._texts: dict[str, str | None] = {}
+        self._lists: dict[str, list[Item]] = {}
         self.whole = self.call is not None and not self.call.args
         for keyword in self.call.keywords if self.call else ():
             if keyword.arg:
                 self.arguments[keyword.arg] = keyword.value
             elif not self._is_compiled(keyword.value):
-                self._spread(keyword.value)
-        self._texts: dict[str, str | None] = {}
-        self._lists: dict[str, list[Item]] = {}
+                items = self.pairs(keyword.value)
+                self.whole &= items is not None
+                self.arguments |= items or {}
 
     def calls_of(self, function: str) -> Iterator[ast.Call]:
         """Yield the calls of a function, by any name that it is imported as."""
@@ -156,13 +156,6 @@ class Setup:
         values = self._bound.get(node.id, []) if isinstance(node, ast.Name) else [node]
         return any(name_of_call(value) == "compile_interfaces" for value in values)
 
-    def _spread(self, node: ast.expr) -> None:
-        """Add the arguments in a dictionary literal."""
-        items = self.pairs(node)
-        if items is None:
-            self.whole = False
-        self.arguments |= items or {}
-
     @cached_property
     def _parents(self) -> dict[int, ast.AST]:
         return {id(child): node for node in self.nodes for child in ast.iter_child_nodes(node)}
@@ -174,14 +167,15 @@ class Setup:
         plain: dict[int, ast.expr] = {}
         added: set[int] = set()
         for node in self.nodes:
-            if isinstance(node, ast.AnnAssign) and node.value:
-                plain[id(node.target)] = node.value
-            elif isinstance(node, ast.Assign):
-                plain |= {id(target): node.value for target in node.targets}
-            elif isinstance(node, ast.AugAssign):
-                added.add(id(node.target))
-            elif _stores(node) and id(node) not in added:
-                bound.setdefault(node.id, []).append(plain.get(id(node)))
+            match node:
+                case ast.AnnAssign(target=target, value=ast.expr() as value):
+                    plain[id(target)] = value
+                case ast.Assign(targets=targets, value=value):
+                    plain |= {id(target): value for target in targets}
+                case ast.AugAssign(target=target):
+                    added.add(id(target))
+                case ast.Name(ctx=ast.Store() | ast.Del()) if id(node) not in added:
+                    bound.setdefault(node.id, []).append(plain.get(id(node)))
             for name in _names_bound(node):
                 bound.setdefault(name, []).append(None)
         return bound
@@ -216,15 +210,9 @@ class Setup:
             return isinstance(call, ast.Call) and _grows(call) == node.id
         if isinstance(parent, ast.Call):
             return name_of_call(parent) in ("glob", "join", "len", "sorted", "find_packages")
-        kinds = (
-            ast.keyword,
-            ast.BinOp,
-            ast.Starred,
-            ast.FormattedValue,
-            ast.Compare,
-            ast.AugAssign,
-        )
-        return isinstance(parent, (*kinds, ast.List, ast.Tuple, ast.Dict, ast.For))
+        operations = (ast.BinOp, ast.Compare, ast.AugAssign, ast.FormattedValue, ast.For)
+        displays = (ast.List, ast.Tuple, ast.Dict, ast.Starred, ast.keyword)
+        return isinstance(parent, (*operations, *displays))
 
     def value(self, node: ast.expr | None) -> ast.expr | None:
         """Return the value of a name that is assigned once; any other expression unchanged."""
@@ -315,6 +303,10 @@ class Setup:
                 break
         return items if len(items) <= _MOST else [Item(node, False)]
 
+    def texts(self, node: ast.expr | None) -> list[str | None]:
+        """Return the texts in a list, `None` for each part that is computed."""
+        return [self.text(item.node) if item.is_element else None for item in self.items(node)]
+
     def pairs(self, node: ast.expr | None) -> dict[str, ast.expr] | None:
         """Return the values of a dictionary by key, `None` if any of it is computed."""
         shared = isinstance(node, ast.Name) and node.id in self._shared
@@ -356,31 +348,30 @@ class Setup:
         items = self.items(self.arguments["data_files"])
         if not all(item.is_element for item in items):
             return None
-        return tuple(self._entry(item.node) for item in items)
-
-    def _entry(self, node: ast.expr) -> DataFiles:
-        value = self.value(node)
-        if isinstance(value, (ast.Tuple, ast.List)) and len(value.elts) == 2:
-            folder = self.text(value.elts[0])
-            return DataFiles(value.elts[0], folder, self._files(value.elts[1]))
-        return DataFiles(node, "" if self.text(node) is not None else None, None)
+        entries = []
+        for item in items:
+            match self.value(item.node):
+                case ast.Tuple(elts=[folder, files]) | ast.List(elts=[folder, files]):
+                    entries.append(DataFiles(folder, self.text(folder), self._files(files)))
+                case _:
+                    is_file = self.text(item.node) is not None
+                    entries.append(DataFiles(item.node, "" if is_file else None, None))
+        return tuple(entries)
 
     def _files(self, node: ast.expr) -> tuple[str, ...] | None:
         """Return the files and patterns in a list of data_files; `None` if some are computed."""
         files: list[str] = []
         for item in self.items(node):
             call = self.value(item.node)
-            if not item.is_element and isinstance(call, ast.Call) and call.args:
+            text, inner = None, None
+            if item.is_element:
+                text = self.text(item.node)
+            elif isinstance(call, ast.Call) and call.args:
                 if name_of_call(call) in ("sorted", "list"):
                     inner = self._files(call.args[0])
                 elif name_of_call(call) in ("glob", "iglob"):
-                    pattern = self.text(call.args[0])
-                    inner = None if pattern is None else (pattern,)
-                else:
-                    inner = None
-            else:
-                text = self.text(item.node) if item.is_element else None
-                inner = None if text is None else (text,)
+                    text = self.text(call.args[0])
+            inner = inner if text is None else (text,)
             if inner is None:
                 return None
             files += inner
@@ -405,14 +396,8 @@ def name_of_call(node: ast.AST | None) -> str:
 def _is_of_paths(function: ast.expr) -> bool:
     """Return whether a `join` is os.path's, and not the method of a text."""
     of = getattr(function, "value", None)
-    return isinstance(function, ast.Name) or "path" in (
-        getattr(of, "id", ""),
-        getattr(of, "attr", ""),
-    )
-
-
-def _stores(node: ast.AST) -> TypeGuard[ast.Name]:
-    return isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+    names = (getattr(of, "id", ""), getattr(of, "attr", ""))
+    return isinstance(function, ast.Name) or "path" in names
 
 
 def _grows(node: ast.Call) -> str:
@@ -425,13 +410,14 @@ def _grows(node: ast.Call) -> str:
 
 def _names_bound(node: ast.AST) -> Iterator[str]:
     """Yield the names that a definition, an import or a parameter binds."""
-    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
-        yield node.name
-    elif isinstance(node, ast.alias):
-        yield node.asname or node.name.partition(".")[0]
-    elif isinstance(node, ast.arg):
-        yield node.arg
-    elif isinstance(node, (ast.Global, ast.Nonlocal)):
-        yield from node.names
-    elif isinstance(node, ast.ExceptHandler) and node.name:
-        yield node.name
+    match node:
+        case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+            yield node.name
+        case ast.alias():
+            yield node.asname or node.name.partition(".")[0]
+        case ast.arg():
+            yield node.arg
+        case ast.Global() | ast.Nonlocal():
+            yield from node.names
+        case ast.ExceptHandler(name=str(name)):
+            yield name

@@ -7,16 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from idlc.check.package.setup_edits import (
-    WIDTH,
-    added_name,
-    append_element,
-    indent_of,
-    insertion,
-    is_spread,
-    margin_of,
-    quote_of,
-)
+from idlc.check.package import setup_edits
 from idlc.check.package.setup_py import Setup, parse, range_of
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source
@@ -39,18 +30,17 @@ class Started(NamedTuple):
         return "LifecycleNode" if self.lifecycle else "Node"
 
     @property
-    def words(self) -> dict[str, str]:
+    def arguments(self) -> list[str]:
         """The keyword arguments of the class."""
         words = {"package": self.package, "executable": self.executable, "output": "screen"}
         if self.lifecycle:  # these have no defaults
             words |= {"name": self.executable, "namespace": ""}
-        return words
+        return [f"{name}='{word}'" for name, word in words.items()]
 
     @property
     def line(self) -> str:
         """The line for a list of nodes."""
-        arguments = ", ".join(f"{name}='{word}'" for name, word in self.words.items())
-        return f"{self.action}({arguments}),"
+        return f"{self.action}({', '.join(self.arguments)}),"
 
 
 def add_node(text: str, node: Started) -> Outcome:
@@ -63,35 +53,25 @@ def add_node(text: str, node: Started) -> Outcome:
     file = Setup(Source("launch.py", text))
     for call in (*file.calls_of("Node"), *file.calls_of("LifecycleNode")):
         arguments = {passed.arg: file.text(passed.value) for passed in call.keywords}
-        if arguments.get("executable") == node.executable and arguments.get("package") in (
-            node.package,
-            None,
-        ):
+        is_same = arguments.get("executable") == node.executable
+        if is_same and arguments.get("package") in (node.package, None):
             return Edited(text)
     imported = _imported(file, node.action)
     if imported is None:
         return Refused(f"`{node.action}` is something else in this file", node.line, WHERE)
     called, imports = imported
-    descriptions = [*file.calls_of("LaunchDescription")]
-    edits = _in_description(file, descriptions[0], node, called) if len(descriptions) == 1 else ()
+    edits: tuple[Edit, ...] = ()
+    match [*file.calls_of("LaunchDescription")]:
+        case [ast.Call(args=[ast.List() as listed], keywords=[])]:
+            margin = setup_edits.margin_of(file.source, listed)
+            before = margin if setup_edits.is_spread(file.source, listed) else "    "
+            new = _call(called, node, margin, before, ",")
+            edits = setup_edits.append_element(file.source, listed, new)
+        case [ast.Call(args=[], keywords=[]) as description]:
+            edits = tuple(_additions(file, description, node, called))
     if not edits:
         return Refused("its nodes are not written out in one place", node.line, WHERE)
     return Edited(apply(text, (*imports, *edits))[0])
-
-
-def _in_description(
-    file: Setup, description: ast.Call, node: Started, called: str
-) -> tuple[Edit, ...]:
-    """Return the edits that add a node to a description; empty if that is not possible."""
-    match description:
-        case ast.Call(args=[ast.List() as listed], keywords=[]):
-            margin = margin_of(file.source, listed)
-            before = margin if is_spread(file.source, listed) else "    "
-            new = _call(called, node, margin, before, ",")
-            return append_element(file.source, listed, new)
-        case ast.Call(args=[], keywords=[]):
-            return tuple(_additions(file, description, node, called))
-    return ()
 
 
 def _additions(file: Setup, description: ast.Call, node: Started, called: str) -> Iterator[Edit]:
@@ -103,12 +83,14 @@ def _additions(file: Setup, description: ast.Call, node: Started, called: str) -
             ) if (last.end_lineno or 0) < end.lineno and any(
                 _names(statement, description, returned) for statement in function.body
             ):
-                margin = indent_of(file.source, range_of(file.source, end)[0])
+                margin = setup_edits.indent_of(file.source, range_of(file.source, end)[0])
                 nodes = next(file.calls_of("Node"), None)
-                quote = quote_of(file.source, nodes) if nodes else "'"
+                quote = setup_edits.quote_of(file.source, nodes) if nodes else "'"
                 before = f"{margin}{returned}.add_action("
                 new = _call(called, node, margin, before, ")").replace("'", quote)
-                yield insertion(file.source, _line_end(file.source, last), f"\n{before}{new})")
+                yield setup_edits.insertion(
+                    file.source, _line_end(file.source, last), f"\n{before}{new})"
+                )
 
 
 def _names(statement: ast.stmt, description: ast.Call, name: str) -> bool:
@@ -128,10 +110,9 @@ def _line_end(source: Source, node: ast.AST) -> int:
 
 def _call(function: str, node: Started, margin: str, before: str, tail: str) -> str:
     """Return the code that starts the node, which stands between others on its line."""
-    arguments = [f"{name}='{word}'" for name, word in node.words.items()]
-    line = f"{function}({', '.join(arguments)})"
-    if len(before + line + tail) > WIDTH:
-        lines = "".join(f"{margin}    {argument},\n" for argument in arguments)
+    line = f"{function}({', '.join(node.arguments)})"
+    if len(before + line + tail) > setup_edits.WIDTH:
+        lines = "".join(f"{margin}    {argument},\n" for argument in node.arguments)
         line = f"{function}(\n{lines}{margin})"
     return line
 
@@ -151,20 +132,16 @@ def _imported(file: Setup, action: str) -> tuple[str, tuple[Edit, ...]] | None:
                 return alias.asname or action, ()
             elif action == (alias.asname or alias.name):
                 return None
-    return action, (_import(file, imports, action),)
-
-
-def _import(file: Setup, imports: list[ast.Import | ast.ImportFrom], action: str) -> Edit:
-    """Return the edit that imports a class of launch_ros, after the other imports."""
     for statement in imports:
         if isinstance(statement, ast.ImportFrom) and statement.module == MODULE:
             code = file.source.text[slice(*range_of(file.source, statement))]
             if code[-1] not in "*)":
-                return added_name(file.source, statement, action)
+                return action, (setup_edits.added_name(file.source, statement, action),)
     new = f"from {MODULE} import {action}"
     if not imports:
-        return insertion(file.source, range_of(file.source, file.tree)[0], f"{new}\n")
+        start = range_of(file.source, file.tree)[0]
+        return action, (setup_edits.insertion(file.source, start, f"{new}\n"),)
     last: ast.stmt = imports[-1]
     for following in file.tree.body:
         last = following if following.lineno == last.end_lineno else last
-    return insertion(file.source, _line_end(file.source, last), f"\n{new}")
+    return action, (setup_edits.insertion(file.source, _line_end(file.source, last), f"\n{new}"),)

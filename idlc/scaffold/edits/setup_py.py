@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 from idlc.check.package.installation import check_setup
@@ -35,22 +35,16 @@ def _section(lines: list[str], name: str) -> tuple[int, int] | None:
     return None
 
 
-def add_entry(text: str, section: str, script: Script) -> Outcome:
-    """Return a text with `name = target` in a section of entries, which is made if need be."""
+def _add_entry(text: str, script: Script, *, in_section: bool) -> Outcome:
+    """Return a text of entries with one more, at its end or in a section, made if need be."""
     lines = text.splitlines(keepends=True)
-    body = _section(lines, section)
+    body = _section(lines, KEY) if in_section else (0, _last(lines))
     if body is not None:
         return _with_entry(lines, *body, script, _margin(lines[slice(*body)] or lines))
     if not lines:
-        return Edited(f"\n[{section}]\n{script.line}\n")
+        return Edited(f"\n[{KEY}]\n{script.line}\n")
     margin = _margin(lines)
-    return _inserted(lines, _last(lines), [f"{margin}[{section}]", f"{margin}{script.line}"])
-
-
-def add_line(text: str, script: Script) -> Outcome:
-    """Return a text of entries, one per line, with one more at its end."""
-    lines = text.splitlines(keepends=True)
-    return _with_entry(lines, 0, _last(lines), script, _margin(lines))
+    return _inserted(lines, _last(lines), [f"{margin}[{KEY}]", f"{margin}{script.line}"])
 
 
 def add_to_cfg(text: str, script: Script) -> Outcome:
@@ -162,7 +156,7 @@ def _in_entry_points(setup: Setup, node: ast.expr, script: Script) -> Change:
     """Return the edits of the value of `entry_points`."""
     value = setup.value(node)
     if isinstance(value, ast.Constant) and isinstance(value.value, str):
-        return _in_literal(setup, value, lambda body: add_entry(body, KEY, script))
+        return _in_literal(setup, value, script, in_section=True)
     if isinstance(value, ast.Dict):
         scripts = dict(zip(map(setup.text, value.keys), value.values, strict=True))
         if KEY not in scripts and None in value.keys:
@@ -202,7 +196,7 @@ def _in_scripts(setup: Setup, node: ast.expr, script: Script) -> Change:
         start, end = range_of(setup.source, value)
         literal = setup.source.text[start:end]
         if literal.endswith(("'''", '"""')):
-            return _in_literal(setup, value, lambda body: add_line(body, script))
+            return _in_literal(setup, value, script, in_section=False)
         name, target = split(value.value)
         if name == script.name:
             return already_taken(script, target, IN_SETUP).why
@@ -218,13 +212,13 @@ def _is_enclosed(source: Source, node: ast.List | ast.Tuple) -> bool:
     return source.text[start] in "[(" and parse(f"({inside}\n)") is not None
 
 
-def _in_literal(setup: Setup, value: ast.Constant, edit: Callable[[str], Outcome]) -> Change:
+def _in_literal(setup: Setup, value: ast.Constant, script: Script, *, in_section: bool) -> Change:
     """Return the edit of a text of several lines."""
     start, end = range_of(setup.source, value)
     literal = re.fullmatch(r"(?s)\w*('{3}|\"{3})(.*)\1", setup.source.text[start:end])
     if literal is None or re.sub(r"\r\n?", "\n", literal[2]) != value.value:
         return "the entry points are a text with escapes or on one line"
-    new = edit(literal[2])
+    new = _add_entry(literal[2], script, in_section=in_section)
     if isinstance(new, Refused):
         return new.why
     return (Edit(Span(setup.source, start + literal.start(2), end - 3), new.text),)
@@ -241,7 +235,7 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
 
     The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
     """
-    project = _table(files.get(PYPROJECT, ""), "project")
+    project = _project(files.get(PYPROJECT, ""))
     if isinstance(project, Refused):
         return PYPROJECT, project._replace(line=_line(script))
     dynamic = project.get("dynamic", ())
@@ -257,9 +251,9 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
     return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
 
 
-def _table(text: str, name: str) -> dict[str, Any] | Refused:
+def _project(text: str) -> dict[str, Any] | Refused:
     try:
-        table = toml(text).get(name, {})
+        table = toml(text).get("project", {})
     except ValueError:
         return Refused("this is not valid TOML", "", f"to [{TABLE}]")
     return table if isinstance(table, dict) else {}
@@ -282,12 +276,10 @@ def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome
         return refused._replace(why=why)
     lines = text.splitlines(keepends=True)
     section = _section(lines, TABLE)
-    if section:
-        edited = _inserted(lines, section[1], [_line(script)])
-    else:
-        edited = _inserted(lines, len(lines), ["", f"[{TABLE}]", _line(script)])
+    at, header = (section[1], []) if section else (len(lines), ["", f"[{TABLE}]"])
+    edited = _inserted(lines, at, [*header, _line(script)])
     expected = {**project, "scripts": {**scripts, script.name: script.target}}
-    return edited if _table(edited.text, "project") == expected else refused
+    return edited if _project(edited.text) == expected else refused
 
 
 WHERE = "to `data_files` in the call of setup()"
