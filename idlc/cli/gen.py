@@ -51,10 +51,7 @@ def _document(
     from idlc.cli import output
 
     if style != "json":
-        from idlc.check.run import CheckResult  # with its rules, which a run does without
-
-        folders = tuple(package.out for package in packages)
-        output.write_report(report, style, CheckResult(folders), sys.stdout, command="gen")
+        output.document(report, style, "gen", tuple(package.out for package in packages))
         return
     output.show(report, style, sys.stdout)
     for package in packages:

@@ -67,8 +67,6 @@ def _padded(text: str, width: int, column: int) -> str:
     return space + text if HEAD[column] == "messages" else text + space
 
 
-FORMATS = ("text", "json", "ros2idl", "jsonschema", "mcap")
-
 EPILOG = """\
 Example:
 
@@ -85,13 +83,9 @@ Example:
     shell_complete=completion.types_and_paths,
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
-@click.option(
-    "--format",
-    "style",
-    type=click.Choice(FORMATS),
-    default="text",
-    show_default=True,
-    help="For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
+@options.output_style(
+    ("text", "json", "ros2idl", "jsonschema", "mcap"),
+    "For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
 )
 @options.scoped(options.package, options.include, options.distro)
 def command(
