@@ -19,26 +19,23 @@ if TYPE_CHECKING:
     from idlc.project.find import Stamp
 
 
-def refuse(report: Report, style: str) -> None:
-    """Show problems that prevent a run."""
-    from idlc.cli import output
-
-    if style == "text":
-        output.show(report, style, sys.stderr)
-    else:
-        _document(report, style)
-
-
 def once(request: GenOptions, style: str) -> int:
     """Run once, show the outcome and return the exit status."""
     from idlc.cli import output
     from idlc.diagnostics.report import Report
+    from idlc.diagnostics.terminal import summary
     from idlc.generate.gen import gen
 
     report = Report()
     packages = gen(request, report)
     if style == "text":
-        _show_outcome(report, packages, request.check)
+        output.show(report, style, sys.stderr)
+        output.notes(report, sys.stderr)
+        if report.had_errors:
+            outcome = "" if request.check else "; nothing was written"
+            sys.stderr.write(f"{summary(report)}{outcome}\n")
+        else:
+            sys.stdout.writelines([_line(package, request.check) for package in packages])
     else:
         _document(report, style, packages, check=request.check)
     return output.status(report)
@@ -57,20 +54,6 @@ def _document(
     for package in packages:
         output.fact(sys.stdout, "package", **package._asdict(), check=check)
     output.fact(sys.stdout, "summary", **output.counts(report))
-
-
-def _show_outcome(report: Report, packages: Sequence[Generated], check: bool) -> None:
-    from idlc.cli import output
-    from idlc.diagnostics.terminal import summary
-
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    if report.had_errors:
-        outcome = "" if check else "; nothing was written"
-        sys.stderr.write(f"{summary(report)}{outcome}\n")
-    else:
-        for package in packages:
-            sys.stdout.write(_line(package, check))
 
 
 def _line(package: Generated, check: bool) -> str:
@@ -217,13 +200,18 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions, in_package, with_settings
+    from idlc.project.find import is_path
     from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
+    from idlc.recordings.find import split_recordings
 
     report = Report()
     settings = load_settings(Root.here(), report)
     if report.had_errors:
-        refuse(report, style)
+        if style == "text":
+            output.show(report, style, sys.stderr)
+        else:
+            _document(report, style)
         return output.status(report)
     package = arguments["package"]
     words = [arguments.pop(name) for name in ("package", "include", "exclude", "distro")]
@@ -234,7 +222,17 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if not request.paths or not (request.out or request.ament):
         missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
-    _refuse_useless(request, package)
+    root = request.scope.root
+    # which may have no effect on the paths
+    judged = request.paths if package or request.topics else ()
+    recordings, others = split_recordings(judged, root)
+    if request.topics and not recordings:
+        raise click.UsageError("--topic is for recordings, and none was given")
+    if package and not any(is_path(word, root) for word in others):
+        what = "what was recorded" if recordings else "what is installed"
+        raise click.UsageError(
+            f"--package is for files, and none was given; {what} keeps the name that messages have"
+        )
     if request.check and (watch or request.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
@@ -244,21 +242,3 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if watch:
         return run_again(request, style)
     return once(request, style)
-
-
-def _refuse_useless(request: GenOptions, package: str | None) -> None:
-    """Refuse options that have no effect on the paths."""
-    from idlc.project.find import is_path
-    from idlc.recordings.find import split_recordings
-
-    root = request.scope.root
-    recordings, others = (
-        split_recordings(request.paths, root) if package or request.topics else ((), ())
-    )
-    if request.topics and not recordings:
-        raise click.UsageError("--topic is for recordings, and none was given")
-    if package and not any(is_path(word, root) for word in others):
-        what = "what was recorded" if recordings else "what is installed"
-        raise click.UsageError(
-            f"--package is for files, and none was given; {what} keeps the name that messages have"
-        )

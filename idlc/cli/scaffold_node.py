@@ -113,30 +113,24 @@ class NodeCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Assign each quality of service to its endpoint, then parse as usual."""
         if not ctx.resilient_parsing:
+            names = {role.name for role in ROLES if role.kind}
+            counts: Counter[str] = Counter()
+            last: tuple[str, int] | None = None
+            owners = ctx.meta[_OWNERS] = []
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
-            ctx.meta[_OWNERS] = _owners([parameter.name or "" for parameter in order], ctx)
+            for name in (parameter.name or "" for parameter in order):
+                if name in names:
+                    last = (name, counts[name])
+                    counts[name] += 1
+                elif name == "qos":
+                    if last is None:
+                        raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
+                    owners.append(last)
         return super().parse_args(ctx, args)
 
 
 #: The key of the endpoints with a --qos in the context: for each, its role and its index.
 _OWNERS = "idlc.qos"
-
-
-def _owners(order: list[str], ctx: click.Context) -> list[tuple[str, int]]:
-    """Return the endpoint before each --qos; `order` names the options as typed."""
-    names = {role.name for role in ROLES if role.kind}
-    counts: Counter[str] = Counter()
-    last: tuple[str, int] | None = None
-    owners = []
-    for name in order:
-        if name in names:
-            last = (name, counts[name])
-            counts[name] += 1
-        elif name == "qos":
-            if last is None:
-                raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
-            owners.append(last)
-    return owners
 
 
 def _role_options(function: Any) -> Any:
@@ -178,10 +172,9 @@ def command(name: str, **arguments: Any) -> int:
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.scaffold import changes, new_node
-    from idlc.scaffold.changes import Settings
 
     shared = ("dry_run", "force", "include", "templates", "launch")
-    settings = Settings(Root.here(), **{key: arguments[key] for key in shared})
+    settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle")
     try:
         spec.check_name(name)
@@ -190,7 +183,14 @@ def command(name: str, **arguments: Any) -> int:
         else:
             owners = click.get_current_context().meta[_OWNERS]
             presets = dict(zip(owners, arguments["qos"], strict=True))
-            requested = _requested(name, arguments, presets)
+            endpoints = (
+                spec.endpoint(role, value, presets.get((role.name, n)))
+                for role in ROLES
+                for n, value in enumerate(arguments[role.name])
+            )
+            parameters = tuple(map(spec.parameter, arguments["parameters"]))
+            lifecycle = arguments["lifecycle"]
+            requested = spec.Node(name, "", tuple(endpoints), parameters, lifecycle)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
@@ -200,16 +200,3 @@ def command(name: str, **arguments: Any) -> int:
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)
     test = f"{python} -m pytest {folder}test/test_{name}.py"
     return finish(result, report, (*install, test))
-
-
-def _requested(
-    name: str, arguments: dict[str, Any], presets: dict[tuple[str, int], str]
-) -> spec.Node:
-    """Return the node that the command line describes."""
-    endpoints = (
-        spec.endpoint(role, value, presets.get((role.name, n)))
-        for role in ROLES
-        for n, value in enumerate(arguments[role.name])
-    )
-    parameters = tuple(map(spec.parameter, arguments["parameters"]))
-    return spec.Node(name, "", tuple(endpoints), parameters, arguments["lifecycle"])
