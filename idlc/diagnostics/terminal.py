@@ -96,9 +96,9 @@ def _line(diagnostic: Diagnostic, paint: Paint) -> str:
 
 def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
     """Yield a line for each reported code, the most frequent first."""
-    counts = Counter(diagnostic.code for diagnostic in diagnostics)
-    width = max(map(len, map(str, counts.values())), default=0)
-    for code, number in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
+    counts = Counter(sorted(diagnostic.code for diagnostic in diagnostics)).most_common()
+    width = len(str(counts[0][1])) if counts else 0
+    for code, number in counts:
         yield f"{number:>{width}}  {code} {CODES[code].slug}\n"
 
 
@@ -106,9 +106,11 @@ def _block(diagnostic: Diagnostic, paint: Paint) -> Iterator[str]:
     level = diagnostic.severity.name.lower()
     head = paint(level, f"{level}[{diagnostic.code}]")
     yield f"{head}{paint('bold', ': ' + one_line(_shortened(diagnostic.message)))}"
-    marks = _marks(diagnostic)
+    marks = [_mark(diagnostic.span, "^", "")] if diagnostic.span else []
+    if marks:
+        marks += [_mark(label.span, "-", label.text) for label in diagnostic.labels]
     margin = " " * max((len(str(mark.line)) for mark in marks), default=1)
-    if diagnostic.span:
+    if marks:
         yield from _snippets(marks, margin, paint)
     elif diagnostic.path:
         yield f"{margin}{paint('frame', '-->')} {one_line(diagnostic.path)}"
@@ -130,13 +132,6 @@ def _block(diagnostic: Diagnostic, paint: Paint) -> Iterator[str]:
 def _shortened(text: str) -> str:
     """Return a text without its middle if it is too long to read."""
     return text if len(text) <= TEXT_WIDTH else f"{text[: TEXT_WIDTH - 200]} … {text[-100:]}"
-
-
-def _marks(diagnostic: Diagnostic) -> list[_Mark]:
-    if not diagnostic.span:
-        return []
-    others = [_mark(label.span, "-", label.text) for label in diagnostic.labels]
-    return [_mark(diagnostic.span, "^", ""), *others]
 
 
 def _mark(span: Span, sign: str, label: str) -> _Mark:
@@ -211,25 +206,21 @@ def json_lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
     import json
 
     for diagnostic in diagnostics:
-        yield json.dumps(_facts(diagnostic)) + "\n"
-
-
-def _facts(diagnostic: Diagnostic) -> dict[str, object]:
-    return {
-        "type": "diagnostic",
-        "code": diagnostic.code,
-        "slug": CODES[diagnostic.code].slug,
-        "severity": diagnostic.severity.name.lower(),
-        "message": diagnostic.message,
-        **_range(diagnostic.span, diagnostic.path),
-        "hint": diagnostic.hint,
-        "detail": diagnostic.detail or None,
-        **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
-        **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
-        "labels": [
-            {"message": label.text, **_range(label.span, "")} for label in diagnostic.labels
-        ],
-    }
+        labels = diagnostic.labels
+        facts = {
+            "type": "diagnostic",
+            "code": diagnostic.code,
+            "slug": CODES[diagnostic.code].slug,
+            "severity": diagnostic.severity.name.lower(),
+            "message": diagnostic.message,
+            **_range(diagnostic.span, diagnostic.path),
+            "hint": diagnostic.hint,
+            "detail": diagnostic.detail or None,
+            **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
+            **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
+            "labels": [{"message": label.text, **_range(label.span, "")} for label in labels],
+        }
+        yield json.dumps(facts) + "\n"
 
 
 def _range(span: Span | None, path: str) -> dict[str, object]:
