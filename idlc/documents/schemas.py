@@ -40,19 +40,17 @@ def _structure(message: ir.Message) -> Json:
             }
             for constant in message.constants
         ],
-        "fields": [_field(field) for field in message.fields],
-    }
-
-
-def _field(field: ir.Field) -> Json:
-    default = {} if field.default is None else {"default": field.default.value}
-    return {
-        "name": field.name,
-        "type": spell(field.type),
-        "unit": field.unit,
-        "comment": list(field.comment),
-        **default,
-        **({"optional": True} if field.optional else {}),
+        "fields": [
+            {
+                "name": field.name,
+                "type": spell(field.type),
+                "unit": field.unit,
+                "comment": list(field.comment),
+                **({} if field.default is None else {"default": field.default.value}),
+                **({"optional": True} if field.optional else {}),
+            }
+            for field in message.fields
+        ],
     }
 
 
@@ -111,13 +109,8 @@ def _property(field: ir.Field) -> Json:
 def _value(type_: ir.FieldType) -> Json:
     match type_:
         case ir.Array():
-            size = type_.size
-            return {
-                "type": "array",
-                "items": _value(type_.element),
-                "minItems": size,
-                "maxItems": size,
-            }
+            limits = {"minItems": type_.size, "maxItems": type_.size}
+            return {"type": "array", "items": _value(type_.element), **limits}
         case ir.Sequence():
             most = {} if type_.bound is None else {"maxItems": type_.bound}
             return {"type": "array", "items": _value(type_.element), **most}

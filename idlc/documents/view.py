@@ -69,41 +69,47 @@ def picture(
     pages: Mapping[ir.TypeName, str],
 ) -> Picture | None:
     """Return the picture of an interface, `None` without neighbours."""
-    left, right = _cut(sorted(users), name.package), _cut(sorted(used), name.package)
-    if not left and not right:
+    left = _column(sorted(users), name.package, 1.0)
+    own = _column([name], name.package, left.end + (_BETWEEN if left.nodes else 0))
+    right = _column(sorted(used), name.package, own.end + _BETWEEN)
+    if not left.nodes and not right.nodes:
         return None
-    users_ = _column(left, 1.0)
-    own = _column([_Node(name, name.name)], users_.end + (_BETWEEN if left else 0))
-    used_ = _column(right, own.end + _BETWEEN)
-    columns = (users_, own, used_)
+    columns = (left, own, right)
     height = max(len(column.nodes) for column in columns) * (_HEIGHT + _GAP) + _GAP
     middle = height / 2
-    lines = [_line((users_.end, y), (own.start, middle)) for y, _ in _places(users_, height)]
-    lines += [_line((own.end, middle), (used_.start, y)) for y, _ in _places(used_, height)]
+    lines = [_line((left.end, y), (own.start, middle)) for y, _ in _places(left, height)]
+    lines += [_line((own.end, middle), (right.start, y)) for y, _ in _places(right, height)]
     others = {other: page for other, page in pages.items() if other != name}
     return Picture(
         f"what uses {name.name}, and what it uses",
-        f"{(used_ if right else own).end + 1:.0f}",
+        f"{(right if right.nodes else own).end + 1:.0f}",
         f"{height:.0f}",
         lines,
         [
-            _box(column, y, node, node.name == name, others)
+            Box(
+                x=f"{column.start:.0f}",
+                y=f"{y - _HEIGHT / 2:.0f}",
+                width=f"{column.width:.0f}",
+                height=str(_HEIGHT),
+                middle=f"{column.start + column.width / 2:.0f}",
+                baseline=f"{y + 4.5:.0f}",
+                text=node.text,
+                own=node.name == name,
+                page=others.get(node.name, "") if node.name else "",
+            )
             for column in columns
             for y, node in _places(column, height)
         ],
     )
 
 
-def _cut(names: list[ir.TypeName], package: str) -> list[_Node]:
-    shown = [
+def _column(names: list[ir.TypeName], package: str, start: float) -> _Column:
+    nodes = [
         _Node(name, name.name if name.package == package else f"{name.package}/{name.name}")
         for name in names[:_MOST]
     ]
-    rest = len(names) - _MOST
-    return [*shown, _Node(None, f"and {rest} more")] if rest > 0 else shown
-
-
-def _column(nodes: list[_Node], start: float) -> _Column:
+    if len(names) > _MOST:
+        nodes.append(_Node(None, f"and {len(names) - _MOST} more"))
     longest = max((len(node.text) for node in nodes), default=0)
     return _Column(nodes, start, longest * _CHARACTER + 24 if nodes else 0)
 
@@ -120,22 +126,6 @@ def _line(start: tuple[float, float], end: tuple[float, float]) -> str:
     return (
         f"M{start[0]:.0f},{start[1]:.0f} C{middle:.0f},{start[1]:.0f} "
         f"{middle:.0f},{end[1]:.0f} {end[0]:.0f},{end[1]:.0f}"
-    )
-
-
-def _box(
-    column: _Column, y: float, node: _Node, own: bool, pages: Mapping[ir.TypeName, str]
-) -> Box:
-    return Box(
-        x=f"{column.start:.0f}",
-        y=f"{y - _HEIGHT / 2:.0f}",
-        width=f"{column.width:.0f}",
-        height=str(_HEIGHT),
-        middle=f"{column.start + column.width / 2:.0f}",
-        baseline=f"{y + 4.5:.0f}",
-        text=node.text,
-        own=own,
-        page=pages.get(node.name, "") if node.name else "",
     )
 
 
@@ -259,11 +249,11 @@ def prefix(interface: ir.Interface, part: ir.Message) -> str:
 def blocks(lines: Sequence[str]) -> list[Block]:
     """Return comment lines as paragraphs, and as drawings where they are indented or aligned."""
     texts = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
-    return [Block(_tag(text), text) for text in texts if text.strip()]
-
-
-def _tag(text: str) -> str:
-    return "pre" if "\n" in text and _DRAWING.search(text) else "p"
+    return [
+        Block("pre" if "\n" in text and _DRAWING.search(text) else "p", text)
+        for text in texts
+        if text.strip()
+    ]
 
 
 def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
