@@ -131,10 +131,8 @@ class Places:
         return Range(self.position(start), self.position(end))
 
 
-@lru_cache(maxsize=256)
-def places(text: str, encoding: str, *, skips_mark: bool = False) -> Places:
-    """Return the places of a text."""
-    return Places(text, encoding, skips_mark=skips_mark)
+#: Has the places of the last texts.
+places = lru_cache(maxsize=256)(Places)
 
 
 #: The language id of interface files.

@@ -170,8 +170,7 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     """
     offset = context.state.offset(context.source, position)
     for element in elements(context):
-        end = element.line.start + len(element.line.code) + len(element.line.comment)
-        if not element.line.start <= offset <= end:
+        if not element.line.start <= offset <= element.comment.end:
             continue
         parts: list[tuple[Part, Span | None]] = [
             ("name", element.name),
@@ -180,7 +179,7 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
             ("comment", element.comment),
         ]
         for part, span in parts:
-            if span is not None and span.start <= offset <= span.end and span.end > span.start:
+            if span and span.start <= offset <= span.end and span.end > span.start:
                 return Spot(element, part, span)
         return None
     return None

@@ -260,23 +260,25 @@ class Server:
         if isinstance(arrival, RequestError):
             self._fail(None, arrival)
         elif "method" not in arrival:
-            self._handle_answer(arrival)
+            id_ = arrival.get("id")
+            take = self._asked.pop(id_, None) if isinstance(id_, int) else None
+            if take is not None and "result" in arrival:
+                self._attempt("answer", lambda: take(arrival["result"]))
         elif "id" in arrival:
             self._answer(arrival)
         else:
             name, params = arrival["method"], arrival.get("params")
             self._attempt(name, lambda: self.handle_notification(name, params))
 
-    def _handle_answer(self, arrival: Message) -> None:
-        """Handle the client's answer to a request; an answer to no request is ignored."""
-        id_ = arrival.get("id")
-        take = self._asked.pop(id_, None) if isinstance(id_, int) else None
-        if take is not None and "result" in arrival:
-            self._attempt("answer", lambda: take(arrival["result"]))
-
     def _answer(self, request: Message) -> None:
         id_, name = request["id"], request["method"]
-        if self._is_cancelled(id_):
+        with self._lock:
+            self._waiting[id_] -= 1
+            if not self._waiting[id_]:
+                del self._waiting[id_]
+            is_cancelled = id_ in self._cancelled
+            self._cancelled.discard(id_)
+        if is_cancelled:
             self._fail(id_, RequestError(protocol.CANCELLED, "cancelled"))
             return
         failure, result = self._result(lambda: self.answer(name, _params(request)))
@@ -286,16 +288,6 @@ class Server:
         if failure.code == protocol.INTERNAL_ERROR:
             self._log(f"{name}: {failure.message}")
         self._fail(id_, failure)
-
-    def _is_cancelled(self, id_: int | str) -> bool:
-        """Return whether the request that is to be answered now was cancelled."""
-        with self._lock:
-            self._waiting[id_] -= 1
-            if not self._waiting[id_]:
-                del self._waiting[id_]
-            is_cancelled = id_ in self._cancelled
-            self._cancelled.discard(id_)
-        return is_cancelled
 
     def _attempt(self, what: str, action: Callable[[], object]) -> None:
         """Run an action that has no answer; failures are only logged."""

@@ -115,7 +115,13 @@ def folds(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object
 def selections(state: ServerState, params: PositionsParams) -> list[Selection]:
     """Return for each position the ranges around it: a part, its line, its section, the file."""
     context = state.context(params.text_document.uri)
-    spans = _selectable(context) if context else []
+    spans = [] if context is None else [Span(context.source, 0, len(context.source.text))]
+    spans += sections(context) if context else ()
+    for element in elements(context) if context else ():
+        start, end = element.line.start, max(element.comment.end, element.whole.end)
+        spans += [Span(element.source, start, end), element.whole]
+        spans += [element.span(element.body.type.whole), element.type, element.name]
+        spans += [*filter(None, (element.value, element.comment))]
     answers = []
     for position in params.positions:
         offset = state.offset(context.source, position) if context else 0
@@ -130,17 +136,6 @@ def selections(state: ServerState, params: PositionsParams) -> list[Selection]:
                 selected, last = Selection(state.range(span), selected), span
         answers.append(selected or Selection(Range(position, position)))
     return answers
-
-
-def _selectable(context: InterfaceContext) -> list[Span]:
-    """Return the spans that a selection grows to, first the whole file."""
-    spans = [Span(context.source, 0, len(context.source.text)), *sections(context)]
-    for element in elements(context):
-        start, end = element.line.start, max(element.comment.end, element.whole.end)
-        spans += [Span(context.source, start, end), element.whole]
-        spans += [element.span(element.body.type.whole), element.type, element.name]
-        spans += [*([element.value] if element.value else []), element.comment]
-    return spans
 
 
 def links(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object]]:
@@ -168,7 +163,7 @@ class Token(NamedTuple):
 
 def tokens(context: InterfaceContext, _: DocumentParams) -> dict[str, list[int]]:
     """Return the tokens of a document: the kind of each word, by which editors colour it."""
-    return {"data": _encoded(_tokens(context), context.state)}
+    return _encoded(_tokens(context), context.state)
 
 
 def tokens_in(context: InterfaceContext, params: RangeParams) -> dict[str, list[int]]:
@@ -176,7 +171,7 @@ def tokens_in(context: InterfaceContext, params: RangeParams) -> dict[str, list[
     state = context.state
     low, high = (state.offset(context.source, at) for at in (params.range.start, params.range.end))
     touching = (t for t in _tokens(context) if t.span.start <= high and low <= t.span.end)
-    return {"data": _encoded(touching, state)}
+    return _encoded(touching, state)
 
 
 def _tokens(context: InterfaceContext) -> Iterator[Token]:
@@ -184,34 +179,31 @@ def _tokens(context: InterfaceContext) -> Iterator[Token]:
         if element.line.start and context.source.text[: element.line.start].endswith("@optional"):
             start = element.line.start - len("@optional")
             yield Token(Span(context.source, start, element.line.start), "keyword")
-        yield from _definition(element)
+        type_ = element.body.type
+        if type_.name.text in ir.PRIMITIVES or type_.name.text in STRINGS:
+            yield Token(element.type, "type", ("defaultLibrary",))
+        else:
+            package, slash, _ = element.type.text.rpartition("/")
+            if slash:
+                yield Token(element.type.at(0, len(package)), "namespace")
+            name = element.type.at(len(package) + len(slash), len(element.type.text))
+            yield Token(name, "struct")
+        for number in (type_.bound, type_.size):
+            if number is not None:
+                yield Token(element.span(number), "number")
+        is_constant = isinstance(element.body, tree.Constant)
+        modifiers = ("declaration", "readonly") if is_constant else ("declaration",)
+        yield Token(element.name, "enumMember" if is_constant else "property", modifiers)
+        if element.value is not None and element.value.text:
+            is_text = type_.name.text in STRINGS and not type_.brackets
+            yield Token(element.value, "string" if is_text else "number")
     yield from (Token(span, "comment") for _, span in comments(context))
     for before, after in pairwise(sections(context)):
         mark = Span(context.source, before.end, after.start)
         yield Token(mark.at(0, len(mark.text.rstrip())), "keyword")
 
 
-def _definition(element: Element) -> Iterator[Token]:
-    type_ = element.body.type
-    if type_.name.text in ir.PRIMITIVES or type_.name.text in STRINGS:
-        yield Token(element.type, "type", ("defaultLibrary",))
-    else:
-        package, slash, _ = element.type.text.rpartition("/")
-        if slash:
-            yield Token(element.type.at(0, len(package)), "namespace")
-        yield Token(element.type.at(len(package) + len(slash), len(element.type.text)), "struct")
-    for number in (type_.bound, type_.size):
-        if number is not None:
-            yield Token(element.span(number), "number")
-    is_constant = isinstance(element.body, tree.Constant)
-    modifiers = ("declaration", "readonly") if is_constant else ("declaration",)
-    yield Token(element.name, "enumMember" if is_constant else "property", modifiers)
-    if element.value is not None and element.value.text:
-        text = type_.name.text in STRINGS and not type_.brackets
-        yield Token(element.value, "string" if text else "number")
-
-
-def _encoded(tokens: Iterable[Token], state: ServerState) -> list[int]:
+def _encoded(tokens: Iterable[Token], state: ServerState) -> dict[str, list[int]]:
     """Return tokens as the protocol has them: five numbers each, positions from the last one."""
     data: list[int] = []
     last = Position(0, 0)
@@ -226,4 +218,4 @@ def _encoded(tokens: Iterable[Token], state: ServerState) -> list[int]:
         data += [start.line - last.line, across, end.character - start.character]
         data += [TYPES.index(token.kind), modifiers]
         last = start
-    return data
+    return {"data": data}
