@@ -72,7 +72,6 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     Each row has the time when a message was recorded, and a column for each of its fields.
     """
     from idlc.cli import output
-    from idlc.cli.output import progress_bar
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.recordings.export import ColumnsOptions, columns
@@ -83,7 +82,7 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
     paths = (*expand(subject), *recordings)
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
-    with progress_bar(sys.stderr) as update:
+    with output.progress_bar(sys.stderr) as update:
         written = columns(request, report, update)
     for file in written:
         sys.stderr.write(f"{file.topic}: {file.rows:,} messages → {file.path}\n")
