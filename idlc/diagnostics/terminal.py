@@ -27,21 +27,11 @@ LINE_WIDTH = 100
 TEXT_WIDTH = 1000
 BEFORE_CARET = 40
 
-_STYLES = {
-    "error": "1;31",
-    "warning": "1;33",
-    "hint": "1;36",
-    "frame": "1;34",
-    "bold": "1",
-}
+_STYLES = {"error": "1;31", "warning": "1;33", "hint": "1;36", "frame": "1;34", "bold": "1"}
 
 
 def _coloured(style: str, text: str) -> str:
     return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if text else ""
-
-
-def _plain(_: str, text: str) -> str:
-    return text
 
 
 Paint: TypeAlias = Callable[[str, str], str]
@@ -65,7 +55,7 @@ def text(
 
     Ends with a count of those beyond `limit`.
     """
-    paint = _coloured if colour else _plain
+    paint: Paint = _coloured if colour else lambda _, text: text
     diagnostics = list(diagnostics)
     if len(diagnostics) > limit:  # no error is left out for a warning
         diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
