@@ -13,17 +13,8 @@ from idlc.check.run import keep_layout
 from idlc.check.select import REMARK
 from idlc.diagnostics.report import Edit, Report, Severity, apply, first_few
 from idlc.diagnostics.source import Span
-from idlc.editor import protocol
+from idlc.editor import parts, protocol
 from idlc.editor.elements import by_uri, differences, workspace_edit
-from idlc.editor.parts import (
-    CodeActionParams,
-    Command,
-    DocumentParams,
-    Part,
-    PositionParams,
-    RangeParams,
-    TextEdit,
-)
 from idlc.editor.problems import DocumentDiagnostic, Problem, problems
 from idlc.editor.protocol import INVALID_PARAMS, REQUEST_FAILED, RequestError
 from idlc.editor.rename import can_move_files, rename_interface
@@ -44,7 +35,7 @@ _OTHER_FILE = re.compile(r"call it `((\w+)\.\w+)`")
 MOST = 3
 
 
-class CodeAction(Part, frozen=True):
+class CodeAction(parts.Part, frozen=True):
     """A code action."""
 
     title: str
@@ -55,7 +46,7 @@ class CodeAction(Part, frozen=True):
     command: Mapping[str, object] | None = None
 
 
-def actions(state: ServerState, params: CodeActionParams) -> list[CodeAction]:
+def actions(state: ServerState, params: parts.CodeActionParams) -> list[CodeAction]:
     """Return actions on the problems in a range, and on all of a document."""
     state.notice_changes()  # or edits may be of older files
     uri, only = params.text_document.uri, params.context.only
@@ -192,7 +183,7 @@ NAMED = 5
 _ERROR, _INFO = 1, 3
 
 
-def execute(state: ServerState, params: Command) -> None:
+def execute(state: ServerState, params: parts.Command) -> None:
     """Run a command."""
     match params.command, *params.arguments:
         case protocol.ADD_DEPENDENCY, str(uri), str(package):
@@ -265,14 +256,14 @@ def _outcome(generated: Generated) -> str:
 # Formatting, as `idlc fmt` does it.
 
 
-def format_document(context: InterfaceContext, _: DocumentParams) -> list[TextEdit]:
+def format_document(context: InterfaceContext, _: parts.DocumentParams) -> list[parts.TextEdit]:
     """Return the edits that format a document; none where it has syntax errors."""
     old = context.source.text
     new = laid_out(context.source, context.interface.name, Report())
     return [] if new is None else differences(old, new, context.state.encoding)
 
 
-def format_range(context: InterfaceContext, params: RangeParams) -> list[TextEdit]:
+def format_range(context: InterfaceContext, params: parts.RangeParams) -> list[parts.TextEdit]:
     """Return those edits that touch the lines of a range."""
     first, last = params.range.start.line, params.range.end.line
     if params.range.end.character == 0 and last > first:
@@ -284,7 +275,7 @@ def format_range(context: InterfaceContext, params: RangeParams) -> list[TextEdi
     ]
 
 
-def format_typed(context: InterfaceContext, params: PositionParams) -> list[TextEdit]:
+def format_typed(context: InterfaceContext, params: parts.PositionParams) -> list[parts.TextEdit]:
     """Return those edits that touch the line before the one that was begun."""
     before = params.position.line - 1
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import SequenceMatcher
+from itertools import accumulate
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -25,9 +26,7 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
     """Return the edits that turn one text into another: whole lines, as few as possible."""
     before, after = lines_of(old), lines_of(new)
     places = Places(old, encoding)
-    starts = [0]
-    for line in before:
-        starts.append(starts[-1] + len(line))
+    starts = [*accumulate(map(len, before), initial=0)]
     return [
         TextEdit(places.range(starts[low], starts[high]), "".join(after[start:end]))
         for what, low, high, start, end in SequenceMatcher(
@@ -200,12 +199,11 @@ def section_names(interface: ir.Interface) -> tuple[str, ...]:
 def uses(state: ServerState) -> Iterator[tuple[Snapshot, Span, ir.TypeName]]:
     """Yield each place where a field's type names a message, and the message."""
     for snapshot in state.snapshots():
-        for model in snapshot.models.values():
-            for interface in model.own:
-                for section in derive.sections(interface):
-                    for field, target in section.holders:
-                        if field.type_span is not None:
-                            yield snapshot, field.type_span, target
+        for interface, _ in snapshot.interfaces.values():
+            for section in derive.sections(interface):
+                for field, target in section.holders:
+                    if field.type_span is not None:
+                        yield snapshot, field.type_span, target
 
 
 def users(name: ir.TypeName, home: Snapshot, state: ServerState) -> Iterator[tuple[Snapshot, Span]]:

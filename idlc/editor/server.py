@@ -14,6 +14,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
+from itertools import count
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 from idlc.editor import protocol
@@ -102,13 +103,12 @@ class Server:
         self._waiting: Counter[int | str | None] = Counter()
         self._cancelled: set[int | str] = set()
         self._lock = threading.Lock()
-        self._count = 0
+        self._ids = count()
         self._asked: dict[int, Answer] = {}
         #: The parameters of `initialize`. The state is made of them when it is needed: its imports
         #: take long.
         self._initialize: dict[str, Any] | None = None
         self._state: ServerState | None = None
-        self._client_process: object = None
         self._is_shut_down = False
 
     @property
@@ -162,7 +162,6 @@ class Server:
             if not isinstance(params, dict):
                 raise RequestError(protocol.INVALID_PARAMS, "`initialize` needs an object")
             self._initialize = params
-            self._client_process = params.get("processId")
             client = params.get("capabilities")
             return protocol.initialize_result(client if isinstance(client, dict) else {})
         if self._initialize is None:
@@ -223,7 +222,7 @@ class Server:
 
     def _client_is_gone(self) -> bool:
         """Return whether the process of the client has ended, where the system can tell."""
-        client = self._client_process
+        client = (self._initialize or {}).get("processId")
         if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
             return False
         try:
@@ -321,8 +320,7 @@ class Server:
 
     def ask(self, method: str, params: object, answer: Answer | None = None) -> None:
         """Send a request to the client; `answer` takes its result."""
-        id_ = self._count
-        self._count += 1
+        id_ = next(self._ids)
         if answer is not None:
             self._asked[id_] = answer
         self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
