@@ -54,23 +54,19 @@ def _summary(verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[st
     return f"{text}; raise the {verdict.part} version"
 
 
-EPILOG = """\
-Example:
-
-\b
-  mkdir -p old/msg new/msg
-  echo 'float64 speed 0.5  # [m/s]' > old/msg/Drive.msg
-  echo 'float64 speed 0.7  # [m/s]' > new/msg/Drive.msg
-  idlc breaking new --against old --level hash
-
-A change that is meant is allowed in pyproject.toml, with a reason and for a time:
-
-\b
-  [[tool.idlc.breaking.allow]]
-  at = "demo/msg/Drive.speed"
-  reason = "all robots are updated in the same week"
-  until = 2030-12-31
-"""
+EPILOG = options.example(
+    "mkdir -p old/msg new/msg",
+    "echo 'float64 speed 0.5  # [m/s]' > old/msg/Drive.msg",
+    "echo 'float64 speed 0.7  # [m/s]' > new/msg/Drive.msg",
+    "idlc breaking new --against old --level hash",
+)
+EPILOG += "\n" + options.example(
+    "[[tool.idlc.breaking.allow]]",
+    'at = "demo/msg/Drive.speed"',
+    'reason = "all robots are updated in the same week"',
+    "until = 2030-12-31",
+    title="A change that is meant is allowed in pyproject.toml, with a reason and for a time",
+)
 
 
 @click.command("breaking", epilog=EPILOG)
@@ -130,12 +126,9 @@ def command(
     from idlc.compare.breaking import GIT, BreakingOptions, breaking
     from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.settings import scope, settings_here
 
-    report = Report()
-    settings = load_settings(Root.here(), report)
+    settings, report = settings_here()
     against = against or packages.against(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:

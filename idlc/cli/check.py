@@ -8,17 +8,8 @@ import click
 
 from idlc.cli import completion, options
 
-EPILOG = """\
-Example:
 
-\b
-  mkdir -p demo/msg
-  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
-  idlc check demo
-"""
-
-
-@click.command("check", epilog=EPILOG)
+@click.command("check", epilog=options.example(*options.DEMO, "idlc check demo"))
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--select",

@@ -9,17 +9,15 @@ import click
 
 from idlc.cli import completion, options
 
-EPILOG = """\
-Example:
 
-\b
-  idlc columns rec.mcap /imu -o imu.parquet
-  idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv
-  idlc columns rec.mcap -o columns/
-"""
-
-
-@click.command("columns", epilog=EPILOG)
+@click.command(
+    "columns",
+    epilog=options.example(
+        "idlc columns rec.mcap /imu -o imu.parquet",
+        "idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv",
+        "idlc columns rec.mcap -o columns/",
+    ),
+)
 @click.argument("subject", metavar="REC", type=click.Path())
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @click.option(

@@ -132,17 +132,16 @@ def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind])
 
 def _library(context: click.Context) -> Library:
     """Return the library that the options mean, for the distribution in the settings by default."""
-    from idlc.diagnostics.report import Report
     from idlc.model.distros import BY_NAME
     from idlc.project.inputs import nearby_packages
     from idlc.project.library import Library
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.settings import scope, settings_here
 
-    report, root = Report(), Root.here()
+    settings, report = settings_here()
+    root = settings.root
     distro = context.params.get("distro")
     name = distro if distro in BY_NAME else None
-    selected = scope(load_settings(root, report), distro=name).distro
+    selected = scope(settings, distro=name).distro
     include = context.params.get("include") or ()
     return Library(include, root, report, own=nearby_packages(root), distro=selected)
 

@@ -28,13 +28,10 @@ def check_paths(
     from idlc.check.select import selection
     from idlc.cli import output
     from idlc.diagnostics import terminal
-    from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import counted
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.settings import scope, settings_here
 
-    report = Report()
-    settings = load_settings(Root.here(), report)
+    settings, report = settings_here()
     chosen = selection(settings, report).with_lists(select, ignore)
     checked = CheckResult(())
     if prefix is not None:

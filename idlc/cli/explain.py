@@ -8,17 +8,10 @@ from collections.abc import Iterator
 
 import click
 
-from idlc.cli import completion
-
-EPILOG = """\
-Example:
-
-\b
-  idlc explain wide-string
-"""
+from idlc.cli import completion, options
 
 
-@click.command("explain", epilog=EPILOG)
+@click.command("explain", epilog=options.example("idlc explain wide-string"))
 @click.argument("code", metavar="[CODE]", required=False, shell_complete=completion.codes)
 @click.option("--all", "everything", is_flag=True, help="Every code, as one Markdown document.")
 def command(code: str | None, everything: bool) -> int:

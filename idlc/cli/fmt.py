@@ -30,17 +30,14 @@ def _diff(path: str, old: str, new: str, stream: TextIO) -> Iterator[str]:
             yield "\\ No newline at end of file\n"
 
 
-EPILOG = """\
-Example:
-
-\b
-  mkdir -p demo/msg
-  echo 'float64   speed 0.5# [m/s]' > demo/msg/Drive.msg
-  idlc fmt demo
-"""
-
-
-@click.command("fmt", epilog=EPILOG)
+@click.command(
+    "fmt",
+    epilog=options.example(
+        "mkdir -p demo/msg",
+        "echo 'float64   speed 0.5# [m/s]' > demo/msg/Drive.msg",
+        "idlc fmt demo",
+    ),
+)
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option("--check", is_flag=True, help="Write nothing; fail if a file would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change, and fail if so.")
@@ -60,18 +57,15 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     from idlc.check.compiler import stage
     from idlc.check.format import laid_out
     from idlc.cli import output
-    from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
     from idlc.model import ir
     from idlc.project.files import read_source
     from idlc.project.find import find
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.settings import scope, settings_here
     from idlc.project.write import rewrite
 
-    report = Report()
-    settings = load_settings(Root.here(), report)
+    settings, report = settings_here()
     write = not (check or diff)
     done = "changed" if write else "would change"
     broken, clean = "with errors left alone", "already formatted"

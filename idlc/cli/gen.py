@@ -119,21 +119,13 @@ def _snapshot(request: GenOptions) -> dict[str, Stamp]:
     return snapshot(request.paths, request.scope.include, root) | stamps(files(request.paths, root))
 
 
-EPILOG = """\
-Example:
-
-\b
-  mkdir -p demo/msg
-  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
-  idlc gen demo -o out/demo
-
-All options can be kept in pyproject.toml:
-
-\b
-  [tool.idlc]
-  paths = ["demo"]
-  out = "out/demo"
-"""
+EPILOG = options.example(*options.DEMO, "idlc gen demo -o out/demo")
+EPILOG += "\n" + options.example(
+    "[tool.idlc]",
+    'paths = ["demo"]',
+    'out = "out/demo"',
+    title="All options can be kept in pyproject.toml",
+)
 
 
 class _Command(click.Command):
@@ -198,15 +190,12 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     it from.
     """
     from idlc.cli import output
-    from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions, in_package, with_settings
     from idlc.project.find import is_path
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.settings import scope, settings_here
     from idlc.recordings.find import split_recordings
 
-    report = Report()
-    settings = load_settings(Root.here(), report)
+    settings, report = settings_here()
     if report.had_errors:
         if style == "text":
             output.show(report, style, sys.stderr)

@@ -17,7 +17,15 @@ FORMATS = ("text", "json")
 DOCUMENTS = ("github", "sarif", "junit", "gitlab")
 REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 
+#: Commands that write an interface, for examples.
+DEMO = ("mkdir -p demo/msg", "echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg")
+
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def example(*lines: str, title: str = "Example") -> str:
+    """Return the end of a command's help: an example of commands."""
+    return "\n".join((f"{title}:\n\n\b", *(f"  {line}" for line in lines), ""))
 
 
 def typed(*without: str) -> tuple[str, ...]:
@@ -127,12 +135,10 @@ def scoped(
             **arguments: Any,
         ) -> int:
             from idlc.cli import output
-            from idlc.diagnostics.report import Report
-            from idlc.project.root import Root
-            from idlc.project.settings import load_settings, scope
+            from idlc.project.settings import scope, settings_here
 
-            report, text = Report(), None
-            settings = load_settings(Root.here(), report)
+            settings, report = settings_here()
+            text = None
             if not report.had_errors:
                 where = scope(settings, package, include, exclude, distro)
                 text = command(**arguments, scope=where, report=report)

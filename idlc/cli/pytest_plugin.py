@@ -89,13 +89,11 @@ class InterfaceItem(pytest.Item):
         """Fail with the errors that idlc reports for the file."""
         from idlc.check import select
         from idlc.check.run import CheckOptions, check
-        from idlc.diagnostics.report import Report, Severity
+        from idlc.diagnostics.report import Severity
         from idlc.diagnostics.terminal import text
-        from idlc.project.root import Root
-        from idlc.project.settings import load_settings, scope
+        from idlc.project.settings import scope, settings_here
 
-        report = Report()
-        settings = load_settings(Root.here(), report)
+        settings, report = settings_here()
         selection = select.selection(settings, report)
         if not report.had_errors:
             check(CheckOptions((str(self.path),), scope(settings), selection), report)

@@ -12,17 +12,6 @@ import click
 from idlc.cli import options
 from idlc.cli.app import LazyGroup
 
-EPILOG = """\
-Example:
-
-\b
-  idlc scaffold package my_robot
-  cd my_robot
-  idlc scaffold interface msg Command 'string verb' 'float32 speed  # [m/s]'
-  idlc scaffold node commander --publisher Command:command@2
-  idlc gen
-"""
-
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 #: Each command with its line in the overview.
@@ -51,7 +40,17 @@ class Scaffold(LazyGroup):
     synonyms = SYNONYMS
 
 
-@click.group("scaffold", cls=Scaffold, epilog=EPILOG)
+@click.group(
+    "scaffold",
+    cls=Scaffold,
+    epilog=options.example(
+        "idlc scaffold package my_robot",
+        "cd my_robot",
+        "idlc scaffold interface msg Command 'string verb' 'float32 speed  # [m/s]'",
+        "idlc scaffold node commander --publisher Command:command@2",
+        "idlc gen",
+    ),
+)
 def command() -> None:
     """Write packages, interfaces and nodes, and enter them where they belong.
 

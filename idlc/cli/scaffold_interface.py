@@ -6,16 +6,15 @@ from typing import Any
 
 import click
 
+from idlc.cli import options
 from idlc.cli.scaffold import common, finish
 
-EPILOG = """\
-Example, within a package:
-
-\b
-  idlc scaffold interface msg RobotCommand \\
-      'string command_type' 'float32 linear_velocity_x  # [m/s]'
-  idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'
-"""
+EPILOG = options.example(
+    "idlc scaffold interface msg RobotCommand \\",
+    "    'string command_type' 'float32 linear_velocity_x  # [m/s]'",
+    "idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'",
+    title="Example, within a package",
+)
 
 
 @click.command("interface", epilog=EPILOG, context_settings={"ignore_unknown_options": True})

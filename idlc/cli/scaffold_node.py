@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -26,7 +26,6 @@ _QUESTIONS: dict[ir.Kind, tuple[str, str]] = {
     "action": ("Action type, such as Countdown", "Action name"),
 }
 
-Answer = TypeVar("Answer")
 #: Raises ValueError for an interface that does not exist.
 CheckType = Callable[[Role, str], None]
 
@@ -40,48 +39,41 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
     parameters: list[spec.Parameter] = []
     while (chosen := click.prompt(f"Add ({DONE} to finish)", type=choices, default=DONE)) != DONE:
         if chosen == PARAMETER:
-            parameters.append(_answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter))
+            answer = _answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter)
+            parameters.append(spec.parameter(answer))
         else:
             endpoints.append(_endpoint(roles[chosen], check_type))
     lifecycle = click.confirm("Make it a lifecycle node?", default=False, prompt_suffix=" ")
     return spec.Node(name, "", spec.in_order(endpoints), tuple(parameters), lifecycle)
 
 
-def _answer(
-    question: str, understand: Callable[[str], Answer], default: str | None = None
-) -> Answer:
-    """Ask until the answer is valid; return its value."""
+def _answer(question: str, check: Callable[[str], object], default: str | None = None) -> str:
+    """Ask until the answer is valid, for which `check` raises no ValueError."""
 
-    def process(text: str) -> Answer:
+    def process(text: str) -> str:
         try:
-            return understand(text)
+            check(text)
         except ValueError as error:
             raise click.BadParameter(str(error)) from error
+        return text
 
-    answer: Answer = click.prompt(question, default=default, value_proc=process)
-    return answer
+    return str(click.prompt(question, default=default, value_proc=process))
 
 
 def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
     """Ask for the value of the role's option."""
-
-    def existing(text: str) -> str:
-        check_type(role, text)
-        return text
-
-    def checked(value: str) -> str:
-        spec.endpoint(role, value)
-        return value
-
     value = ""
     if role.kind:
         type_question, name_question = _QUESTIONS[role.kind]
-        type_ = _answer(type_question, existing)
-        value = _answer(name_question, lambda name: checked(f"{type_}:{name}"))
+        type_ = _answer(type_question, lambda text: check_type(role, text))
+        name = _answer(name_question, lambda text: spec.endpoint(role, f"{type_}:{text}"))
+        value = f"{type_}:{name}"
     question = role.question
     if question and not (question.separator and question.separator in value):
-        head = f"{value}{question.separator}"
-        value = _answer(question.text, lambda answer: checked(f"{head}{answer}"), question.default)
+        start = f"{value}{question.separator}"
+        value = start + _answer(
+            question.text, lambda text: spec.endpoint(role, start + text), question.default
+        )
     if role.kind != "msg":
         return spec.endpoint(role, value)
     preset = click.prompt(

@@ -23,7 +23,7 @@ HEAD = ("topic", "type", "messages", "hash", "here")
 def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
     from idlc.diagnostics.text import display_width, one_line
 
-    rows = [HEAD] if topic_facts else []
+    rows: list[tuple[str, ...]] = [HEAD] if topic_facts else []
     for facts in topic_facts:
         count = "?" if facts.messages is None else str(facts.messages)
         hash_ = one_line(facts.hash or "-")
@@ -42,20 +42,9 @@ def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
         yield "  ".join(cells).rstrip() + "\n"
 
 
-EPILOG = """\
-Example:
-
-\b
-  idlc show geometry_msgs/msg/PoseStamped
-"""
-
-
-@click.command("show", epilog=EPILOG)
+@click.command("show", epilog=options.example("idlc show geometry_msgs/msg/PoseStamped"))
 @click.argument(
-    "subject",
-    metavar="TYPE|PATH|REC",
-    type=click.Path(),
-    shell_complete=completion.types_and_paths,
+    "subject", metavar="TYPE|PATH|REC", type=click.Path(), shell_complete=completion.types_and_paths
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @options.output_style(
