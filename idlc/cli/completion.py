@@ -68,9 +68,9 @@ def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionIt
     """Offer the ids and names of codes."""
     from idlc.diagnostics.codes import CODES
 
-    ids = [_item(code.id, about=code.slug) for code in CODES.values()]
-    names = [_item(code.slug, about=code.id) for code in CODES.values()]
-    return [item for item in (*ids, *names) if item.value.startswith(word)]
+    names = {code.id: code.slug for code in CODES.values()}
+    names |= {slug: id_ for id_, slug in names.items()}
+    return [_item(name, about=about) for name, about in names.items() if name.startswith(word)]
 
 
 def rules(context: click.Context, option: click.Parameter, word: str) -> list[CompletionItem[str]]:

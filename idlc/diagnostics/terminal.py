@@ -177,11 +177,8 @@ def summary(diagnostics: Iterable[Diagnostic]) -> str:
     """Return the closing line, such as `2 errors, 1 warning in 3 files`."""
     reported = list(diagnostics)
     errors = sum(diagnostic.severity is Severity.ERROR for diagnostic in reported)
-    parts = [
-        counted(number, noun)
-        for number, noun in ((errors, "error"), (len(reported) - errors, "warning"))
-        if number
-    ]
+    numbers = {"error": errors, "warning": len(reported) - errors}
+    parts = [counted(number, noun) for noun, number in numbers.items() if number]
     files = len({diagnostic.where[0] for diagnostic in reported})
     return f"{', '.join(parts)} in {counted(files, 'file')}" if parts else "no problems"
 

@@ -27,9 +27,8 @@ def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[s
     """Return type hash and full name of each type in paths and names, derived types included."""
     named_hashes: list[tuple[str, str]] = []
     scope = _with_hashes(scope, report)
-    if not scope.distro.has_hashes:
-        return named_hashes
-    for model, names in requested_models(targets, scope, report):
+    models = requested_models(targets, scope, report) if scope.distro.has_hashes else ()
+    for model, names in models:
         with stage("describe", model.package):
             named_hashes += [(model.describer.hash(name), name) for name in names]
     return list(dict.fromkeys(named_hashes))
