@@ -6,7 +6,6 @@ import sys
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -21,28 +20,19 @@ class LazyGroup(click.Group):
     the commands that are suggested for them.
     """
 
-    def __init__(
-        self,
-        *args: Any,
-        overview: Mapping[str, str],
-        modules: str,
-        synonyms: Mapping[str, str] | None = None,
-        **more: Any,
-    ) -> None:
-        super().__init__(*args, **more)
-        self._overview = overview
-        self._modules = modules
-        self._synonyms = synonyms or {}
+    overview: Mapping[str, str]
+    modules: str
+    synonyms: Mapping[str, str]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Return the names in the order in which people need them."""
-        return list(self._overview)
+        return list(self.overview)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """Return a command by name; this imports it."""
-        if cmd_name not in self._overview:
+        if cmd_name not in self.overview:
             return None
-        command: click.Command = import_module(f"{self._modules}{cmd_name}").command
+        command: click.Command = import_module(f"{self.modules}{cmd_name}").command
         return command
 
     def resolve_command(
@@ -50,22 +40,20 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the invoked command; suggest one for an unknown name."""
         name = args[0]
-        unknown = name not in self._overview and not name.startswith("-")
+        unknown = name not in self.overview and not name.startswith("-")
         if unknown and not ctx.resilient_parsing:
-            raise click.UsageError(f"no such command: {name!r}; {self._hint(name)}", ctx)
+            from idlc.diagnostics.text import did_you_mean
+
+            synonym = self.synonyms.get(name.lower())
+            hint = f"did you mean `{synonym}`?" if synonym else did_you_mean(name, self.overview)
+            hint = hint or f"the commands are {', '.join(self.overview)}"
+            raise click.UsageError(f"no such command: {name!r}; {hint}", ctx)
         return super().resolve_command(ctx, args)
-
-    def _hint(self, name: str) -> str:
-        from idlc.diagnostics.text import did_you_mean
-
-        synonym = self._synonyms.get(name.lower())
-        close = f"did you mean `{synonym}`?" if synonym else did_you_mean(name, self._overview)
-        return close or f"the commands are {', '.join(self._overview)}"
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the overview without importing any command."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(self._overview.items()))
+            formatter.write_dl(list(self.overview.items()))
 
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
@@ -103,6 +91,10 @@ SYNONYMS = {
 
 class App(LazyGroup):
     """The group of all commands, which `idlc help` explains too."""
+
+    overview = COMMANDS
+    modules = "idlc.cli."
+    synonyms = SYNONYMS
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the invoked command."""
@@ -142,9 +134,6 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
 
 @click.group(
     cls=App,
-    overview=COMMANDS,
-    modules="idlc.cli.",
-    synonyms=SYNONYMS,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,
     no_args_is_help=True,
@@ -162,15 +151,11 @@ def run(words: list[str]) -> int:
 
 
 def _through_click(words: list[str]) -> object:
+    name = "rosidlc" if Path(sys.argv[0]).stem == "rosidlc" else "idlc"
     try:
-        return app.main(words, prog_name=_called_as(), standalone_mode=False)
+        return app.main(words, prog_name=name, standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return 2
     except click.Abort as error:
         raise KeyboardInterrupt from error
-
-
-def _called_as() -> str:
-    name = Path(sys.argv[0]).stem
-    return name if name == "rosidlc" else "idlc"

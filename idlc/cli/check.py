@@ -8,17 +8,8 @@ import click
 
 from idlc.cli import completion, options
 
-EPILOG = """\
-Example:
 
-\b
-  mkdir -p demo/msg
-  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
-  idlc check demo
-"""
-
-
-@click.command("check", epilog=EPILOG)
+@click.command("check", epilog=options.example(*options.DEMO, "idlc check demo"))
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--select",
@@ -51,10 +42,17 @@ def command(paths: tuple[str, ...], **arguments: Any) -> int:
 
     Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
     """
-    from idlc.cli.direct import CheckArguments, check_paths
+    from idlc.check.select import is_selector
+    from idlc.cli.direct import check_paths
 
-    typed = CheckArguments(**arguments)
-    options.check_rules(typed.select, typed.ignore)
-    if typed.prefix is not None and (paths or typed.fix):
+    for word in f"{arguments['select'] or ''},{arguments['ignore'] or ''}".split(","):
+        if word and not is_selector(word):
+            from idlc.diagnostics.codes import CATEGORIES, CODES
+            from idlc.diagnostics.text import did_you_mean
+
+            hint = did_you_mean(word, (*CATEGORIES, *(code.slug for code in CODES.values())))
+            hint = hint or "`idlc explain` lists the codes"
+            raise click.UsageError(f"{word!r} means no rule; {hint}")
+    if arguments["prefix"] is not None and (paths or arguments["fix"]):
         raise click.UsageError("--prefix looks at what is installed, without PATH and --fix")
-    return check_paths(paths, typed)
+    return check_paths(paths, **arguments)

@@ -9,17 +9,15 @@ import click
 
 from idlc.cli import completion, options
 
-EPILOG = """\
-Example:
 
-\b
-  idlc columns rec.mcap /imu -o imu.parquet
-  idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv
-  idlc columns rec.mcap -o columns/
-"""
-
-
-@click.command("columns", epilog=EPILOG)
+@click.command(
+    "columns",
+    epilog=options.example(
+        "idlc columns rec.mcap /imu -o imu.parquet",
+        "idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv",
+        "idlc columns rec.mcap -o columns/",
+    ),
+)
 @click.argument("subject", metavar="REC", type=click.Path())
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @click.option(
@@ -72,7 +70,6 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     Each row has the time when a message was recorded, and a column for each of its fields.
     """
     from idlc.cli import output
-    from idlc.cli.output import progress_bar
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.recordings.export import ColumnsOptions, columns
@@ -83,7 +80,7 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
     paths = (*expand(subject), *recordings)
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
-    with progress_bar(sys.stderr) as update:
+    with output.progress_bar(sys.stderr) as update:
         written = columns(request, report, update)
     for file in written:
         sys.stderr.write(f"{file.topic}: {file.rows:,} messages → {file.path}\n")

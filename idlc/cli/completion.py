@@ -68,9 +68,9 @@ def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionIt
     """Offer the ids and names of codes."""
     from idlc.diagnostics.codes import CODES
 
-    ids = [_item(code.id, about=code.slug) for code in CODES.values()]
-    names = [_item(code.slug, about=code.id) for code in CODES.values()]
-    return [item for item in (*ids, *names) if item.value.startswith(word)]
+    names = {code.id: code.slug for code in CODES.values()}
+    names |= {slug: id_ for id_, slug in names.items()}
+    return [_item(name, about=about) for name, about in names.items() if name.startswith(word)]
 
 
 def rules(context: click.Context, option: click.Parameter, word: str) -> list[CompletionItem[str]]:
@@ -132,17 +132,16 @@ def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind])
 
 def _library(context: click.Context) -> Library:
     """Return the library that the options mean, for the distribution in the settings by default."""
-    from idlc.diagnostics.report import Report
     from idlc.model.distros import BY_NAME
     from idlc.project.inputs import nearby_packages
     from idlc.project.library import Library
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.settings import scope, settings_here
 
-    report, root = Report(), Root.here()
+    settings, report = settings_here()
+    root = settings.root
     distro = context.params.get("distro")
     name = distro if distro in BY_NAME else None
-    selected = scope(load_settings(root, report), distro=name).distro
+    selected = scope(settings, distro=name).distro
     include = context.params.get("include") or ()
     return Library(include, root, report, own=nearby_packages(root), distro=selected)
 

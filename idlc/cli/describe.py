@@ -13,20 +13,10 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.project.settings import Scope
 
-EPILOG = """\
-Example:
 
-\b
-  idlc describe std_msgs/msg/Header
-"""
-
-
-@click.command("describe", epilog=EPILOG)
+@click.command("describe", epilog=options.example("idlc describe std_msgs/msg/Header"))
 @click.argument(
-    "subject",
-    metavar="TYPE|PATH",
-    type=click.Path(),
-    shell_complete=completion.types_and_paths,
+    "subject", metavar="TYPE|PATH", type=click.Path(), shell_complete=completion.types_and_paths
 )
 @options.scoped(options.package, options.include, options.distro)
 def command(subject: str, scope: Scope, report: Report) -> None:

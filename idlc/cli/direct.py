@@ -3,64 +3,67 @@
 from __future__ import annotations
 
 import sys
-from typing import NamedTuple
 
 
-class CheckArguments(NamedTuple):
-    """The arguments besides paths; `select` and `ignore` are lists of rules with commas."""
+def check_paths(
+    paths: tuple[str, ...],
+    *,
+    select: str | None = None,
+    ignore: str | None = None,
+    fix: bool = False,
+    strict: bool = False,
+    style: str = "text",
+    statistics: bool = False,
+    prefix: str | None = None,
+    package: str | None = None,
+    include: tuple[str, ...] = (),
+    exclude: tuple[str, ...] = (),
+    distro: str | None = None,
+) -> int:
+    """Check paths, or those in pyproject.toml, or the working folder; return the exit status.
 
-    select: str | None = None
-    ignore: str | None = None
-    fix: bool = False
-    strict: bool = False
-    package: str | None = None
-    include: tuple[str, ...] = ()
-    exclude: tuple[str, ...] = ()
-    style: str = "text"
-    statistics: bool = False
-    prefix: str | None = None
-    distro: str | None = None
-
-
-def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None) -> int:
-    """Check paths, or those in pyproject.toml, or the working folder; return the exit status."""
+    `select` and `ignore` are lists of rules with commas.
+    """
     from idlc.check.run import CheckOptions, CheckResult, check
     from idlc.check.select import selection
     from idlc.cli import output
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.diagnostics import terminal
+    from idlc.diagnostics.terminal import counted
+    from idlc.project.settings import scope, settings_here
 
-    arguments = arguments or CheckArguments()
-    report = Report()
-    settings = load_settings(Root.here(), report)
-    configured = selection(settings, report)
-    chosen = configured.with_lists(arguments.select, arguments.ignore)
+    settings, report = settings_here()
+    chosen = selection(settings, report).with_lists(select, ignore)
     checked = CheckResult(())
-    if arguments.prefix is not None:
+    if prefix is not None:
         from idlc.check.prefix import check_prefix
 
-        checked = check_prefix(arguments.prefix, settings.root, report)
+        checked = check_prefix(prefix, settings.root, report)
     elif not report.had_errors:
-        where = scope(
-            settings,
-            arguments.package,
-            arguments.include,
-            arguments.exclude,
-            arguments.distro,
-        )
-        options = CheckOptions(
-            paths=paths or settings.paths or (".",),
-            scope=where,
-            selection=chosen,
-            fix=arguments.fix,
-        )
+        where = scope(settings, package, include, exclude, distro)
+        options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix)
         checked = check(options, report)
-    numbers, strict = arguments.statistics, arguments.strict
-    output.write_report(
-        report, arguments.style, checked, sys.stdout, numbers=numbers, strict=strict
-    )
-    return output.status(report) or int(arguments.strict and bool(len(report)))
+    files, fixed = checked.files, checked.fixed
+    match style:
+        case "text":
+            if not statistics:
+                output.show(report, style, sys.stdout)
+            if statistics or len(report) > terminal.MANY:
+                sys.stdout.writelines(terminal.statistics(report))
+            done = f"{counted(fixed, 'problem')} fixed, " if fixed else ""
+            what = counted(len(files), "file")
+            if not files and checked.packages:
+                what = f"{counted(checked.packages, 'package')} without interfaces"
+            which = f" for {', '.join(checked.distros)}" if checked.distros else ""
+            rest = terminal.summary(report) if len(report) else f"no problems in {what}{which}"
+            sys.stdout.write(f"{done}{rest}\n")
+        case "json":
+            output.show(report, style, sys.stdout)
+            facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
+            facts |= {"distros": list(checked.distros)} if checked.distros else {}
+            output.fact(sys.stdout, "summary", **output.counts(report), **facts)
+        case _:
+            output.document(report, style, "check", files, strict=strict)
+    return output.status(report) or int(strict and bool(len(report)))
 
 
 def serve_editor() -> int:

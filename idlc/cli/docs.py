@@ -12,17 +12,8 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.project.settings import Scope
 
-EPILOG = """\
-Example:
 
-\b
-  mkdir -p demo/msg
-  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
-  idlc docs demo -o site
-"""
-
-
-@click.command("docs", epilog=EPILOG)
+@click.command("docs", epilog=options.example(*options.DEMO, "idlc docs demo -o site"))
 @click.argument("paths", metavar="[PATH|PACKAGE|TYPE]...", nargs=-1, type=click.Path())
 @click.option("-o", "--out", metavar="DIR", required=True, type=click.Path(), help="The site.")
 @options.scoped(options.package, options.include, options.exclude, options.distro)

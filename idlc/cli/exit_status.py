@@ -55,12 +55,10 @@ def status_of(command: Callable[[], object]) -> int:
     set_up()
     try:
         os.stat(os.getcwd())  # noqa: PTH109, PTH116 - a server starts without pathlib
-    except FileNotFoundError:
-        sys.stderr.write("Error: the working folder is gone\n")
-        return 2
     except OSError as error:  # its path may be too long
-        reason = (error.strerror or str(error)).lower()
-        sys.stderr.write(f"Error: the working folder cannot be opened: {reason}\n")
+        reason = f"cannot be opened: {(error.strerror or str(error)).lower()}"
+        reason = "is gone" if isinstance(error, FileNotFoundError) else reason
+        sys.stderr.write(f"Error: the working folder {reason}\n")
         return 2
     try:
         status = command()

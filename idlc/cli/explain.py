@@ -8,17 +8,10 @@ from collections.abc import Iterator
 
 import click
 
-from idlc.cli import completion
-
-EPILOG = """\
-Example:
-
-\b
-  idlc explain wide-string
-"""
+from idlc.cli import completion, options
 
 
-@click.command("explain", epilog=EPILOG)
+@click.command("explain", epilog=options.example("idlc explain wide-string"))
 @click.argument("code", metavar="[CODE]", required=False, shell_complete=completion.codes)
 @click.option("--all", "everything", is_flag=True, help="Every code, as one Markdown document.")
 def command(code: str | None, everything: bool) -> int:
@@ -28,7 +21,6 @@ def command(code: str | None, everything: bool) -> int:
     """
     from idlc.cli import output
     from idlc.diagnostics import explain
-    from idlc.diagnostics.explain import close_name, page
 
     if everything:
         sys.stdout.write(explain.document())
@@ -36,9 +28,9 @@ def command(code: str | None, everything: bool) -> int:
     if code is None:
         sys.stdout.writelines(f"{line}\n" for line in explain.overview())
         return 0
-    text = page(code)
+    text = explain.page(code)
     if text is None:
-        close = close_name(code)
+        close = explain.close_name(code)
         hint = f"did you mean {close}?" if close else "`idlc explain` lists the codes"
         raise click.UsageError(f"no such code: {code}; {hint}")
     if output.colours(sys.stdout):

@@ -19,26 +19,23 @@ if TYPE_CHECKING:
     from idlc.project.find import Stamp
 
 
-def refuse(report: Report, style: str) -> None:
-    """Show problems that prevent a run."""
-    from idlc.cli import output
-
-    if style == "text":
-        output.show(report, style, sys.stderr)
-    else:
-        _document(report, style)
-
-
 def once(request: GenOptions, style: str) -> int:
     """Run once, show the outcome and return the exit status."""
     from idlc.cli import output
     from idlc.diagnostics.report import Report
+    from idlc.diagnostics.terminal import summary
     from idlc.generate.gen import gen
 
     report = Report()
     packages = gen(request, report)
     if style == "text":
-        _show_outcome(report, packages, request.check)
+        output.show(report, style, sys.stderr)
+        output.notes(report, sys.stderr)
+        if report.had_errors:
+            outcome = "" if request.check else "; nothing was written"
+            sys.stderr.write(f"{summary(report)}{outcome}\n")
+        else:
+            sys.stdout.writelines([_line(package, request.check) for package in packages])
     else:
         _document(report, style, packages, check=request.check)
     return output.status(report)
@@ -51,29 +48,12 @@ def _document(
     from idlc.cli import output
 
     if style != "json":
-        from idlc.check.run import CheckResult  # with its rules, which a run does without
-
-        folders = tuple(package.out for package in packages)
-        output.write_report(report, style, CheckResult(folders), sys.stdout, command="gen")
+        output.document(report, style, "gen", tuple(package.out for package in packages))
         return
     output.show(report, style, sys.stdout)
     for package in packages:
         output.fact(sys.stdout, "package", **package._asdict(), check=check)
     output.fact(sys.stdout, "summary", **output.counts(report))
-
-
-def _show_outcome(report: Report, packages: Sequence[Generated], check: bool) -> None:
-    from idlc.cli import output
-    from idlc.diagnostics.terminal import summary
-
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    if report.had_errors:
-        outcome = "" if check else "; nothing was written"
-        sys.stderr.write(f"{summary(report)}{outcome}\n")
-    else:
-        for package in packages:
-            sys.stdout.write(_line(package, check))
 
 
 def _line(package: Generated, check: bool) -> str:
@@ -139,21 +119,13 @@ def _snapshot(request: GenOptions) -> dict[str, Stamp]:
     return snapshot(request.paths, request.scope.include, root) | stamps(files(request.paths, root))
 
 
-EPILOG = """\
-Example:
-
-\b
-  mkdir -p demo/msg
-  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
-  idlc gen demo -o out/demo
-
-All options can be kept in pyproject.toml:
-
-\b
-  [tool.idlc]
-  paths = ["demo"]
-  out = "out/demo"
-"""
+EPILOG = options.example(*options.DEMO, "idlc gen demo -o out/demo")
+EPILOG += "\n" + options.example(
+    "[tool.idlc]",
+    'paths = ["demo"]',
+    'out = "out/demo"',
+    title="All options can be kept in pyproject.toml",
+)
 
 
 class _Command(click.Command):
@@ -218,15 +190,17 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     it from.
     """
     from idlc.cli import output
-    from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions, in_package, with_settings
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
+    from idlc.project.find import is_path
+    from idlc.project.settings import scope, settings_here
+    from idlc.recordings.find import split_recordings
 
-    report = Report()
-    settings = load_settings(Root.here(), report)
+    settings, report = settings_here()
     if report.had_errors:
-        refuse(report, style)
+        if style == "text":
+            output.show(report, style, sys.stderr)
+        else:
+            _document(report, style)
         return output.status(report)
     package = arguments["package"]
     words = [arguments.pop(name) for name in ("package", "include", "exclude", "distro")]
@@ -237,7 +211,17 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if not request.paths or not (request.out or request.ament):
         missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
-    _refuse_useless(request, package)
+    root = request.scope.root
+    # which may have no effect on the paths
+    judged = request.paths if package or request.topics else ()
+    recordings, others = split_recordings(judged, root)
+    if request.topics and not recordings:
+        raise click.UsageError("--topic is for recordings, and none was given")
+    if package and not any(is_path(word, root) for word in others):
+        what = "what was recorded" if recordings else "what is installed"
+        raise click.UsageError(
+            f"--package is for files, and none was given; {what} keeps the name that messages have"
+        )
     if request.check and (watch or request.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
@@ -247,21 +231,3 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if watch:
         return run_again(request, style)
     return once(request, style)
-
-
-def _refuse_useless(request: GenOptions, package: str | None) -> None:
-    """Refuse options that have no effect on the paths."""
-    from idlc.project.find import is_path
-    from idlc.recordings.find import split_recordings
-
-    root = request.scope.root
-    recordings, others = (
-        split_recordings(request.paths, root) if package or request.topics else ((), ())
-    )
-    if request.topics and not recordings:
-        raise click.UsageError("--topic is for recordings, and none was given")
-    if package and not any(is_path(word, root) for word in others):
-        what = "what was recorded" if recordings else "what is installed"
-        raise click.UsageError(
-            f"--package is for files, and none was given; {what} keeps the name that messages have"
-        )

@@ -13,15 +13,8 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.project.settings import Scope
 
-EPILOG = """\
-Example:
 
-\b
-  idlc hash std_msgs/msg/Header std_srvs/srv/SetBool
-"""
-
-
-@click.command("hash", epilog=EPILOG)
+@click.command("hash", epilog=options.example("idlc hash std_msgs/msg/Header std_srvs/srv/SetBool"))
 @click.argument(
     "subjects",
     metavar="PATH|TYPE...",

@@ -13,15 +13,8 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.project.settings import Scope
 
-EPILOG = """\
-Example:
 
-\b
-  idlc list std_msgs
-"""
-
-
-@click.command("list", epilog=EPILOG)
+@click.command("list", epilog=options.example("idlc list std_msgs"))
 @click.argument("packages", metavar="[PACKAGE]...", nargs=-1, shell_complete=completion.packages)
 @options.scoped(options.include, options.distro)
 @options.style

@@ -6,15 +6,10 @@ import sys
 
 import click
 
-EPILOG = """\
-Example:
-
-\b
-  idlc lsp --check
-"""
+from idlc.cli import options
 
 
-@click.command("lsp", epilog=EPILOG)
+@click.command("lsp", epilog=options.example("idlc lsp --check"))
 @click.option("--check", is_flag=True, help="Print what the server can do, as JSON, and end.")
 @click.option(
     "--stdio", is_flag=True, expose_value=False, help="Many editors add it; it is so anyway."

@@ -27,7 +27,10 @@ def _run(words: list[str]) -> int:
         from idlc.cli.exit_status import status_of
 
         return status_of(lambda: check_paths(tuple(words[1:])))
-    if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
+    # words that editors add to a server's command have no effect
+    if words[:1] == ["lsp"] and all(
+        word == "--stdio" or word.startswith("--clientProcessId=") for word in words[1:]
+    ):
         from idlc.cli.direct import serve_editor
         from idlc.cli.exit_status import status_of
 
@@ -35,8 +38,3 @@ def _run(words: list[str]) -> int:
     from idlc.cli.app import run
 
     return run(words)
-
-
-def _is_added_by_clients(word: str) -> bool:
-    """Return whether a word is one that editors add to a server's command, without effect."""
-    return word == "--stdio" or word.startswith("--clientProcessId=")

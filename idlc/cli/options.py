@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any, TypeVar
 
@@ -17,7 +17,15 @@ FORMATS = ("text", "json")
 DOCUMENTS = ("github", "sarif", "junit", "gitlab")
 REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 
+#: Commands that write an interface, for examples.
+DEMO = ("mkdir -p demo/msg", "echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg")
+
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def example(*lines: str, title: str = "Example") -> str:
+    """Return the end of a command's help: an example of commands."""
+    return "\n".join((f"{title}:\n\n\b", *(f"  {line}" for line in lines), ""))
 
 
 def typed(*without: str) -> tuple[str, ...]:
@@ -42,58 +50,27 @@ def typed(*without: str) -> tuple[str, ...]:
     return (*arguments, *words)
 
 
-def package(command: Command) -> Command:
-    """Add --package."""
-    return click.option(
-        "--package",
-        metavar="NAME",
-        help="The package's name. Otherwise that of the nearest package.xml, of the package that "
-        "was generated from the files, or of the folder.",
-    )(command)
-
-
-def include(command: Command) -> Command:
-    """Add -I."""
-    return click.option(
-        "-I",
-        "--include",
-        metavar="DIR",
-        multiple=True,
-        type=click.Path(file_okay=False),
-        help="Look for other packages here first: a package, a source tree or an install prefix. "
-        "May be repeated.",
-    )(command)
-
-
-def exclude(command: Command) -> Command:
-    """Add --exclude."""
-    return click.option(
-        "--exclude",
-        metavar="PATTERN",
-        multiple=True,
-        help="Leave out files or folders such as `msg/ros1/**` or `*_test`. May be repeated.",
-    )(command)
-
-
-def distro(command: Command) -> Command:
-    """Add --distro with one name."""
-    return _distro(command, "NAME", "The distribution of ROS 2 to work for.", _single)
-
-
-def distros(command: Command) -> Command:
-    """Add --distro with several names."""
-    return _distro(command, "NAME,...", "Check for these distributions of ROS 2.", _several)
-
-
-def _distro(command: Command, metavar: str, text: str, callback: Any) -> Command:
-    more = "Otherwise `distro` in [tool.idlc], what is installed, or jazzy."
-    return click.option(
-        "--distro",
-        metavar=metavar,
-        help=f"{text} {more}",
-        callback=callback,
-        shell_complete=completion.distros,
-    )(command)
+package = click.option(
+    "--package",
+    metavar="NAME",
+    help="The package's name. Otherwise that of the nearest package.xml, of the package that "
+    "was generated from the files, or of the folder.",
+)
+include = click.option(
+    "-I",
+    "--include",
+    metavar="DIR",
+    multiple=True,
+    type=click.Path(file_okay=False),
+    help="Look for other packages here first: a package, a source tree or an install prefix. "
+    "May be repeated.",
+)
+exclude = click.option(
+    "--exclude",
+    metavar="PATTERN",
+    multiple=True,
+    help="Leave out files or folders such as `msg/ros1/**` or `*_test`. May be repeated.",
+)
 
 
 def _single(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
@@ -109,6 +86,35 @@ def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | 
         if name not in BY_NAME:
             raise click.UsageError(f"there is no distribution {name!r}; {unknown_distro(name)}")
     return value
+
+
+def _distro(metavar: str, text: str, callback: Any) -> Callable[[Command], Command]:
+    more = "Otherwise `distro` in [tool.idlc], what is installed, or jazzy."
+    return click.option(
+        "--distro",
+        metavar=metavar,
+        help=f"{text} {more}",
+        callback=callback,
+        shell_complete=completion.distros,
+    )
+
+
+distro = _distro("NAME", "The distribution of ROS 2 to work for.", _single)
+distros = _distro("NAME,...", "Check for these distributions of ROS 2.", _several)
+
+
+def output_style(formats: Sequence[str], text: str) -> Callable[[Command], Command]:
+    """Return the option --format with these names, the first of which is the default."""
+    choice = click.Choice(formats)
+    return click.option(
+        "--format", "style", type=choice, default=formats[0], show_default=True, help=text
+    )
+
+
+style = output_style(FORMATS, "For people, or one JSON object per line.")
+report_style = output_style(
+    REPORT_FORMATS, "For people, one JSON object per line, or what a CI system reads."
+)
 
 
 def scoped(
@@ -129,12 +135,10 @@ def scoped(
             **arguments: Any,
         ) -> int:
             from idlc.cli import output
-            from idlc.diagnostics.report import Report
-            from idlc.project.root import Root
-            from idlc.project.settings import load_settings, scope
+            from idlc.project.settings import scope, settings_here
 
-            report, text = Report(), None
-            settings = load_settings(Root.here(), report)
+            settings, report = settings_here()
+            text = None
             if not report.had_errors:
                 where = scope(settings, package, include, exclude, distro)
                 text = command(**arguments, scope=where, report=report)
@@ -148,42 +152,3 @@ def scoped(
         return run
 
     return decorate
-
-
-def style(command: Command) -> Command:
-    """Add --format."""
-    return click.option(
-        "--format",
-        "style",
-        type=click.Choice(FORMATS),
-        default="text",
-        show_default=True,
-        help="For people, or one JSON object per line.",
-    )(command)
-
-
-def report_style(command: Command) -> Command:
-    """Add --format with the formats that CI systems read."""
-    return click.option(
-        "--format",
-        "style",
-        type=click.Choice(REPORT_FORMATS),
-        default="text",
-        show_default=True,
-        help="For people, one JSON object per line, or what a CI system reads.",
-    )(command)
-
-
-def check_rules(*lists: str | None) -> None:
-    """Refuse lists of rules with an unknown name."""
-    from idlc.check.select import is_selector
-
-    for words in lists:
-        for word in (words or "").split(","):
-            if word and not is_selector(word):
-                from idlc.diagnostics.codes import CATEGORIES, CODES
-                from idlc.diagnostics.text import did_you_mean
-
-                hint = did_you_mean(word, (*CATEGORIES, *(code.slug for code in CODES.values())))
-                hint = hint or "`idlc explain` lists the codes"
-                raise click.UsageError(f"{word!r} means no rule; {hint}")

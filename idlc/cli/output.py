@@ -5,18 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report
-from idlc.diagnostics.terminal import MANY, counted, statistics, summary
 from idlc.diagnostics.text import one_line, visible
 from idlc.version import __version__
-
-if TYPE_CHECKING:
-    from idlc.check.run import CheckResult
 
 #: The text in our console scripts.
 _OURS = b"idlc.cli.main"
@@ -28,16 +24,10 @@ def program() -> str:
 
     for name in ("idlc", "rosidlc"):
         path = shutil.which(name)
-        if path and _is_ours(Path(path)):
-            return name
+        with suppress(OSError):
+            if path and _OURS in Path(path).read_bytes():
+                return name
     return f"{Path(sys.executable).name} -m idlc"
-
-
-def _is_ours(path: Path) -> bool:
-    try:
-        return _OURS in path.read_bytes()
-    except OSError:
-        return False
 
 
 WIDTH = 30
@@ -76,12 +66,11 @@ def colours(stream: TextIO) -> bool:
 
 def show(report: Report, style: str, stream: TextIO) -> None:
     """Write every problem to a stream, as text or as JSON lines."""
-    blocks = terminal.json_lines(report) if style == "json" else _spaced(report, stream)
-    stream.writelines(blocks)
-
-
-def _spaced(report: Report, stream: TextIO) -> list[str]:
-    return [f"{block}\n" for block in terminal.text(report, colour=colours(stream))]
+    if style == "json":
+        stream.writelines(terminal.json_lines(report))
+    else:
+        blocks = terminal.text(report, colour=colours(stream))
+        stream.writelines([f"{block}\n" for block in blocks])
 
 
 def notes(report: Report, stream: TextIO) -> None:
@@ -117,41 +106,13 @@ def status(report: Report) -> int:
     return 1 if report.had_errors else 0
 
 
-def write_report(
-    report: Report,
-    style: str,
-    checked: CheckResult,
-    stream: TextIO,
-    *,
-    command: str = "check",
-    numbers: bool = False,
-    strict: bool = False,
+def document(
+    report: Report, style: str, command: str, files: tuple[str, ...] = (), *, strict: bool = False
 ) -> None:
-    """Write a report on checked files; formats for machines are one whole document.
+    """Write a report on files as the document of a CI system to standard output.
 
-    With `numbers`, the text has the number of problems by code instead of each; with `strict`,
-    warnings fail as errors do.
+    With `strict`, warnings fail as errors do.
     """
-    files, fixed = checked.files, checked.fixed
-    match style:
-        case "text":
-            if not numbers:
-                show(report, style, stream)
-            if numbers or len(report) > MANY:
-                stream.writelines(statistics(report))
-            done = f"{counted(fixed, 'problem')} fixed, " if fixed else ""
-            what = counted(len(files), "file")
-            if not files and checked.packages:
-                what = f"{counted(checked.packages, 'package')} without interfaces"
-            which = f" for {', '.join(checked.distros)}" if checked.distros else ""
-            rest = summary(report) if len(report) else f"no problems in {what}{which}"
-            stream.write(f"{done}{rest}\n")
-        case "json":
-            show(report, style, stream)
-            facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
-            facts |= {"distros": list(checked.distros)} if checked.distros else {}
-            fact(stream, "summary", **counts(report), **facts)
-        case _:
-            from idlc.diagnostics.formats import DOCUMENTS, Run
+    from idlc.diagnostics.formats import DOCUMENTS, Run
 
-            stream.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))
+    sys.stdout.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))

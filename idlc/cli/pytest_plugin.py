@@ -6,12 +6,9 @@ import warnings
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic
 
 #: How many differences between two messages are listed; pytest shows few of them without -vv.
 MOST = 1000
@@ -90,13 +87,19 @@ class InterfaceItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fail with the errors that idlc reports for the file."""
+        from idlc.check import select
+        from idlc.check.run import CheckOptions, check
         from idlc.diagnostics.report import Severity
         from idlc.diagnostics.terminal import text
+        from idlc.project.settings import scope, settings_here
 
-        problems = _problems(self.path)
+        settings, report = settings_here()
+        selection = select.selection(settings, report)
+        if not report.had_errors:
+            check(CheckOptions((str(self.path),), scope(settings), selection), report)
         strict = self.config.getoption("--idlc-strict")
-        errors = [problem for problem in problems if strict or problem.severity is Severity.ERROR]
-        for problem in problems:
+        errors = [problem for problem in report if strict or problem.severity is Severity.ERROR]
+        for problem in report:
             if problem not in errors:
                 place = f"{problem.where[0]}: {problem.code}: {problem.message}"
                 warnings.warn(place, InterfaceWarning, stacklevel=1)
@@ -114,18 +117,3 @@ class InterfaceItem(pytest.Item):
     def reportinfo(self) -> tuple[Path, int | None, str]:
         """Return the name of the test."""
         return self.path, None, f"idlc {self.path.name}"
-
-
-def _problems(path: Path) -> list[Diagnostic]:
-    from idlc.check import select
-    from idlc.check.run import CheckOptions, check
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
-
-    report = Report()
-    settings = load_settings(Root.here(), report)
-    selection = select.selection(settings, report)
-    if not report.had_errors:
-        check(CheckOptions((str(path),), scope(settings), selection), report)
-    return list(report)

@@ -12,17 +12,6 @@ import click
 from idlc.cli import options
 from idlc.cli.app import LazyGroup
 
-EPILOG = """\
-Example:
-
-\b
-  idlc scaffold package my_robot
-  cd my_robot
-  idlc scaffold interface msg Command 'string verb' 'float32 speed  # [m/s]'
-  idlc scaffold node commander --publisher Command:command@2
-  idlc gen
-"""
-
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 #: Each command with its line in the overview.
@@ -43,13 +32,24 @@ SYNONYMS = {
 }
 
 
+class Scaffold(LazyGroup):
+    """The group of these commands."""
+
+    overview = COMMANDS
+    modules = "idlc.cli.scaffold_"
+    synonyms = SYNONYMS
+
+
 @click.group(
     "scaffold",
-    cls=LazyGroup,
-    overview=COMMANDS,
-    modules="idlc.cli.scaffold_",
-    synonyms=SYNONYMS,
-    epilog=EPILOG,
+    cls=Scaffold,
+    epilog=options.example(
+        "idlc scaffold package my_robot",
+        "cd my_robot",
+        "idlc scaffold interface msg Command 'string verb' 'float32 speed  # [m/s]'",
+        "idlc scaffold node commander --publisher Command:command@2",
+        "idlc gen",
+    ),
 )
 def command() -> None:
     """Write packages, interfaces and nodes, and enter them where they belong.
@@ -81,7 +81,6 @@ def common(function: Command) -> Command:
 def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
     """Show the outcome of a command and return the exit status; `hints` are the next commands."""
     from idlc.cli import output
-    from idlc.cli.output import program
     from idlc.diagnostics.terminal import summary
 
     output.show(report, "text", sys.stderr)
@@ -92,14 +91,13 @@ def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
         sys.stdout.writelines(result.diff)
         return output.status(report)
     folder = "" if result.folder in ("", ".") else f"{result.folder}/"
-    for done in result.done:
-        if done.what != "unchanged":
-            sys.stdout.write(f"{done.what} {folder}{done.path}\n")
-    if all(done.what == "unchanged" for done in result.done):
+    changes = [done for done in result.done if done.what != "unchanged"]
+    sys.stdout.writelines(f"{done.what} {folder}{done.path}\n" for done in changes)
+    if not changes:
         sys.stdout.write("nothing to do: everything is there\n")
     sys.stdout.writelines(f"note: {note}\n" for note in result.notes)
-    if any(done.what != "unchanged" for done in result.done):
+    if changes:
         if result.following:
-            hints = (shlex.join([*program().split(), *result.following]), *hints)
+            hints = (shlex.join([*output.program().split(), *result.following]), *hints)
         sys.stdout.writelines(f"next: {hint}\n" for hint in hints)
     return output.status(report)

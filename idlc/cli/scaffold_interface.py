@@ -6,16 +6,15 @@ from typing import Any
 
 import click
 
+from idlc.cli import options
 from idlc.cli.scaffold import common, finish
 
-EPILOG = """\
-Example, within a package:
-
-\b
-  idlc scaffold interface msg RobotCommand \\
-      'string command_type' 'float32 linear_velocity_x  # [m/s]'
-  idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'
-"""
+EPILOG = options.example(
+    "idlc scaffold interface msg RobotCommand \\",
+    "    'string command_type' 'float32 linear_velocity_x  # [m/s]'",
+    "idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'",
+    title="Example, within a package",
+)
 
 
 @click.command("interface", epilog=EPILOG, context_settings={"ignore_unknown_options": True})
@@ -40,22 +39,17 @@ def command(
     from idlc.diagnostics.report import Report
     from idlc.model.ir import KINDS
     from idlc.project.root import Root
+    from idlc.scaffold import interface
     from idlc.scaffold.changes import Settings
-    from idlc.scaffold.interface import (
-        check_fields,
-        check_interface_name,
-        interface,
-        interface_text,
-    )
 
     report = Report()
     try:
-        check_interface_name(name)
-        check_fields(fields)
-        interface_text(kind, fields, comment)
+        interface.check_interface_name(name)
+        interface.check_fields(fields)
+        interface.interface_text(kind, fields, comment)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     settings = Settings(Root.here(), include=include, **arguments)
     checked_kind = KINDS[KINDS.index(kind)]
-    result = interface(checked_kind, name, fields, comment, settings, report)
+    result = interface.interface(checked_kind, name, fields, comment, settings, report)
     return finish(result, report)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -26,7 +26,6 @@ _QUESTIONS: dict[ir.Kind, tuple[str, str]] = {
     "action": ("Action type, such as Countdown", "Action name"),
 }
 
-Answer = TypeVar("Answer")
 #: Raises ValueError for an interface that does not exist.
 CheckType = Callable[[Role, str], None]
 
@@ -40,48 +39,41 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
     parameters: list[spec.Parameter] = []
     while (chosen := click.prompt(f"Add ({DONE} to finish)", type=choices, default=DONE)) != DONE:
         if chosen == PARAMETER:
-            parameters.append(_answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter))
+            answer = _answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter)
+            parameters.append(spec.parameter(answer))
         else:
             endpoints.append(_endpoint(roles[chosen], check_type))
     lifecycle = click.confirm("Make it a lifecycle node?", default=False, prompt_suffix=" ")
     return spec.Node(name, "", spec.in_order(endpoints), tuple(parameters), lifecycle)
 
 
-def _answer(
-    question: str, understand: Callable[[str], Answer], default: str | None = None
-) -> Answer:
-    """Ask until the answer is valid; return its value."""
+def _answer(question: str, check: Callable[[str], object], default: str | None = None) -> str:
+    """Ask until the answer is valid, for which `check` raises no ValueError."""
 
-    def process(text: str) -> Answer:
+    def process(text: str) -> str:
         try:
-            return understand(text)
+            check(text)
         except ValueError as error:
             raise click.BadParameter(str(error)) from error
+        return text
 
-    answer: Answer = click.prompt(question, default=default, value_proc=process)
-    return answer
+    return str(click.prompt(question, default=default, value_proc=process))
 
 
 def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
     """Ask for the value of the role's option."""
-
-    def existing(text: str) -> str:
-        check_type(role, text)
-        return text
-
-    def checked(value: str) -> str:
-        spec.endpoint(role, value)
-        return value
-
     value = ""
     if role.kind:
         type_question, name_question = _QUESTIONS[role.kind]
-        type_ = _answer(type_question, existing)
-        value = _answer(name_question, lambda name: checked(f"{type_}:{name}"))
+        type_ = _answer(type_question, lambda text: check_type(role, text))
+        name = _answer(name_question, lambda text: spec.endpoint(role, f"{type_}:{text}"))
+        value = f"{type_}:{name}"
     question = role.question
     if question and not (question.separator and question.separator in value):
-        head = f"{value}{question.separator}"
-        value = _answer(question.text, lambda answer: checked(f"{head}{answer}"), question.default)
+        start = f"{value}{question.separator}"
+        value = start + _answer(
+            question.text, lambda text: spec.endpoint(role, start + text), question.default
+        )
     if role.kind != "msg":
         return spec.endpoint(role, value)
     preset = click.prompt(
@@ -113,30 +105,24 @@ class NodeCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Assign each quality of service to its endpoint, then parse as usual."""
         if not ctx.resilient_parsing:
+            names = {role.name for role in ROLES if role.kind}
+            counts: Counter[str] = Counter()
+            last: tuple[str, int] | None = None
+            owners = ctx.meta[_OWNERS] = []
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
-            ctx.meta[_OWNERS] = _owners([parameter.name or "" for parameter in order], ctx)
+            for name in (parameter.name or "" for parameter in order):
+                if name in names:
+                    last = (name, counts[name])
+                    counts[name] += 1
+                elif name == "qos":
+                    if last is None:
+                        raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
+                    owners.append(last)
         return super().parse_args(ctx, args)
 
 
 #: The key of the endpoints with a --qos in the context: for each, its role and its index.
 _OWNERS = "idlc.qos"
-
-
-def _owners(order: list[str], ctx: click.Context) -> list[tuple[str, int]]:
-    """Return the endpoint before each --qos; `order` names the options as typed."""
-    names = {role.name for role in ROLES if role.kind}
-    counts: Counter[str] = Counter()
-    last: tuple[str, int] | None = None
-    owners = []
-    for name in order:
-        if name in names:
-            last = (name, counts[name])
-            counts[name] += 1
-        elif name == "qos":
-            if last is None:
-                raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
-            owners.append(last)
-    return owners
 
 
 def _role_options(function: Any) -> Any:
@@ -178,10 +164,9 @@ def command(name: str, **arguments: Any) -> int:
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.scaffold import changes, new_node
-    from idlc.scaffold.changes import Settings
 
     shared = ("dry_run", "force", "include", "templates", "launch")
-    settings = Settings(Root.here(), **{key: arguments[key] for key in shared})
+    settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle")
     try:
         spec.check_name(name)
@@ -190,7 +175,14 @@ def command(name: str, **arguments: Any) -> int:
         else:
             owners = click.get_current_context().meta[_OWNERS]
             presets = dict(zip(owners, arguments["qos"], strict=True))
-            requested = _requested(name, arguments, presets)
+            endpoints = (
+                spec.endpoint(role, value, presets.get((role.name, n)))
+                for role in ROLES
+                for n, value in enumerate(arguments[role.name])
+            )
+            parameters = tuple(map(spec.parameter, arguments["parameters"]))
+            lifecycle = arguments["lifecycle"]
+            requested = spec.Node(name, "", tuple(endpoints), parameters, lifecycle)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
@@ -200,16 +192,3 @@ def command(name: str, **arguments: Any) -> int:
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)
     test = f"{python} -m pytest {folder}test/test_{name}.py"
     return finish(result, report, (*install, test))
-
-
-def _requested(
-    name: str, arguments: dict[str, Any], presets: dict[tuple[str, int], str]
-) -> spec.Node:
-    """Return the node that the command line describes."""
-    endpoints = (
-        spec.endpoint(role, value, presets.get((role.name, n)))
-        for role in ROLES
-        for n, value in enumerate(arguments[role.name])
-    )
-    parameters = tuple(map(spec.parameter, arguments["parameters"]))
-    return spec.Node(name, "", tuple(endpoints), parameters, arguments["lifecycle"])

@@ -6,15 +6,14 @@ from typing import Any
 
 import click
 
+from idlc.cli import options
 from idlc.cli.scaffold import common, finish
 
-EPILOG = """\
-Examples:
-
-\b
-  idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com
-  idlc scaffold package --interfaces my_msgs Drive srv/Ask
-"""
+EPILOG = options.example(
+    "idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com",
+    "idlc scaffold package --interfaces my_msgs Drive srv/Ask",
+    title="Examples",
+)
 BUILD_TYPES = ("ament_python", "ament_cmake")
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 

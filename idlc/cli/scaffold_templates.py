@@ -7,19 +7,16 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion
+from idlc.cli import completion, options
 from idlc.cli.scaffold import finish, writing
 
-EPILOG = """\
-Example:
 
-\b
-  idlc scaffold templates
-  idlc scaffold templates --copy node/publisher.py.jinja
-"""
-
-
-@click.command("templates", epilog=EPILOG)
+@click.command(
+    "templates",
+    epilog=options.example(
+        "idlc scaffold templates", "idlc scaffold templates --copy node/publisher.py.jinja"
+    ),
+)
 @click.option(
     "--copy",
     "copies",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -20,78 +20,36 @@ SHORT = len("RIHS01_") + 8
 HEAD = ("topic", "type", "messages", "hash", "here")
 
 
-def show_recording(
-    path: str, selected: Sequence[str], style: str, scope: Scope, report: Report
-) -> None:
-    """Show the topics of a recording, or definitions of selected ones."""
-    from idlc.cli import output
-    from idlc.documents.show import definitions, topics
+def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
+    from idlc.diagnostics.text import display_width, one_line
 
-    if selected:
-        output.texts(definitions(path, selected, style, scope, report), style, sys.stdout)
-    elif style == "json":
-        for facts in topics(path, scope, report):
-            output.fact(sys.stdout, "topic", **facts._asdict())
-    elif style == "text":
-        sys.stdout.writelines(_table(topics(path, scope, report)))
-    else:
-        raise click.UsageError(f"--format {style} shows types: name a topic")
-
-
-def _table(topic_facts: Sequence[TopicFacts]) -> list[str]:
-    from idlc.diagnostics.text import display_width
-
-    rows = [HEAD, *map(_row, topic_facts)] if topic_facts else []
+    rows: list[tuple[str, ...]] = [HEAD] if topic_facts else []
+    for facts in topic_facts:
+        count = "?" if facts.messages is None else str(facts.messages)
+        hash_ = one_line(facts.hash or "-")
+        no_definition = "" if facts.definition else "; no definition in the recording"
+        name = one_line(facts.name)
+        # lines that begin with other characters may be commands to a CI system
+        name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
+        type_ = one_line(facts.type_name)
+        rows.append((name, type_, count, hash_[:SHORT], facts.here + no_definition))
     widths = [max(map(display_width, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(map(_padded, row, widths, range(len(row)))).rstrip() + "\n" for row in rows]
+    for row in rows:
+        cells = []
+        for head, text, width in zip(HEAD, row, widths, strict=True):
+            space = " " * (width - display_width(text))
+            cells.append(space + text if head == "messages" else text + space)
+        yield "  ".join(cells).rstrip() + "\n"
 
 
-def _row(facts: TopicFacts) -> tuple[str, ...]:
-    from idlc.diagnostics.text import one_line
-
-    count = "?" if facts.messages is None else str(facts.messages)
-    hash_ = one_line(facts.hash or "-")
-    comparison = facts.here
-    if not facts.definition:
-        comparison += "; no definition in the recording"
-    name = one_line(facts.name)
-    # lines that begin with other characters may be commands to a CI system
-    name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
-    return name, one_line(facts.type_name), count, hash_[:SHORT], comparison
-
-
-def _padded(text: str, width: int, column: int) -> str:
-    from idlc.diagnostics.text import display_width
-
-    space = " " * (width - display_width(text))
-    return space + text if HEAD[column] == "messages" else text + space
-
-
-FORMATS = ("text", "json", "ros2idl", "jsonschema", "mcap")
-
-EPILOG = """\
-Example:
-
-\b
-  idlc show geometry_msgs/msg/PoseStamped
-"""
-
-
-@click.command("show", epilog=EPILOG)
+@click.command("show", epilog=options.example("idlc show geometry_msgs/msg/PoseStamped"))
 @click.argument(
-    "subject",
-    metavar="TYPE|PATH|REC",
-    type=click.Path(),
-    shell_complete=completion.types_and_paths,
+    "subject", metavar="TYPE|PATH|REC", type=click.Path(), shell_complete=completion.types_and_paths
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
-@click.option(
-    "--format",
-    "style",
-    type=click.Choice(FORMATS),
-    default="text",
-    show_default=True,
-    help="For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
+@options.output_style(
+    ("text", "json", "ros2idl", "jsonschema", "mcap"),
+    "For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
 )
 @options.scoped(options.package, options.include, options.distro)
 def command(
@@ -104,12 +62,20 @@ def command(
     TOPIC, the definitions of their types.
     """
     from idlc.cli import output
-    from idlc.documents.show import show
+    from idlc.documents import show
     from idlc.recordings.find import is_recording
 
-    if is_recording(subject, scope.root):
-        show_recording(subject, topics, style, scope, report)
+    if not is_recording(subject, scope.root):
+        if topics:
+            raise click.UsageError(f"`{subject}` is no recording, so it has no topics")
+        output.texts(show.show(subject, style, scope, report), style, sys.stdout)
     elif topics:
-        raise click.UsageError(f"`{subject}` is no recording, so it has no topics")
+        definitions = show.definitions(subject, topics, style, scope, report)
+        output.texts(definitions, style, sys.stdout)
+    elif style == "json":
+        for facts in show.topics(subject, scope, report):
+            output.fact(sys.stdout, "topic", **facts._asdict())
+    elif style == "text":
+        sys.stdout.writelines(_table(show.topics(subject, scope, report)))
     else:
-        output.texts(show(subject, style, scope, report), style, sys.stdout)
+        raise click.UsageError(f"--format {style} shows types: name a topic")

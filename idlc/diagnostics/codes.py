@@ -64,13 +64,7 @@ class Code(msgspec.Struct, frozen=True):
         )
 
     def of(
-        self,
-        path: str,
-        message: str,
-        *,
-        hint: str | None = None,
-        detail: str = "",
-        place: str = "",
+        self, path: str, message: str, *, hint: str | None = None, detail: str = "", place: str = ""
     ) -> Diagnostic:
         """Return a problem of this kind with a whole file or folder."""
         return Diagnostic(

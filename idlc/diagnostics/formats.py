@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from idlc.diagnostics.codes import CODES
 from idlc.diagnostics.explain import page
-from idlc.diagnostics.report import Diagnostic, Edit, Severity
+from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import one_line
 
@@ -37,11 +37,14 @@ def github(diagnostics: Iterable[Diagnostic], _: Run) -> str:
 
 def _command(diagnostic: Diagnostic) -> str:
     slug = CODES[diagnostic.code].slug
-    facts = {
-        "file": diagnostic.file,
-        **_region(diagnostic),
-        "title": f"{diagnostic.code} {slug}",
-    }
+    region = {}
+    if diagnostic.span is not None and not diagnostic.within:
+        line, column, end_line, end_column = diagnostic.span.corners
+        region = {"line": line, "endLine": end_line}
+        # GitHub shows columns only for places within one line
+        if end_line == line:
+            region |= {"col": column, "endColumn": end_column}
+    facts = {"file": diagnostic.file, **region, "title": f"{diagnostic.code} {slug}"}
     listed = ",".join(
         f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
     )
@@ -52,16 +55,6 @@ def _command(diagnostic: Diagnostic) -> str:
 def notice(title: str, text: str) -> str:
     """Return a command that shows a line about the whole run."""
     return f"::notice title={_property(one_line(title))}::{_escaped(one_line(text))}\n"
-
-
-def _region(diagnostic: Diagnostic) -> dict[str, int]:
-    if diagnostic.span is None or diagnostic.within:
-        return {}
-    line, column, end_line, end_column = diagnostic.span.corners
-    # GitHub shows columns only for places within one line
-    if end_line != line:
-        return {"line": line, "endLine": end_line}
-    return {"line": line, "endLine": line, "col": column, "endColumn": end_column}
 
 
 def _escaped(text: str) -> str:
@@ -75,19 +68,19 @@ def _property(text: str) -> str:
 def gitlab(diagnostics: Iterable[Diagnostic], _: Run) -> str:
     """Return the JSON document."""
     seen: dict[str, int] = {}
-    return json.dumps([_issue(diagnostic, seen) for diagnostic in diagnostics], indent=2) + "\n"
-
-
-def _issue(diagnostic: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
-    line = diagnostic.span.corners[0] if diagnostic.span and not diagnostic.within else 1
-    return {
-        "type": "issue",
-        "check_name": diagnostic.code,
-        "description": "; ".join(diagnostic.sentences(hint=False)),
-        "severity": "major" if diagnostic.severity is Severity.ERROR else "minor",
-        "fingerprint": fingerprint(diagnostic, seen),
-        "location": {"path": diagnostic.file or ".", "lines": {"begin": line}},
-    }
+    issues = []
+    for diagnostic in diagnostics:
+        line = diagnostic.span.corners[0] if diagnostic.span and not diagnostic.within else 1
+        issue = {
+            "type": "issue",
+            "check_name": diagnostic.code,
+            "description": "; ".join(diagnostic.sentences(hint=False)),
+            "severity": "major" if diagnostic.severity is Severity.ERROR else "minor",
+            "fingerprint": fingerprint(diagnostic, seen),
+            "location": {"path": diagnostic.file or ".", "lines": {"begin": line}},
+        }
+        issues.append(issue)
+    return json.dumps(issues, indent=2) + "\n"
 
 
 def fingerprint(diagnostic: Diagnostic, seen: dict[str, int]) -> str:
@@ -204,7 +197,13 @@ def _result(diagnostic: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str
             for label in diagnostic.labels
         ]
     if diagnostic.edits:
-        result["fixes"] = [{"artifactChanges": [_change(edit) for edit in diagnostic.edits]}]
+        changes = []
+        for edit in diagnostic.edits:
+            region = _physical_region(edit.span)
+            replacement = {"deletedRegion": region, "insertedContent": {"text": edit.text}}
+            file = _artifact(edit.span.source.path)
+            changes.append({"artifactLocation": file, "replacements": [replacement]})
+        result["fixes"] = [{"artifactChanges": changes}]
     return result
 
 
@@ -227,15 +226,6 @@ def _physical_region(span: Span) -> dict[str, int]:
     return dict(
         zip(("startLine", "startColumn", "endLine", "endColumn"), span.corners, strict=True)
     )
-
-
-def _change(edit: Edit) -> dict[str, object]:
-    return {
-        "artifactLocation": _artifact(edit.span.source.path),
-        "replacements": [
-            {"deletedRegion": _physical_region(edit.span), "insertedContent": {"text": edit.text}}
-        ],
-    }
 
 
 #: By the name of the format.

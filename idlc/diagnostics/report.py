@@ -108,13 +108,14 @@ class Report:
 
     def __init__(self) -> None:
         self._diagnostics: dict[tuple[str, str, int, int, str], Diagnostic] = {}
-        self._had_errors = False
+        #: Whether any problem is an error.
+        self.had_errors = False
         self.notes: list[str] = []
 
     def add(self, diagnostic: Diagnostic) -> None:
         """Add a problem unless the same code was already reported at the same location."""
         self._diagnostics.setdefault(diagnostic.identity, diagnostic)
-        self._had_errors = self._had_errors or diagnostic.severity is Severity.ERROR
+        self.had_errors |= diagnostic.severity is Severity.ERROR
 
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
         """Add several problems."""
@@ -128,11 +129,6 @@ class Report:
 
     def __len__(self) -> int:
         return len(self._diagnostics)
-
-    @property
-    def had_errors(self) -> bool:
-        """True if any problem is an error."""
-        return self._had_errors
 
     @property
     def errors(self) -> list[Diagnostic]:

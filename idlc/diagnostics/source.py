@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from functools import cached_property
+from itertools import accumulate
 from typing import NamedTuple
 
 
@@ -38,10 +39,7 @@ class Source:
     @cached_property
     def line_starts(self) -> tuple[int, ...]:
         """Character offset of each line's first character; one entry at least."""
-        starts = [0]
-        for line in self.lines:
-            starts.append(starts[-1] + len(line))
-        return tuple(starts[:-1]) or (0,)
+        return tuple(accumulate(map(len, self.lines), initial=0))[:-1] or (0,)
 
     def position(self, offset: int) -> tuple[int, int]:
         """Return the 1-based (line, column) of a character offset; columns count characters."""

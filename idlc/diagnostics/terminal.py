@@ -27,21 +27,11 @@ LINE_WIDTH = 100
 TEXT_WIDTH = 1000
 BEFORE_CARET = 40
 
-_STYLES = {
-    "error": "1;31",
-    "warning": "1;33",
-    "hint": "1;36",
-    "frame": "1;34",
-    "bold": "1",
-}
+_STYLES = {"error": "1;31", "warning": "1;33", "hint": "1;36", "frame": "1;34", "bold": "1"}
 
 
 def _coloured(style: str, text: str) -> str:
     return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if text else ""
-
-
-def _plain(_: str, text: str) -> str:
-    return text
 
 
 Paint: TypeAlias = Callable[[str, str], str]
@@ -65,7 +55,7 @@ def text(
 
     Ends with a count of those beyond `limit`.
     """
-    paint = _coloured if colour else _plain
+    paint: Paint = _coloured if colour else lambda _, text: text
     diagnostics = list(diagnostics)
     if len(diagnostics) > limit:  # no error is left out for a warning
         diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
@@ -96,9 +86,9 @@ def _line(diagnostic: Diagnostic, paint: Paint) -> str:
 
 def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
     """Yield a line for each reported code, the most frequent first."""
-    counts = Counter(diagnostic.code for diagnostic in diagnostics)
-    width = max(map(len, map(str, counts.values())), default=0)
-    for code, number in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
+    counts = Counter(sorted(diagnostic.code for diagnostic in diagnostics)).most_common()
+    width = len(str(counts[0][1])) if counts else 0
+    for code, number in counts:
         yield f"{number:>{width}}  {code} {CODES[code].slug}\n"
 
 
@@ -106,9 +96,11 @@ def _block(diagnostic: Diagnostic, paint: Paint) -> Iterator[str]:
     level = diagnostic.severity.name.lower()
     head = paint(level, f"{level}[{diagnostic.code}]")
     yield f"{head}{paint('bold', ': ' + one_line(_shortened(diagnostic.message)))}"
-    marks = _marks(diagnostic)
+    marks = [_mark(diagnostic.span, "^", "")] if diagnostic.span else []
+    if marks:
+        marks += [_mark(label.span, "-", label.text) for label in diagnostic.labels]
     margin = " " * max((len(str(mark.line)) for mark in marks), default=1)
-    if diagnostic.span:
+    if marks:
         yield from _snippets(marks, margin, paint)
     elif diagnostic.path:
         yield f"{margin}{paint('frame', '-->')} {one_line(diagnostic.path)}"
@@ -130,13 +122,6 @@ def _block(diagnostic: Diagnostic, paint: Paint) -> Iterator[str]:
 def _shortened(text: str) -> str:
     """Return a text without its middle if it is too long to read."""
     return text if len(text) <= TEXT_WIDTH else f"{text[: TEXT_WIDTH - 200]} … {text[-100:]}"
-
-
-def _marks(diagnostic: Diagnostic) -> list[_Mark]:
-    if not diagnostic.span:
-        return []
-    others = [_mark(label.span, "-", label.text) for label in diagnostic.labels]
-    return [_mark(diagnostic.span, "^", ""), *others]
 
 
 def _mark(span: Span, sign: str, label: str) -> _Mark:
@@ -192,11 +177,8 @@ def summary(diagnostics: Iterable[Diagnostic]) -> str:
     """Return the closing line, such as `2 errors, 1 warning in 3 files`."""
     reported = list(diagnostics)
     errors = sum(diagnostic.severity is Severity.ERROR for diagnostic in reported)
-    parts = [
-        counted(number, noun)
-        for number, noun in ((errors, "error"), (len(reported) - errors, "warning"))
-        if number
-    ]
+    numbers = {"error": errors, "warning": len(reported) - errors}
+    parts = [counted(number, noun) for noun, number in numbers.items() if number]
     files = len({diagnostic.where[0] for diagnostic in reported})
     return f"{', '.join(parts)} in {counted(files, 'file')}" if parts else "no problems"
 
@@ -211,25 +193,21 @@ def json_lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
     import json
 
     for diagnostic in diagnostics:
-        yield json.dumps(_facts(diagnostic)) + "\n"
-
-
-def _facts(diagnostic: Diagnostic) -> dict[str, object]:
-    return {
-        "type": "diagnostic",
-        "code": diagnostic.code,
-        "slug": CODES[diagnostic.code].slug,
-        "severity": diagnostic.severity.name.lower(),
-        "message": diagnostic.message,
-        **_range(diagnostic.span, diagnostic.path),
-        "hint": diagnostic.hint,
-        "detail": diagnostic.detail or None,
-        **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
-        **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
-        "labels": [
-            {"message": label.text, **_range(label.span, "")} for label in diagnostic.labels
-        ],
-    }
+        labels = diagnostic.labels
+        facts = {
+            "type": "diagnostic",
+            "code": diagnostic.code,
+            "slug": CODES[diagnostic.code].slug,
+            "severity": diagnostic.severity.name.lower(),
+            "message": diagnostic.message,
+            **_range(diagnostic.span, diagnostic.path),
+            "hint": diagnostic.hint,
+            "detail": diagnostic.detail or None,
+            **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
+            **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
+            "labels": [{"message": label.text, **_range(label.span, "")} for label in labels],
+        }
+        yield json.dumps(facts) + "\n"
 
 
 def _range(span: Span | None, path: str) -> dict[str, object]:

@@ -97,14 +97,13 @@ def closest(name: str, names: Iterable[str]) -> str | None:
     if len(name) > 100:
         return None
     limit = min(max(1, len(name) // 3), 3)
-    best: tuple[int, str] | None = None
-    for candidate in names:
-        if abs(len(candidate) - len(name)) > limit:
-            continue
-        distance = edit_distance(name.lower(), candidate.lower())
-        if distance <= limit and (best is None or (distance, candidate) < best):
-            best = distance, candidate
-    return best[1] if best else None
+    distances = (
+        (edit_distance(name.lower(), candidate.lower()), candidate)
+        for candidate in names
+        if abs(len(candidate) - len(name)) <= limit
+    )
+    near = min((pair for pair in distances if pair[0] <= limit), default=None)
+    return near[1] if near else None
 
 
 def package_hint(name: str, names: Iterable[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
@@ -89,16 +89,6 @@ def _package_page(
     )
 
 
-def _title_page(packages: Packages, home: Mapping[str, str], about: Abouts) -> Listing:
-    entries = []
-    for name, interfaces in packages.items():
-        own = about.get(name, About())
-        version = [f"version {own.version}"] if own.version else []
-        facts = " · ".join([*version, counted(interfaces)])
-        entries.append(Entry(home[name], words(name), "", facts, own.description))
-    return Listing("Interfaces", "", (), (), "", True, entries)
-
-
 def counted(interfaces: Sequence[ir.Interface]) -> str:
     """Return the number of interfaces of each kind, in words."""
     kinds: Counter[str] = Counter(interface.name.kind for interface in interfaces)
@@ -143,26 +133,27 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
         yield RenderedFile(home[package], template.render(page=shown))
     if len(packages) > 1:
         template = html().get_template("documents/index.html.jinja")
-        shown = _title_page(packages, home, about)
+        entries = []
+        for name, interfaces in packages.items():
+            own_facts = about.get(name, About())
+            version = [f"version {own_facts.version}"] if own_facts.version else []
+            line = " · ".join([*version, counted(interfaces)])
+            entries.append(Entry(home[name], words(name), "", line, own_facts.description))
+        shown = Listing("Interfaces", "", (), (), "", True, entries)
         yield RenderedFile("index.html", template.render(page=shown))
     yield RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n")
     for path in ("search.js", "style.css"):
         yield RenderedFile(path, verbatim(f"documents/{path}"))
     template = html().get_template("documents/interface.html.jinja")
-    users = _users(interface for interface, _ in sources.values())
+    users: dict[ir.TypeName, set[ir.TypeName]] = {}
+    for interface, _ in sources.values():
+        for target in derive.references(interface):
+            users.setdefault(target, set()).add(interface.name)
     owners = {name: Home(home[name], about.get(name, About()).version) for name in home}
     for name, (interface, model) in sorted(sources.items()):
         owner = owners.get(name.package, Home())
         text = template.render(page=page(interface, model, users.get(name, set()), pages, owner))
         yield RenderedFile(pages[name], text)
-
-
-def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeName]]:
-    users: dict[ir.TypeName, set[ir.TypeName]] = {}
-    for interface in interfaces:
-        for target in derive.references(interface):
-            users.setdefault(target, set()).add(interface.name)
-    return users
 
 
 def _index(packages: Packages, home: Mapping[str, str], pages: Pages, about: Abouts) -> str:
@@ -188,23 +179,13 @@ def _items(interface: ir.Interface) -> Iterator[tuple[str, str]]:
     for part in derive.sections(interface):
         before = prefix(interface, part)
         divider = "_" if before else "."
-        items = [(constant.name, constant.comment) for constant in part.constants]
-        items += [(field.name, field.comment) for field in part.fields]
-        for name, comment in items:
-            yield f"{divider}{before}{name}", printable(" ".join(comment[:1]))
+        items: tuple[ir.Constant | ir.Field, ...] = (*part.constants, *part.fields)
+        for item in items:
+            yield f"{divider}{before}{item.name}", printable(" ".join(item.comment[:1]))
 
 
 #: The pages that a run wrote, each with its SHA-256.
 LISTING = "idlc-docs.json"
-
-
-def write(out: str, files: Mapping[str, str], root: Root, report: Report) -> bool:
-    """Write files below `out`; report IDL612 to IDL614 and return `False` if that is refused."""
-    folder = root.absolute(out)
-    pages = {path: text.encode("utf-8") for path, text in files.items()}
-    with exclusive(folder):
-        planned = plan(folder, out, pages, _listed(folder), report, record=LISTING)
-        return planned is not None and apply(planned, out, report, _listing)
 
 
 def _listing(outputs: Mapping[str, str]) -> bytes:
@@ -235,11 +216,13 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
 
     about = {package.package: _about(package, scope.root) for package in packages}
     with stage("document", out):
-        files = {file.path: file.text for file in site(models, about)}
-    written = Report()
-    done = write(out, files, scope.root, written)
-    report.extend(written)
-    return sum(path.endswith(".html") for path in files) if done else 0
+        pages = {file.path: file.text.encode("utf-8") for file in site(models, about)}
+    folder, problems = scope.root.absolute(out), Report()
+    with exclusive(folder):
+        planned = plan(folder, out, pages, _listed(folder), problems, record=LISTING)
+        done = planned is not None and apply(planned, out, problems, _listing)
+    report.extend(problems)
+    return sum(path.endswith(".html") for path in pages) if done else 0
 
 
 def _packages(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from idlc.generate.idl import file_text
 from idlc.model import derive, ir
 from idlc.model.ir import spell
@@ -18,7 +16,7 @@ MCAP_LINE = "=" * 80
 
 def facts(interface: ir.Interface, model: Model) -> Json:
     """Return all facts about an interface and the messages that it uses."""
-    used = [model.messages[name] for name in _used(derive.sections(interface), model)]
+    used = [model.messages[name] for name in _used(interface, model)]
     return {
         "name": str(interface.name),
         "hash": model.describer.hash(str(interface.name)) if model.distro.has_hashes else None,
@@ -40,25 +38,23 @@ def _structure(message: ir.Message) -> Json:
             }
             for constant in message.constants
         ],
-        "fields": [_field(field) for field in message.fields],
+        "fields": [
+            {
+                "name": field.name,
+                "type": spell(field.type),
+                "unit": field.unit,
+                "comment": list(field.comment),
+                **({} if field.default is None else {"default": field.default.value}),
+                **({"optional": True} if field.optional else {}),
+            }
+            for field in message.fields
+        ],
     }
 
 
-def _field(field: ir.Field) -> Json:
-    default = {} if field.default is None else {"default": field.default.value}
-    return {
-        "name": field.name,
-        "type": spell(field.type),
-        "unit": field.unit,
-        "comment": list(field.comment),
-        **default,
-        **({"optional": True} if field.optional else {}),
-    }
-
-
-def _used(parts: Iterable[ir.Message], model: Model) -> list[ir.TypeName]:
-    """Return the names of all messages that structures hold, each once, in the order of use."""
-    queue = list(parts)
+def _used(interface: ir.Interface, model: Model) -> list[ir.TypeName]:
+    """Return the names of all messages that an interface holds, once each, in order of use."""
+    queue = list(derive.sections(interface))
     used: dict[ir.TypeName, None] = {}
     for message in queue:
         for target in message.references:
@@ -71,7 +67,7 @@ def _used(parts: Iterable[ir.Message], model: Model) -> list[ir.TypeName]:
 def json_schema(interface: ir.Interface, model: Model) -> Json:
     """Return the JSON Schema of the result of `to_dict()`; a service has one for each part."""
     parts = derive.sections(interface)
-    used = _used(parts, model)
+    used = _used(interface, model)
     definitions = {str(name): _object(model.messages[name]) for name in used}
     head: Json = {"$schema": DIALECT, "title": str(interface.name)}
     if len(parts) == 1:
@@ -88,36 +84,29 @@ def _reference(name: ir.TypeName) -> Json:
 
 def _object(message: ir.Message) -> Json:
     about: Json = {"description": "\n".join(message.comment)} if message.comment else {}
+    properties = {}
+    for field in message.fields:
+        schema = properties[field.name] = _value(field.type)
+        if field.comment:
+            schema["description"] = "\n".join(field.comment)
+        if field.unit:
+            schema["x-unit"] = field.unit
+        if field.default is not None:
+            schema["default"] = field.default.value
     return {
         **about,
         "type": "object",
-        "properties": {field.name: _property(field) for field in message.fields},
+        "properties": properties,
         "required": [field.name for field in message.fields if field.default is None],
         "additionalProperties": False,
     }
 
 
-def _property(field: ir.Field) -> Json:
-    schema = _value(field.type)
-    if field.comment:
-        schema["description"] = "\n".join(field.comment)
-    if field.unit:
-        schema["x-unit"] = field.unit
-    if field.default is not None:
-        schema["default"] = field.default.value
-    return schema
-
-
 def _value(type_: ir.FieldType) -> Json:
     match type_:
         case ir.Array():
-            size = type_.size
-            return {
-                "type": "array",
-                "items": _value(type_.element),
-                "minItems": size,
-                "maxItems": size,
-            }
+            limits = {"minItems": type_.size, "maxItems": type_.size}
+            return {"type": "array", "items": _value(type_.element), **limits}
         case ir.Sequence():
             most = {} if type_.bound is None else {"maxItems": type_.bound}
             return {"type": "array", "items": _value(type_.element), **most}
@@ -139,7 +128,7 @@ def _value(type_: ir.FieldType) -> Json:
 def mcap(interface: ir.Interface, model: Model) -> str:
     """Return a message's MCAP schema of encoding `ros2msg`: its text and nested messages' texts."""
     text = file_text(interface)
-    for name in _used(derive.sections(interface), model):
+    for name in _used(interface, model):
         line_end = "" if not text or text.endswith("\n") else "\n"
         text += f"{line_end}{MCAP_LINE}\nMSG: {name.package}/{name.name}\n"
         text += file_text(model.interfaces[name])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
@@ -22,20 +22,13 @@ from idlc.project.library import resolve
 from idlc.project.settings import Scope
 from idlc.recordings.find import split_recordings
 
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic
-    from idlc.project.library import Library
-    from idlc.recordings.definitions import RecordedDefinition
-    from idlc.recordings.types import LocalTypes
-
 
 def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
     """Return type hash and full name of each type in paths and names, derived types included."""
     named_hashes: list[tuple[str, str]] = []
     scope = _with_hashes(scope, report)
-    if not scope.distro.has_hashes:
-        return named_hashes
-    for model, names in requested_models(targets, scope, report):
+    models = requested_models(targets, scope, report) if scope.distro.has_hashes else ()
+    for model, names in models:
         with stage("describe", model.package):
             named_hashes += [(model.describer.hash(name), name) for name in names]
     return list(dict.fromkeys(named_hashes))
@@ -105,8 +98,11 @@ def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, lis
     """Yield the models of a type's or package's name, and the requested names in them."""
     library, matches = resolve(text, scope, report)
     for name, interface in matches:
-        model = _compiled(interface, library, report)
-        if model is None:
+        source = library.source(interface)
+        if source is None:
+            return
+        model = compile_package(interface.package, [(interface, source)], library, report)
+        if report.had_errors:
             return
         names = [n for own in model.own if own.name == interface for n in derived_names(own)]
         if name == interface:
@@ -114,22 +110,9 @@ def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, lis
         elif str(name) in names:
             yield model, [str(name)]
         else:
-            report.add(_no_such_part(text, interface, names))
-
-
-def _compiled(interface: ir.TypeName, library: Library, report: Report) -> Model | None:
-    """Return the model of an interface alone, `None` after an error."""
-    source = library.source(interface)
-    if source is None:
-        return None
-    model = compile_package(interface.package, [(interface, source)], library, report)
-    return None if report.had_errors else model
-
-
-def _no_such_part(text: str, interface: ir.TypeName, names: Sequence[str]) -> Diagnostic:
-    parts = (f"`{name.rpartition('/')[2]}`" for name in names if name != str(interface))
-    hint = f"the parts of `{interface}` are {', '.join(parts)}"
-    return codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint)
+            parts = (f"`{name.rpartition('/')[2]}`" for name in names if name != str(interface))
+            hint = f"the parts of `{interface}` are {', '.join(parts)}"
+            report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))
 
 
 class TopicFacts(NamedTuple):
@@ -161,24 +144,19 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
         own = (typed for typed in types.topics if typed.interface in types.texts)
         # a name may stand for several topics, of different types
         hashes = {id(typed.recorded): types.hash(typed) for typed in own}
-        facts += [_facts(recorded, hashes.get(id(recorded)), local) for recorded in version.topics]
+        for recorded in version.topics:
+            topic, compiled = recorded.topic, hashes.get(id(recorded))
+            hash_, here, local_hash = topic.hash or compiled, "unknown", None
+            if recorded.name and recorded.interface:
+                local_hash = local.hash(recorded.name, recorded.interface)
+            if local_hash and hash_:
+                here = "same" if local_hash == hash_ else "differs"
+            schema = topic.schema
+            if schema and schema.is_blank and not compiled:
+                schema = None
+            definition = schema.encoding or "unknown" if schema else None
+            facts.append(TopicFacts(topic.name, topic.type, topic.count, hash_, here, definition))
     return sorted(facts, key=lambda row: (row.name, row.type_name))
-
-
-def _facts(recorded: RecordedDefinition, compiled: str | None, local: LocalTypes) -> TopicFacts:
-    topic = recorded.topic
-    hash_ = topic.hash or compiled
-    local_hash = (
-        local.hash(recorded.name, recorded.interface)
-        if recorded.name and recorded.interface
-        else None
-    )
-    comparison = "unknown"
-    if local_hash and hash_:
-        comparison = "same" if local_hash == hash_ else "differs"
-    schema = None if topic.schema and topic.schema.is_blank and not compiled else topic.schema
-    definition = schema.encoding or "unknown" if schema else None
-    return TopicFacts(topic.name, topic.type, topic.count, hash_, comparison, definition)
 
 
 def definitions(

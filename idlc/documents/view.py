@@ -6,7 +6,7 @@ Texts are as the user wrote them; the templates' environment escapes every text.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from idlc.model import derive, ir
@@ -45,23 +45,6 @@ class Picture(NamedTuple):
     boxes: Sequence[Box]
 
 
-class _Node(NamedTuple):
-    name: ir.TypeName | None
-    text: str
-
-
-class _Column(NamedTuple):
-    """Nodes below each other, from `start` to `end`."""
-
-    nodes: list[_Node]
-    start: float
-    width: float
-
-    @property
-    def end(self) -> float:
-        return self.start + self.width
-
-
 def picture(
     name: ir.TypeName,
     users: Iterable[ir.TypeName],
@@ -69,50 +52,51 @@ def picture(
     pages: Mapping[ir.TypeName, str],
 ) -> Picture | None:
     """Return the picture of an interface, `None` without neighbours."""
-    left, right = _cut(sorted(users), name.package), _cut(sorted(used), name.package)
-    if not left and not right:
+    columns = (sorted(users), [name], sorted(used))
+    if not columns[0] and not columns[2]:
         return None
-    users_ = _column(left, 1.0)
-    own = _column([_Node(name, name.name)], users_.end + (_BETWEEN if left else 0))
-    used_ = _column(right, own.end + _BETWEEN)
-    columns = (users_, own, used_)
-    height = max(len(column.nodes) for column in columns) * (_HEIGHT + _GAP) + _GAP
+    most = max(min(len(names), _MOST + 1) for names in columns)
+    height = most * (_HEIGHT + _GAP) + _GAP
     middle = height / 2
-    lines = [_line((users_.end, y), (own.start, middle)) for y, _ in _places(users_, height)]
-    lines += [_line((own.end, middle), (used_.start, y)) for y, _ in _places(used_, height)]
-    others = {other: page for other, page in pages.items() if other != name}
-    return Picture(
-        f"what uses {name.name}, and what it uses",
-        f"{(used_ if right else own).end + 1:.0f}",
-        f"{height:.0f}",
-        lines,
-        [
-            _box(column, y, node, node.name == name, others)
-            for column in columns
-            for y, node in _places(column, height)
-        ],
-    )
-
-
-def _cut(names: list[ir.TypeName], package: str) -> list[_Node]:
-    shown = [
-        _Node(name, name.name if name.package == package else f"{name.package}/{name.name}")
-        for name in names[:_MOST]
-    ]
-    rest = len(names) - _MOST
-    return [*shown, _Node(None, f"and {rest} more")] if rest > 0 else shown
-
-
-def _column(nodes: list[_Node], start: float) -> _Column:
-    longest = max((len(node.text) for node in nodes), default=0)
-    return _Column(nodes, start, longest * _CHARACTER + 24 if nodes else 0)
-
-
-def _places(column: _Column, height: float) -> Iterator[tuple[float, _Node]]:
-    """Yield the nodes, each with the middle of its height."""
-    first = (height - len(column.nodes) * (_HEIGHT + _GAP) + _GAP) / 2 + _HEIGHT / 2
-    for number, node in enumerate(column.nodes):
-        yield first + number * (_HEIGHT + _GAP), node
+    lines: list[str] = []
+    boxes: list[Box] = []
+    start = end = 1.0
+    for column, names in enumerate(columns):
+        if not names:
+            continue
+        nodes: list[tuple[ir.TypeName | None, str]] = [
+            (
+                other,
+                other.name if other.package == name.package else f"{other.package}/{other.name}",
+            )
+            for other in names[:_MOST]
+        ]
+        if len(names) > _MOST:
+            nodes.append((None, f"and {len(names) - _MOST} more"))
+        width = max(len(text) for _, text in nodes) * _CHARACTER + 24
+        before, start = end, end + (_BETWEEN if boxes else 0)
+        end = start + width
+        y = (height - len(nodes) * (_HEIGHT + _GAP) + _GAP) / 2 + _HEIGHT / 2
+        for other, text in nodes:
+            if column == 0:
+                lines.append(_line((end, y), (end + _BETWEEN, middle)))
+            elif column == 2:
+                lines.append(_line((before, middle), (start, y)))
+            box = Box(
+                x=f"{start:.0f}",
+                y=f"{y - _HEIGHT / 2:.0f}",
+                width=f"{width:.0f}",
+                height=str(_HEIGHT),
+                middle=f"{start + width / 2:.0f}",
+                baseline=f"{y + 4.5:.0f}",
+                text=text,
+                own=other == name,
+                page=pages.get(other, "") if other and other != name else "",
+            )
+            boxes.append(box)
+            y += _HEIGHT + _GAP
+    label = f"what uses {name.name}, and what it uses"
+    return Picture(label, f"{end + 1:.0f}", f"{height:.0f}", lines, boxes)
 
 
 def _line(start: tuple[float, float], end: tuple[float, float]) -> str:
@@ -120,22 +104,6 @@ def _line(start: tuple[float, float], end: tuple[float, float]) -> str:
     return (
         f"M{start[0]:.0f},{start[1]:.0f} C{middle:.0f},{start[1]:.0f} "
         f"{middle:.0f},{end[1]:.0f} {end[0]:.0f},{end[1]:.0f}"
-    )
-
-
-def _box(
-    column: _Column, y: float, node: _Node, own: bool, pages: Mapping[ir.TypeName, str]
-) -> Box:
-    return Box(
-        x=f"{column.start:.0f}",
-        y=f"{y - _HEIGHT / 2:.0f}",
-        width=f"{column.width:.0f}",
-        height=str(_HEIGHT),
-        middle=f"{column.start + column.width / 2:.0f}",
-        baseline=f"{y + 4.5:.0f}",
-        text=node.text,
-        own=own,
-        page=pages.get(node.name, "") if node.name else "",
     )
 
 
@@ -259,11 +227,11 @@ def prefix(interface: ir.Interface, part: ir.Message) -> str:
 def blocks(lines: Sequence[str]) -> list[Block]:
     """Return comment lines as paragraphs, and as drawings where they are indented or aligned."""
     texts = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
-    return [Block(_tag(text), text) for text in texts if text.strip()]
-
-
-def _tag(text: str) -> str:
-    return "pre" if "\n" in text and _DRAWING.search(text) else "p"
+    return [
+        Block("pre" if "\n" in text and _DRAWING.search(text) else "p", text)
+        for text in texts
+        if text.strip()
+    ]
 
 
 def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
@@ -273,34 +241,29 @@ def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
 def _section(title: str, message: ir.Message, before: str, pages: Pages) -> Section:
     package = message.name.package
     constants, fields = (
-        _table([_row(element, package, before, pages) for element in elements])
-        for elements in (message.constants, message.fields)
+        _table(elements, package, before, pages) for elements in (message.constants, message.fields)
     )
     empty = not (message.constants or message.fields)
     return Section(title, blocks(message.comment), constants, fields, empty)
 
 
-def _row(element: ir.Field | ir.Constant, package: str, before: str, pages: Pages) -> Row:
-    type_ = ir.element_of(element.type)
-    written = spell(element.type, package)
-    link, rest = None, words(written)
-    if isinstance(type_, ir.Ref):
-        text = spell(type_, package)
-        link, rest = _link(type_.target, text, pages), [written.removeprefix(text)]
-    is_field = isinstance(element, ir.Field)
-    value = element.default if isinstance(element, ir.Field) else element
-    return Row(
-        before + element.name,
-        words(element.name),
-        link,
-        rest,
-        (element.unit or "") if is_field else "",
-        spell_value(value.value) if value else "",
-        blocks(element.comment),
-    )
-
-
-def _table(rows: Sequence[Row]) -> Table:
+def _table(
+    elements: Sequence[ir.Field | ir.Constant], package: str, before: str, pages: Pages
+) -> Table:
+    rows = []
+    for element in elements:
+        type_ = ir.element_of(element.type)
+        written = spell(element.type, package)
+        link, rest = None, words(written)
+        if isinstance(type_, ir.Ref):
+            text = spell(type_, package)
+            link, rest = _link(type_.target, text, pages), [written.removeprefix(text)]
+        unit, value = "", spell_value(element.value) if isinstance(element, ir.Constant) else ""
+        if isinstance(element, ir.Field):
+            unit = element.unit or ""
+            value = spell_value(element.default.value) if element.default else ""
+        meaning, anchor = blocks(element.comment), before + element.name
+        rows.append(Row(anchor, words(element.name), link, rest, unit, value, meaning))
     kinds = {"range" if is_range(row.unit) else "unit" for row in rows if row.unit}
     return Table(
         rows,

@@ -4,28 +4,17 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from idlc.check.format import laid_out
 from idlc.check.package.manifest import dependency
 from idlc.check.run import keep_layout
 from idlc.check.select import REMARK
-from idlc.diagnostics.report import Diagnostic, Edit, Report, Severity, apply, first_few
+from idlc.diagnostics.report import Edit, Report, Severity, apply, first_few
 from idlc.diagnostics.source import Span
-from idlc.editor import protocol
+from idlc.editor import parts, protocol
 from idlc.editor.elements import by_uri, differences, workspace_edit
-from idlc.editor.parts import (
-    CodeActionParams,
-    Command,
-    DocumentParams,
-    Part,
-    PositionParams,
-    Range,
-    RangeParams,
-    TextEdit,
-)
 from idlc.editor.problems import DocumentDiagnostic, Problem, problems
 from idlc.editor.protocol import INVALID_PARAMS, REQUEST_FAILED, RequestError
 from idlc.editor.rename import can_move_files, rename_interface
@@ -46,7 +35,7 @@ _OTHER_FILE = re.compile(r"call it `((\w+)\.\w+)`")
 MOST = 3
 
 
-class CodeAction(Part, frozen=True):
+class CodeAction(parts.Part, frozen=True):
     """A code action."""
 
     title: str
@@ -54,10 +43,10 @@ class CodeAction(Part, frozen=True):
     edit: dict[str, object] | None = None
     diagnostics: tuple[DocumentDiagnostic, ...] = ()
     is_preferred: bool = False
-    command: dict[str, object] | None = None
+    command: Mapping[str, object] | None = None
 
 
-def actions(state: ServerState, params: CodeActionParams) -> list[CodeAction]:
+def actions(state: ServerState, params: parts.CodeActionParams) -> list[CodeAction]:
     """Return actions on the problems in a range, and on all of a document."""
     state.notice_changes()  # or edits may be of older files
     uri, only = params.text_document.uri, params.context.only
@@ -66,25 +55,35 @@ def actions(state: ServerState, params: CodeActionParams) -> list[CodeAction]:
     offered: list[CodeAction] = []
     if _is_requested(_FIX, only):
         for problem in all_:
-            if _touch(problem.shown.range, params.range):
+            range_ = problem.shown.range
+            if range_.start <= params.range.end and params.range.start <= range_.end:
                 offered += _about(problem)
     if _is_requested(_FIX_ALL, only) and path is not None:
-        offered += _everything(all_, uri, state)
-    if _is_requested(protocol.UPDATE_KIND, only) and (command := _update_command(state, uri)):
-        title = str(command["title"])
-        offered.append(CodeAction(title, protocol.UPDATE_KIND, command=command))
+        fixed = [problem for problem in all_ if problem.diagnostic.edits]
+        edits = [
+            edit
+            for problem in fixed
+            for edit in problem.diagnostic.edits
+            if in_folder(problem.workspace.folder, edit.span.source.path) == path
+        ]
+        if edits:  # as `idlc check --fix` makes them
+            old = edits[0].span.source
+            new = keep_layout(old.path, old.text, apply(old.text, edits)[0])
+            change = workspace_edit({uri: differences(old.text, new, state.encoding)}, state)
+            title = "Fix all that can be fixed without harm"
+            shown = tuple(problem.shown for problem in fixed)
+            offered.append(CodeAction(title, _FIX_ALL, change, shown))
+    if _is_requested(protocol.UPDATE_KIND, only):
+        run, inputs, key = _generation(state, uri)
+        if run and inputs and run.is_needed(inputs.package, inputs.digests, key):
+            title = f"Update the generated package in {run.options.out}"
+            command = {"title": title, "command": protocol.UPDATE_GENERATED, "arguments": (uri,)}
+            offered.append(CodeAction(title, protocol.UPDATE_KIND, command=command))
     return offered
 
 
 def _is_requested(kind: str, only: tuple[str, ...] | None) -> bool:
     return only is None or any(f"{kind}.".startswith(f"{other}.") for other in only)
-
-
-def _touch(range_: Range, other: Range) -> bool:
-    start, end, first, last = (
-        (at.line, at.character) for at in (range_.start, range_.end, other.start, other.end)
-    )
-    return start <= last and first <= end
 
 
 def _action(
@@ -96,34 +95,23 @@ def _action(
 
 def _about(problem: Problem) -> Iterator[CodeAction]:
     diagnostic = problem.diagnostic
+    hint = diagnostic.hint or ""
     if diagnostic.edits:
-        hint = diagnostic.hint or f"fix {diagnostic.code}"
-        yield _action(problem, hint[:1].upper() + hint[1:], diagnostic.edits, best=True)
+        title = hint or f"fix {diagnostic.code}"
+        yield _action(problem, title[:1].upper() + title[1:], diagnostic.edits, best=True)
     elif diagnostic.span is not None:
-        best = bool(_MEANT.match(diagnostic.hint or ""))
-        for title, edit in _offers(diagnostic.hint or "", diagnostic.span):
+        for title, edit in _offers(hint, diagnostic.span):
             if _helps(problem, edit):
-                yield _action(problem, title, [edit], best=best)
-    if can_move_files(problem.state) and (moved := _moved(problem)):
-        yield moved
+                yield _action(problem, title, [edit], best=bool(_MEANT.match(hint)))
+    file = _OTHER_FILE.match(hint) if can_move_files(problem.state) else None
+    if file and not os.path.lexists(problem.path.with_name(file[1])):
+        title = f"Rename the file to `{file[1]}`"
+        arguments = (problem.state.uri(problem.path), file[2])
+        command = {"title": title, "command": protocol.RENAME_FILE, "arguments": arguments}
+        yield CodeAction(title, _FIX, diagnostics=(problem.shown,), command=command)
     remark = _remark(problem) if diagnostic.severity is Severity.WARNING else None
     if remark is not None and _helps(problem, remark):
         yield _action(problem, f"Ignore {diagnostic.code} here", [remark])
-
-
-def _moved(problem: Problem) -> CodeAction | None:
-    """Return the action that gives a file the name that a hint says, if nothing has it."""
-    hint = _OTHER_FILE.match(problem.diagnostic.hint or "")
-    if hint is None or os.path.lexists(problem.path.with_name(hint[1])):
-        return None
-    title = f"Rename the file to `{hint[1]}`"
-    arguments = [problem.state.uri(problem.path), hint[2]]
-    command = _command(title, protocol.RENAME_FILE, *arguments)
-    return CodeAction(title, _FIX, diagnostics=(problem.shown,), command=command)
-
-
-def _command(title: str, command: str, *arguments: str) -> dict[str, object]:
-    return {"title": title, "command": command, "arguments": arguments}
 
 
 def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
@@ -139,7 +127,9 @@ def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
     has_one_definition = sum(" " in word for word in words) == 1
     for word in words:
         if " " not in word:
-            yield f"Write `{word}`", _instead(span, word)
+            package, slash, _ = span.text.rpartition("/")
+            name = span.at(len(package) + 1, len(span.text))  # in a type with its package
+            yield f"Write `{word}`", Edit(name if slash and "/" not in word else span, word)
         elif has_one_definition:
             whole = Span(source, start, start + len(definition.rstrip()))
             yield f"Write `{word}`", Edit(whole, word)
@@ -153,14 +143,6 @@ def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
         yield "Remove this line", Edit(Span(source, start, end), "")
 
 
-def _instead(span: Span, word: str) -> Edit:
-    """Return the edit that replaces a span, or the name in a type, with a word."""
-    package, slash, _ = span.text.rpartition("/")
-    if slash and "/" not in word:
-        span = span.at(len(package) + 1, len(span.text))
-    return Edit(span, word)
-
-
 def _helps(problem: Problem, edit: Edit) -> bool:
     """Return whether a check of the text after an edit finds fewer problems."""
     text, _ = apply(edit.span.source.text, [edit])
@@ -168,13 +150,8 @@ def _helps(problem: Problem, edit: Edit) -> bool:
     after = problem.workspace.snapshot_with(problem.path, text)
     if before is None or after is None:
         return False
-    return _count(after.problems) < _count(before.problems)
-
-
-def _count(diagnostics: Iterable[Diagnostic]) -> tuple[int, int]:
-    """Return the numbers of errors and of all problems."""
-    severities = [diagnostic.severity for diagnostic in diagnostics]
-    return severities.count(Severity.ERROR), len(severities)
+    new, old = ([problem.severity for problem in snapshot.problems] for snapshot in (after, before))
+    return (new.count(Severity.ERROR), len(new)) < (old.count(Severity.ERROR), len(old))
 
 
 def _remark(problem: Problem) -> Edit | None:
@@ -199,24 +176,6 @@ def _remark(problem: Problem) -> Edit | None:
     return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: say why")
 
 
-def _everything(all_: list[Problem], uri: str, state: ServerState) -> Iterator[CodeAction]:
-    """Yield the action that applies every fix of a document, as `idlc check --fix` does."""
-    fixed = [problem for problem in all_ if problem.diagnostic.edits]
-    edits = [
-        edit
-        for problem in fixed
-        for edit in problem.diagnostic.edits
-        if in_folder(problem.workspace.folder, edit.span.source.path) == problem.path
-    ]
-    if not edits:
-        return
-    old = edits[0].span.source
-    new = keep_layout(old.path, old.text, apply(old.text, edits)[0])
-    change = workspace_edit({uri: differences(old.text, new, state.encoding)}, state)
-    title = "Fix all that can be fixed without harm"
-    yield CodeAction(title, _FIX_ALL, change, tuple(problem.shown for problem in fixed))
-
-
 # Commands.
 
 #: Problems, and packages, that a message names.
@@ -224,43 +183,27 @@ NAMED = 5
 _ERROR, _INFO = 1, 3
 
 
-def execute(state: ServerState, params: Command) -> None:
+def execute(state: ServerState, params: parts.Command) -> None:
     """Run a command."""
     match params.command, *params.arguments:
         case protocol.ADD_DEPENDENCY, str(uri), str(package):
             state.notice_changes()  # or the edit may be of an older package.xml
-            _declare(state.context(uri), package)
+            context = state.context(uri)
+            facts = context.workspace.facts(context.path) if context else None
+            edit = dependency(facts, package) if facts else None
+            if context and edit:
+                change = workspace_edit(by_uri([edit], context.workspace.folder, state), state)
+                state.ask("workspace/applyEdit", {"label": f"declare {package}", "edit": change})
         case protocol.RENAME_FILE, str(uri), str(new):
             state.forget()
-            _rename(state.context(uri), new)
+            context = state.context(uri)
+            renaming = rename_interface(context, new, context) if context else None
+            if renaming is not None:
+                state.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": renaming})
         case protocol.UPDATE_GENERATED, str(uri):
             _update(state, uri)
         case _:
             raise RequestError(INVALID_PARAMS, f"there is no command `{params.command}` for these")
-
-
-def _declare(context: InterfaceContext | None, package: str) -> None:
-    facts = context.workspace.facts(context.path) if context else None
-    edit = dependency(facts, package) if facts else None
-    if context is not None and edit is not None:
-        state = context.state
-        change = workspace_edit(by_uri([edit], context.workspace.folder, state), state)
-        state.ask("workspace/applyEdit", {"label": f"declare {package}", "edit": change})
-
-
-def _rename(context: InterfaceContext | None, new: str) -> None:
-    edit = rename_interface(context, new, context) if context else None
-    if context is not None and edit is not None:
-        context.state.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": edit})
-
-
-def _update_command(state: ServerState, uri: str) -> dict[str, object] | None:
-    """Return the command for a document whose generated package is out of date."""
-    run, inputs, key = _generation(state, uri)
-    if run is None or inputs is None or not run.is_needed(inputs.package, inputs.digests, key):
-        return None
-    title = f"Update the generated package in {run.options.out}"
-    return _command(title, protocol.UPDATE_GENERATED, uri)
 
 
 def _generation(state: ServerState, uri: str) -> tuple[Run | None, Inputs | None, str]:
@@ -280,9 +223,14 @@ def _update(state: ServerState, uri: str) -> None:
     run, inputs, _ = _generation(state, uri)
     if run is None or inputs is None:
         raise RequestError(REQUEST_FAILED, "[tool.idlc] does not say where to generate it")
-    unsaved = sorted(f"`{path.name}`" for path in _unsaved(state, inputs.package))
+    unsaved = []
+    for document in state.documents.values():
+        context = state.context(document.uri)
+        is_input = context is not None and context.interface.name.package == inputs.package
+        if is_input and document.path and not document.is_on_disk():
+            unsaved.append(f"`{document.path.name}`")
     if unsaved:
-        names = first_few(unsaved, NAMED)
+        names = first_few(sorted(unsaved), NAMED)
         raise RequestError(REQUEST_FAILED, f"save first, what is on disk is compiled: {names}")
     report = Report()
     try:
@@ -299,15 +247,6 @@ def _update(state: ServerState, uri: str) -> None:
     state.notify("window/showMessage", {"type": kind, "message": message})
 
 
-def _unsaved(state: ServerState, package: str) -> Iterator[Path]:
-    """Yield the files of a package that hold another text than their documents."""
-    for document in state.documents.values():
-        context = state.context(document.uri)
-        is_input = context is not None and context.interface.name.package == package
-        if is_input and document.path and not document.is_on_disk():
-            yield document.path
-
-
 def _outcome(generated: Generated) -> str:
     counts = [f"{generated.written} written"] if generated.written else []
     counts += [f"{generated.removed} removed"] if generated.removed else []
@@ -317,14 +256,14 @@ def _outcome(generated: Generated) -> str:
 # Formatting, as `idlc fmt` does it.
 
 
-def format_document(context: InterfaceContext, _: DocumentParams) -> list[TextEdit]:
+def format_document(context: InterfaceContext, _: parts.DocumentParams) -> list[parts.TextEdit]:
     """Return the edits that format a document; none where it has syntax errors."""
     old = context.source.text
     new = laid_out(context.source, context.interface.name, Report())
     return [] if new is None else differences(old, new, context.state.encoding)
 
 
-def format_range(context: InterfaceContext, params: RangeParams) -> list[TextEdit]:
+def format_range(context: InterfaceContext, params: parts.RangeParams) -> list[parts.TextEdit]:
     """Return those edits that touch the lines of a range."""
     first, last = params.range.start.line, params.range.end.line
     if params.range.end.character == 0 and last > first:
@@ -336,7 +275,7 @@ def format_range(context: InterfaceContext, params: RangeParams) -> list[TextEdi
     ]
 
 
-def format_typed(context: InterfaceContext, params: PositionParams) -> list[TextEdit]:
+def format_typed(context: InterfaceContext, params: parts.PositionParams) -> list[parts.TextEdit]:
     """Return those edits that touch the line before the one that was begun."""
     before = params.position.line - 1
     return [

@@ -162,7 +162,10 @@ def _items(typed: TypedLine) -> Iterator[Item]:
         if "[" not in words[0] and ("<=" not in words[0] or "=" in words[-1]):
             yield from _values(typed, words[0], word, "")
     elif len(words) == 1 or (len(words) == 2 and not code.endswith((" ", "\t"))):
-        yield from _names(typed, words[0], words[1] if len(words) == 2 else "")
+        if "/" in words[0] or words[0][:1].isupper():  # the usual name for a field of it
+            name = names.snake_case(words[0].rpartition("/")[2].partition("[")[0])
+            word = words[1] if len(words) == 2 else ""
+            yield Item(name, _FIELD, typed.replacing(len(word), name))
     else:
         yield from _values(typed, words[0], words[2] if len(words) == 3 else "", words[1])
 
@@ -230,13 +233,6 @@ def _type(
         command=command,
         data=(uri, package, text.rpartition("/")[2]),
     )
-
-
-def _names(typed: TypedLine, type_: str, word: str) -> Iterator[Item]:
-    """Yield usual names for a field of a type."""
-    if "/" in type_ or type_[:1].isupper():
-        name = names.snake_case(type_.rpartition("/")[2].partition("[")[0])
-        yield Item(name, _FIELD, typed.replacing(len(word), name))
 
 
 def _values(typed: TypedLine, type_: str, word: str, name: str) -> Iterator[Item]:

@@ -17,7 +17,6 @@ from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot
 from idlc.model import derive, ir
 from idlc.model.ir import is_range, spell, spell_value
-from idlc.model.link import Model
 from idlc.wire.layout import Placed, layout
 
 #: Lines of a message that are shown.
@@ -59,24 +58,17 @@ def _definition(meaning: ir.Field | ir.Constant, context: InterfaceContext) -> I
     yield prose(meaning.comment)
     says_range = meaning.unit is not None and is_range(meaning.unit)
     facts = [f"{'range' if says_range else 'unit'}: `{meaning.unit}`"] if meaning.unit else []
-    facts += _limits(meaning.type, has_range=says_range)
+    element = ir.element_of(meaning.type)
+    if isinstance(element, ir.Primitive) and element.info.low is not None and not says_range:
+        facts.append(f"range: `{element.info.low}` to `{element.info.high}`")
+    if isinstance(element, ir.String) and element.bound is not None:
+        facts.append(f"length: at most {element.bound} characters")
+    if isinstance(meaning.type, ir.Sequence) and meaning.type.bound is not None:
+        facts.append(f"elements: at most {meaning.type.bound}")
     facts += [f"default: `{default}`"] if default else []
     if each := _placed(context).get(id(meaning)):
         facts.append(f"on the wire: {each.size.in_bytes} at offset {each.offset}")
     yield "  \n".join(facts)
-
-
-def _limits(type_: ir.FieldType, *, has_range: bool) -> list[str]:
-    """Return the limits of a type's values, where it is not any float or text."""
-    facts = []
-    element = ir.element_of(type_)
-    if isinstance(element, ir.Primitive) and element.info.low is not None and not has_range:
-        facts.append(f"range: `{element.info.low}` to `{element.info.high}`")
-    if isinstance(element, ir.String) and element.bound is not None:
-        facts.append(f"length: at most {element.bound} characters")
-    if isinstance(type_, ir.Sequence) and type_.bound is not None:
-        facts.append(f"elements: at most {type_.bound}")
-    return facts
 
 
 def _placed(context: InterfaceContext) -> dict[int, Placed]:
@@ -96,7 +88,12 @@ def _interface(interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
         yield prose(derive.sections(interface)[0].comment)
         return
     yield code(list(outline(interface, model)))
-    yield "  \n".join(_sizes(interface, model))
+    names = section_names(interface) or ("",)
+    sizes = []
+    for name, section in zip(names, derive.sections(interface), strict=True):
+        of = f" of the {name.lower()}" if name else ""
+        sizes.append(f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}")
+    yield "  \n".join(sizes)
     if model.distro.has_hashes:
         yield f"`{model.describer.hash(str(interface.name))}`"
     if interface.source is not None and is_built_in(interface.source):
@@ -104,13 +101,6 @@ def _interface(interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
         package = interface.name.package
         page = f"https://docs.ros.org/en/{model.distro.name}/p/{package}/"
         yield f"[{prose((package,))} in the documentation of ROS 2]({page})"
-
-
-def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
-    names = section_names(interface) or ("",)
-    for name, section in zip(names, derive.sections(interface), strict=True):
-        of = f" of the {name.lower()}" if name else ""
-        yield f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}"
 
 
 def code(lines: list[str]) -> str:
@@ -197,11 +187,16 @@ def resolve(state: ServerState, lens: Lens) -> Lens:
         return lens
     uri, kind = lens.data
     context = state.context(uri)
-    return _with_text(_text(context, kind) if context else "", lens.range, lens.data)
-
-
-def _with_text(text: str, place: Range, data: object = None) -> Lens:
-    return Lens(place, {"title": text, "command": ""}, data)
+    text = ""
+    if context is not None and kind == _USERS:
+        used = users(context.interface.name, context.snapshot, state)
+        text = counted(len(list(used)), "use")
+    elif context is not None and kind == _BREAKS:
+        text = _what_breaks(context)
+    elif context is not None:
+        model, name = context.model, str(context.interface.name)
+        text = model.describer.hash(name) if model else "no type hash: there are errors"
+    return Lens(lens.range, {"title": text, "command": ""}, lens.data)
 
 
 def _defaults(context: InterfaceContext) -> Iterator[Lens]:
@@ -213,7 +208,7 @@ def _defaults(context: InterfaceContext) -> Iterator[Lens]:
             assert with_default[0].name_span is not None
             start = Position(context.state.range(with_default[0].name_span).start.line, 0)
             text = f"defaults: {first_few(texts, MOST_DEFAULTS)}"
-            yield _with_text(text, Range(start, start))
+            yield Lens(Range(start, start), {"title": text, "command": ""})
 
 
 def _default(field: ir.Field, section: ir.Message) -> str:
@@ -229,16 +224,6 @@ def _default(field: ir.Field, section: ir.Message) -> str:
     named = own or same
     text = named[0].name if len(named) == 1 else spell_value(value)
     return f"{field.name} {text if len(text) <= MOST_LETTERS else text[:MOST_LETTERS] + '…'}"
-
-
-def _text(context: InterfaceContext, kind: str) -> str:
-    name = context.interface.name
-    if kind == _USERS:
-        return counted(len(list(users(name, context.snapshot, context.state))), "use")
-    if kind == _BREAKS:
-        return _what_breaks(context)
-    model = context.model
-    return model.describer.hash(str(name)) if model else "no type hash: there are errors"
 
 
 def _what_breaks(context: InterfaceContext) -> str:

@@ -12,6 +12,7 @@ from bisect import bisect_right
 from codecs import BOM_UTF8
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -110,9 +111,7 @@ class Places:
         self._encoding = encoding
         self._skipped = int(skips_mark and text.startswith(BYTE_ORDER_MARK))
         self._lines = lines_of(text[self._skipped :])
-        self._starts = [0]
-        for line in self._lines[:-1]:
-            self._starts.append(self._starts[-1] + len(line))
+        self._starts = [*accumulate(map(len, self._lines[:-1]), initial=0)]
 
     def position(self, offset: int) -> Position:
         """Return the position of a character; within a line's end, that end."""
@@ -131,10 +130,8 @@ class Places:
         return Range(self.position(start), self.position(end))
 
 
-@lru_cache(maxsize=256)
-def places(text: str, encoding: str, *, skips_mark: bool = False) -> Places:
-    """Return the places of a text."""
-    return Places(text, encoding, skips_mark=skips_mark)
+#: Has the places of the last texts.
+places = lru_cache(maxsize=256)(Places)
 
 
 #: The language id of interface files.

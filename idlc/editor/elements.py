@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import SequenceMatcher
+from itertools import accumulate
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -25,9 +26,7 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
     """Return the edits that turn one text into another: whole lines, as few as possible."""
     before, after = lines_of(old), lines_of(new)
     places = Places(old, encoding)
-    starts = [0]
-    for line in before:
-        starts.append(starts[-1] + len(line))
+    starts = [*accumulate(map(len, before), initial=0)]
     return [
         TextEdit(places.range(starts[low], starts[high]), "".join(after[start:end]))
         for what, low, high, start, end in SequenceMatcher(
@@ -170,8 +169,7 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     """
     offset = context.state.offset(context.source, position)
     for element in elements(context):
-        end = element.line.start + len(element.line.code) + len(element.line.comment)
-        if not element.line.start <= offset <= end:
+        if not element.line.start <= offset <= element.comment.end:
             continue
         parts: list[tuple[Part, Span | None]] = [
             ("name", element.name),
@@ -180,7 +178,7 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
             ("comment", element.comment),
         ]
         for part, span in parts:
-            if span is not None and span.start <= offset <= span.end and span.end > span.start:
+            if span and span.start <= offset <= span.end and span.end > span.start:
                 return Spot(element, part, span)
         return None
     return None
@@ -201,12 +199,11 @@ def section_names(interface: ir.Interface) -> tuple[str, ...]:
 def uses(state: ServerState) -> Iterator[tuple[Snapshot, Span, ir.TypeName]]:
     """Yield each place where a field's type names a message, and the message."""
     for snapshot in state.snapshots():
-        for model in snapshot.models.values():
-            for interface in model.own:
-                for section in derive.sections(interface):
-                    for field, target in section.holders:
-                        if field.type_span is not None:
-                            yield snapshot, field.type_span, target
+        for interface, _ in snapshot.interfaces.values():
+            for section in derive.sections(interface):
+                for field, target in section.holders:
+                    if field.type_span is not None:
+                        yield snapshot, field.type_span, target
 
 
 def users(name: ir.TypeName, home: Snapshot, state: ServerState) -> Iterator[tuple[Snapshot, Span]]:

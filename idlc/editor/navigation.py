@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from idlc.check.package.manifest import declaration
 from idlc.diagnostics.report import Report
@@ -35,33 +34,6 @@ def _named_package(state: ServerState, params: PositionParams) -> str | None:
     return next((name for name, at in _packages(source) if at.start <= offset <= at.end), None)
 
 
-def _manifest_definition(package: str, state: ServerState) -> Location | None:
-    """Return the package.xml of a package, or one of its built-in interfaces."""
-    for snapshot in state.snapshots():
-        if path := _file(package, snapshot):
-            return Location(state.uri(path), TOP)
-    for snapshot in state.snapshots():
-        for name in snapshot.library.interfaces(package)[:1]:
-            return _top(name, snapshot, state)
-    return None
-
-
-def _manifest_references(package: str, state: ServerState, *, declared: bool) -> list[Location]:
-    """Return the uses of a package's messages, and the declarations in other packages."""
-    locations = [
-        state.location(at, snapshot.folder)
-        for snapshot, at, used in uses(state)
-        if used.package == package
-    ]
-    for path in dict.fromkeys(_manifests(state)):
-        source = _source(path, state)
-        for name, at in _packages(source) if source else ():
-            is_own = source is not None and source.text[: at.start].rstrip().endswith("<name>")
-            if name == package and (declared or not is_own):
-                locations.append(Location(state.uri(path), state.range(at)))
-    return locations
-
-
 def _source(path: Path, state: ServerState) -> Source | None:
     """Return the text of a package.xml, as an editor has it if it is open."""
     return Root(path.parent, state.texts()).read_source(path, str(path), Report())
@@ -76,59 +48,44 @@ def _packages(source: Source) -> Iterator[tuple[str, Span]]:
                 yield statement.text, Span(source, start, start + len(statement.text))
 
 
-def _manifests(state: ServerState) -> Iterator[Path]:
-    """Yield the package.xml files of the packages in all folders."""
-    for snapshot in state.snapshots():
-        for path in snapshot.interfaces:
-            if declared := snapshot.root.manifest(path.parent.parent):
-                yield declared
+def _subject_at(context: InterfaceContext, params: PositionParams) -> Element | ir.TypeName | None:
+    """Return the definition at a position, or the interface that is named there.
 
-
-def _file(package: str, snapshot: Snapshot) -> Path | None:
-    """Return the package.xml of a package that is in a folder, beside it, or installed."""
-    home = snapshot.library.home(package)
-    declared = snapshot.root.manifest(home) if home else None
-    installed = (prefix / "share" / package / MANIFEST for prefix in ament_prefixes())
-    paths = (declared and snapshot.folder / declared, *installed)
-    return next((path for path in paths if path and is_file(path)), None)
-
-
-class Subject(NamedTuple):
-    """The subject of a position: a definition, or the interface of that name."""
-
-    name: ir.TypeName
-    element: Element | None = None
-
-
-def _subject_at(context: InterfaceContext, params: PositionParams) -> Subject | None:
-    """Return the subject of a position; between definitions, the file's interface."""
+    Between definitions, that is the file's interface.
+    """
     spot = spot_at(context, params.position)
     if spot is None or spot.part == "comment":
-        return Subject(context.interface.name)
-    if spot.part == "type":
-        return Subject(spot.element.target) if spot.element.target else None
-    return Subject(context.interface.name, spot.element)
+        return context.interface.name
+    return spot.element.target if spot.part == "type" else spot.element
 
 
 def definition(state: ServerState, params: PositionParams) -> Location | None:
     """Return the definition of the subject at a position."""
     if package := _named_package(state, params):
-        return _manifest_definition(package, state)
+        for snapshot in state.snapshots():
+            home = snapshot.library.home(package)
+            declared = snapshot.root.manifest(home) if home else None
+            installed = (prefix / "share" / package / MANIFEST for prefix in ament_prefixes())
+            for path in (declared and snapshot.folder / declared, *installed):
+                if path and is_file(path):
+                    return Location(state.uri(path), TOP)
+        for snapshot in state.snapshots():
+            for name in snapshot.library.interfaces(package)[:1]:
+                return _top(name, snapshot, state)
+        return None
     context = state.context(params.text_document.uri)
     subject = _subject_at(context, params) if context else None
     if context is None or subject is None:
         return None
-    if subject.element is not None:
-        return state.location(subject.element.name, context.snapshot.folder)
-    return _top(subject.name, context.snapshot, state)
+    if isinstance(subject, Element):
+        return state.location(subject.name, context.snapshot.folder)
+    return _top(subject, context.snapshot, state)
 
 
 def type_definition(context: InterfaceContext, params: PositionParams) -> Location | None:
     """Return the definition of the type of the field at a position."""
     subject = _subject_at(context, params)
-    if subject is None:
-        return None
-    target = subject.element.target if subject.element else subject.name
+    target = subject.target if isinstance(subject, Element) else subject
     return _top(target, context.snapshot, context.state) if target else None
 
 
@@ -142,22 +99,38 @@ def references(state: ServerState, params: ReferenceParams) -> list[Location]:
     """Return the uses of the subject at a position in all folders, and its definition."""
     declared = params.context.include_declaration
     if package := _named_package(state, params):
-        return _manifest_references(package, state, declared=declared)
+        locations = [
+            state.location(at, snapshot.folder)
+            for snapshot, at, used in uses(state)
+            if used.package == package
+        ]
+        manifests = (
+            snapshot.root.manifest(path.parent.parent)
+            for snapshot in state.snapshots()
+            for path in snapshot.interfaces
+        )
+        for path in dict.fromkeys(filter(None, manifests)):
+            source = _source(path, state)
+            for name, at in _packages(source) if source else ():
+                is_own = at.source.text[: at.start].rstrip().endswith("<name>")
+                if name == package and (declared or not is_own):
+                    locations.append(Location(state.uri(path), state.range(at)))
+        return locations
     context = state.context(params.text_document.uri)
     subject = _subject_at(context, params) if context else None
     if context is None or subject is None:
         return []
     snapshot = context.snapshot
-    if subject.element is not None:
-        spans = [*mentions(subject.element, context)][0 if declared else 1 :]
+    if isinstance(subject, Element):
+        spans = [*mentions(subject, context)][0 if declared else 1 :]
         return [state.location(span, snapshot.folder) for span in spans]
-    first = _top(subject.name, snapshot, state) if declared else None
-    used = users(subject.name, snapshot, state)
+    first = _top(subject, snapshot, state) if declared else None
+    used = users(subject, snapshot, state)
     locations = [state.location(span, holder.folder) for holder, span in used]
     facts = context.workspace.facts(context.path)
-    if facts and (span := declaration(facts, subject.name.package)):
+    if facts and (span := declaration(facts, subject.package)):
         locations.append(state.location(span, snapshot.folder))
-    return list(dict.fromkeys((*([first] if first else ()), *locations)))
+    return list(dict.fromkeys(filter(None, (first, *locations))))
 
 
 def mentions(element: Element, context: InterfaceContext) -> Iterator[Span]:
@@ -184,14 +157,13 @@ def highlights(context: InterfaceContext, params: PositionParams) -> list[dict[s
     subject = _subject_at(context, params)
     if subject is None:
         return []
-    if subject.element is not None:
-        spans, kinds = [*mentions(subject.element, context)], [_WRITE]
+    if isinstance(subject, Element):
+        spans, first = [*mentions(subject, context)], _WRITE
     else:
-        spans, kinds = [e.type for e in elements(context) if e.target == subject.name], []
-    kinds += [_READ] * (len(spans) - len(kinds))
+        spans, first = [e.type for e in elements(context) if e.target == subject], _READ
     return [
-        {"range": context.state.range(span), "kind": kind}
-        for span, kind in zip(spans, kinds, strict=True)
+        {"range": context.state.range(span), "kind": _READ if number else first}
+        for number, span in enumerate(spans)
     ]
 
 

@@ -17,7 +17,7 @@ class Part(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
     """A part of a message, encoded in camel case and without values that are defaults."""
 
 
-class Position(Part, frozen=True):
+class Position(Part, frozen=True, order=True):
     """A place in a document: line and character from 0, in units of the agreed encoding."""
 
     line: Number

@@ -89,8 +89,7 @@ def encoding(client: dict[str, Any]) -> str:
     """Return the first encoding of positions that a client offers and the server supports."""
     general = client.get("general")
     offered = general.get("positionEncodings") if isinstance(general, dict) else None
-    supported = [name for name in offered or () if name in ENCODINGS]
-    return supported[0] if supported else DEFAULT_ENCODING
+    return next((name for name in offered or () if name in ENCODINGS), DEFAULT_ENCODING)
 
 
 def supports(client: object, *path: str) -> bool:
@@ -131,10 +130,7 @@ CAPABILITIES: dict[str, object] = {
         "interFileDependencies": True,
         "workspaceDiagnostics": True,
     },
-    "completionProvider": {
-        "triggerCharacters": ["/", "=", "[", "(", " "],
-        "resolveProvider": True,
-    },
+    "completionProvider": {"triggerCharacters": ["/", "=", "[", "(", " "], "resolveProvider": True},
     "codeActionProvider": {"codeActionKinds": ["quickfix", "source.fixAll.idlc", UPDATE_KIND]},
     "renameProvider": {"prepareProvider": True},
     "inlayHintProvider": True,

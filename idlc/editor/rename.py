@@ -100,21 +100,15 @@ def _rename_definition(element: Element, context: InterfaceContext, new: str) ->
     if any(definition.name == new and definition is not element.meaning for definition in siblings):
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
     edits = [Edit(span, new) for span in mentions(element, context)]
-    changes = _changes(context, apply(context.source.text, edits)[0])
+    name, path = context.interface.name, context.path
+    after = context.workspace.snapshot_with(path, apply(context.source.text, edits)[0])
+    changes = None  # where a version has errors
+    if after is not None and path in after.interfaces:
+        before, renamed = context.model, after.model_of(after.interfaces[path][0])
+        if before and renamed:
+            changes = compare(before.only({name}), renamed.only({name})).changes
     edited = by_uri(edits, context.workspace.folder, context.state)
     return _answer(edited, None, f"Rename {element.body.name.text} to {new}", changes, context)
-
-
-def _changes(context: InterfaceContext, text: str) -> Iterable[Change] | None:
-    """Return the changes that a new text of a file makes; `None` if a version has errors."""
-    path = context.path
-    after = context.workspace.snapshot_with(path, text)
-    if after is None or path not in after.interfaces:
-        return None
-    interface = after.interfaces[path][0]
-    old, new = context.model, after.model_of(interface)
-    name = {interface.name}
-    return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
 def rename_interface(
@@ -166,9 +160,14 @@ def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | 
     for file in {each.old_uri: each for each in params.files}.values():
         old, new = to_path(file.old_uri), to_path(file.new_uri)
         context = state.context(file.old_uri)
-        if not (old and new and context and _is_other_name(old, new)):
+        if not (old and new and context and names.is_message_name(new.stem)):
             continue
-        is_own = state.renaming is not None and _is_under_way(state.renaming, old, new, state)
+        if old.parent != new.parent or old.suffix != new.suffix:
+            continue
+        renaming, is_own = state.renaming, False
+        if renaming is not None and (renaming.old, renaming.new) == (old, new):
+            asking = state.context(renaming.uri)
+            is_own = asking is not None and asking.source.text == renaming.text
         for uri, some in _edits_of_users(context, new.stem, report).items():
             if not is_own or uri in state.documents:
                 edits.setdefault(uri, []).extend(some)
@@ -177,20 +176,6 @@ def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | 
             "window/showMessage", {"type": 2, "message": f"{BUILD} is left: {problem.message}"}
         )
     return workspace_edit(edits, state) if edits else None
-
-
-def _is_other_name(old: Path, new: Path) -> bool:
-    """Return whether a file gets another name that an interface can have."""
-    is_valid = names.is_message_name(new.stem)
-    return is_valid and old.parent == new.parent and old.suffix == new.suffix
-
-
-def _is_under_way(renaming: Renaming, old: Path, new: Path, state: ServerState) -> bool:
-    """Return whether the client applies the edits of an answer, and now moves this file for it."""
-    if (renaming.old, renaming.new) != (old, new):
-        return False
-    context = state.context(renaming.uri)
-    return context is not None and context.source.text == renaming.text
 
 
 def _edits_of_users(

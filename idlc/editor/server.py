@@ -14,6 +14,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
+from itertools import count
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 from idlc.editor import protocol
@@ -102,13 +103,12 @@ class Server:
         self._waiting: Counter[int | str | None] = Counter()
         self._cancelled: set[int | str] = set()
         self._lock = threading.Lock()
-        self._count = 0
+        self._ids = count()
         self._asked: dict[int, Answer] = {}
         #: The parameters of `initialize`. The state is made of them when it is needed: its imports
         #: take long.
         self._initialize: dict[str, Any] | None = None
         self._state: ServerState | None = None
-        self._client_process: object = None
         self._is_shut_down = False
 
     @property
@@ -162,7 +162,6 @@ class Server:
             if not isinstance(params, dict):
                 raise RequestError(protocol.INVALID_PARAMS, "`initialize` needs an object")
             self._initialize = params
-            self._client_process = params.get("processId")
             client = params.get("capabilities")
             return protocol.initialize_result(client if isinstance(client, dict) else {})
         if self._initialize is None:
@@ -223,7 +222,7 @@ class Server:
 
     def _client_is_gone(self) -> bool:
         """Return whether the process of the client has ended, where the system can tell."""
-        client = self._client_process
+        client = (self._initialize or {}).get("processId")
         if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
             return False
         try:
@@ -260,23 +259,25 @@ class Server:
         if isinstance(arrival, RequestError):
             self._fail(None, arrival)
         elif "method" not in arrival:
-            self._handle_answer(arrival)
+            id_ = arrival.get("id")
+            take = self._asked.pop(id_, None) if isinstance(id_, int) else None
+            if take is not None and "result" in arrival:
+                self._attempt("answer", lambda: take(arrival["result"]))
         elif "id" in arrival:
             self._answer(arrival)
         else:
             name, params = arrival["method"], arrival.get("params")
             self._attempt(name, lambda: self.handle_notification(name, params))
 
-    def _handle_answer(self, arrival: Message) -> None:
-        """Handle the client's answer to a request; an answer to no request is ignored."""
-        id_ = arrival.get("id")
-        take = self._asked.pop(id_, None) if isinstance(id_, int) else None
-        if take is not None and "result" in arrival:
-            self._attempt("answer", lambda: take(arrival["result"]))
-
     def _answer(self, request: Message) -> None:
         id_, name = request["id"], request["method"]
-        if self._is_cancelled(id_):
+        with self._lock:
+            self._waiting[id_] -= 1
+            if not self._waiting[id_]:
+                del self._waiting[id_]
+            is_cancelled = id_ in self._cancelled
+            self._cancelled.discard(id_)
+        if is_cancelled:
             self._fail(id_, RequestError(protocol.CANCELLED, "cancelled"))
             return
         failure, result = self._result(lambda: self.answer(name, _params(request)))
@@ -286,16 +287,6 @@ class Server:
         if failure.code == protocol.INTERNAL_ERROR:
             self._log(f"{name}: {failure.message}")
         self._fail(id_, failure)
-
-    def _is_cancelled(self, id_: int | str) -> bool:
-        """Return whether the request that is to be answered now was cancelled."""
-        with self._lock:
-            self._waiting[id_] -= 1
-            if not self._waiting[id_]:
-                del self._waiting[id_]
-            is_cancelled = id_ in self._cancelled
-            self._cancelled.discard(id_)
-        return is_cancelled
 
     def _attempt(self, what: str, action: Callable[[], object]) -> None:
         """Run an action that has no answer; failures are only logged."""
@@ -329,8 +320,7 @@ class Server:
 
     def ask(self, method: str, params: object, answer: Answer | None = None) -> None:
         """Send a request to the client; `answer` takes its result."""
-        id_ = self._count
-        self._count += 1
+        id_ = next(self._ids)
         if answer is not None:
             self._asked[id_] = answer
         self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})

@@ -10,15 +10,7 @@ import msgspec
 
 from idlc.diagnostics.source import Source, Span
 from idlc.editor import parts, protocol
-from idlc.editor.documents import (
-    Document,
-    Places,
-    file_of,
-    inside,
-    is_built_in,
-    places,
-    to_path,
-)
+from idlc.editor.documents import Document, Places, file_of, inside, is_built_in, places, to_path
 from idlc.editor.protocol import INVALID_REQUEST, RequestError
 from idlc.editor.workspace import (
     OTHER_INPUTS,
@@ -83,10 +75,7 @@ class ServerState:
     """
 
     def __init__(
-        self,
-        initialize: dict[str, Any],
-        notify: Callable[..., None],
-        ask: Callable[..., None],
+        self, initialize: dict[str, Any], notify: Callable[..., None], ask: Callable[..., None]
     ) -> None:
         self.notify = notify
         self.ask = ask

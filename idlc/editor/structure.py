@@ -7,18 +7,9 @@ from itertools import groupby, pairwise
 from typing import NamedTuple
 
 from idlc.diagnostics.source import Span
+from idlc.editor import parts
 from idlc.editor.documents import is_built_in
-from idlc.editor.elements import Element, comments, elements, has_letters, section_names
-from idlc.editor.parts import (
-    DocumentParams,
-    Location,
-    Part,
-    Position,
-    PositionsParams,
-    Range,
-    RangeParams,
-    WorkspaceSymbolParams,
-)
+from idlc.editor.elements import comments, elements, has_letters, section_names
 from idlc.editor.protocol import MODIFIERS, TYPES
 from idlc.editor.state import CONTENT, InterfaceContext, ServerState
 from idlc.language import tree
@@ -33,16 +24,22 @@ _KINDS = {"msg": _STRUCT, "srv": _INTERFACE, "action": _INTERFACE}
 MOST = 1000
 
 
-def symbols(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object]]:
+def symbols(context: InterfaceContext, _: parts.DocumentParams) -> list[dict[str, object]]:
     """Return the definitions of a file, by section where it has several."""
-    definitions = list(elements(context))
+    definitions = []
+    for element in elements(context):
+        meaning = element.meaning
+        kind = _CONSTANT if isinstance(meaning, ir.Constant) else _FIELD
+        type_ = spell(meaning.type) if meaning is not None else element.body.type.whole.text
+        name = element.body.name.text or "?"
+        symbol = _symbol(name, type_, kind, element.whole, element.name, context)
+        definitions.append((element.line.start, symbol))
     names = section_names(context.interface)
     if not names:
-        return [_of_definition(element, context) for element in definitions]
+        return [symbol for _, symbol in definitions]
     listed = []
     for name, span in zip(names, sections(context), strict=False):
-        inner = (e for e in definitions if span.start <= e.line.start < span.end)
-        children = [_of_definition(element, context) for element in inner]
+        children = [symbol for start, symbol in definitions if span.start <= start < span.end]
         symbol = _symbol(name, "", _NAMESPACE, span, span.at(0, 0), context)
         listed.append(symbol | ({"children": children} if children else {}))
     return listed
@@ -55,15 +52,6 @@ def _symbol(
     return {"name": name, "detail": detail, "kind": kind, **ranges}
 
 
-def _of_definition(element: Element, context: InterfaceContext) -> dict[str, object]:
-    kind = _CONSTANT if isinstance(element.meaning, ir.Constant) else _FIELD
-    type_ = element.body.type.whole.text
-    if element.meaning is not None:
-        type_ = spell(element.meaning.type)
-    name = element.body.name.text or "?"
-    return _symbol(name, type_, kind, element.whole, element.name, context)
-
-
 def sections(context: InterfaceContext) -> list[Span]:
     """Return the spans of the sections of a file, without the lines between them."""
     file = parse(context.source)
@@ -72,9 +60,9 @@ def sections(context: InterfaceContext) -> list[Span]:
     return [Span(context.source, *place) for place in zip(starts, ends, strict=True)]
 
 
-def workspace(state: ServerState, params: WorkspaceSymbolParams) -> list[dict[str, object]]:
+def workspace(state: ServerState, params: parts.WorkspaceSymbolParams) -> list[dict[str, object]]:
     """Return the interfaces in whose full names the letters of a word occur in this order."""
-    interfaces: dict[tuple[Location, ir.TypeName], dict[str, object]] = {}
+    interfaces: dict[tuple[parts.Location, ir.TypeName], dict[str, object]] = {}
     for snapshot in state.snapshots():
         for interface, source in snapshot.interfaces.values():
             package, kind, name = interface.name
@@ -85,14 +73,14 @@ def workspace(state: ServerState, params: WorkspaceSymbolParams) -> list[dict[st
     return list(interfaces.values())[:MOST]
 
 
-class Selection(Part, frozen=True):
+class Selection(parts.Part, frozen=True):
     """A range, and the one around it."""
 
-    range: Range
+    range: parts.Range
     parent: Selection | None = None
 
 
-def folds(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object]]:
+def folds(context: InterfaceContext, _: parts.DocumentParams) -> list[dict[str, object]]:
     """Return the sections of a service or action, and comments of several lines."""
     state = context.state
     alone = (span for line, span in comments(context) if not line.code.strip())
@@ -101,8 +89,8 @@ def folds(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object
     for _, run in groupby(lines, lambda pair: pair[1] - pair[0]):
         numbers = [line for _, line in run]
         places.append((numbers[0], numbers[-1], "comment"))
-    parts = sections(context)
-    for span in parts if len(parts) > 1 else ():
+    spans = sections(context)
+    for span in spans if len(spans) > 1 else ():
         place = state.range(span.at(0, len(span.text.rstrip())))
         places.append((place.start.line, place.end.line, "region"))
     return [
@@ -112,10 +100,16 @@ def folds(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object
     ]
 
 
-def selections(state: ServerState, params: PositionsParams) -> list[Selection]:
+def selections(state: ServerState, params: parts.PositionsParams) -> list[Selection]:
     """Return for each position the ranges around it: a part, its line, its section, the file."""
     context = state.context(params.text_document.uri)
-    spans = _selectable(context) if context else []
+    spans = [] if context is None else [Span(context.source, 0, len(context.source.text))]
+    spans += sections(context) if context else ()
+    for element in elements(context) if context else ():
+        start, end = element.line.start, max(element.comment.end, element.whole.end)
+        spans += [Span(element.source, start, end), element.whole]
+        spans += [element.span(element.body.type.whole), element.type, element.name]
+        spans += [*filter(None, (element.value, element.comment))]
     answers = []
     for position in params.positions:
         offset = state.offset(context.source, position) if context else 0
@@ -128,22 +122,11 @@ def selections(state: ServerState, params: PositionsParams) -> list[Selection]:
         for span in sorted(around.values(), key=lambda span: span.start - span.end):
             if last is None or (last.start <= span.start and span.end <= last.end):
                 selected, last = Selection(state.range(span), selected), span
-        answers.append(selected or Selection(Range(position, position)))
+        answers.append(selected or Selection(parts.Range(position, position)))
     return answers
 
 
-def _selectable(context: InterfaceContext) -> list[Span]:
-    """Return the spans that a selection grows to, first the whole file."""
-    spans = [Span(context.source, 0, len(context.source.text)), *sections(context)]
-    for element in elements(context):
-        start, end = element.line.start, max(element.comment.end, element.whole.end)
-        spans += [Span(context.source, start, end), element.whole]
-        spans += [element.span(element.body.type.whole), element.type, element.name]
-        spans += [*([element.value] if element.value else []), element.comment]
-    return spans
-
-
-def links(context: InterfaceContext, _: DocumentParams) -> list[dict[str, object]]:
+def links(context: InterfaceContext, _: parts.DocumentParams) -> list[dict[str, object]]:
     """Return the types of a file that lead to other files."""
     state = context.state
     shows_texts = state.supports("workspace", CONTENT)
@@ -166,17 +149,17 @@ class Token(NamedTuple):
     modifiers: tuple[str, ...] = ()
 
 
-def tokens(context: InterfaceContext, _: DocumentParams) -> dict[str, list[int]]:
+def tokens(context: InterfaceContext, _: parts.DocumentParams) -> dict[str, list[int]]:
     """Return the tokens of a document: the kind of each word, by which editors colour it."""
-    return {"data": _encoded(_tokens(context), context.state)}
+    return _encoded(_tokens(context), context.state)
 
 
-def tokens_in(context: InterfaceContext, params: RangeParams) -> dict[str, list[int]]:
+def tokens_in(context: InterfaceContext, params: parts.RangeParams) -> dict[str, list[int]]:
     """Return the tokens that touch a range."""
     state = context.state
     low, high = (state.offset(context.source, at) for at in (params.range.start, params.range.end))
     touching = (t for t in _tokens(context) if t.span.start <= high and low <= t.span.end)
-    return {"data": _encoded(touching, state)}
+    return _encoded(touching, state)
 
 
 def _tokens(context: InterfaceContext) -> Iterator[Token]:
@@ -184,37 +167,34 @@ def _tokens(context: InterfaceContext) -> Iterator[Token]:
         if element.line.start and context.source.text[: element.line.start].endswith("@optional"):
             start = element.line.start - len("@optional")
             yield Token(Span(context.source, start, element.line.start), "keyword")
-        yield from _definition(element)
+        type_ = element.body.type
+        if type_.name.text in ir.PRIMITIVES or type_.name.text in STRINGS:
+            yield Token(element.type, "type", ("defaultLibrary",))
+        else:
+            package, slash, _ = element.type.text.rpartition("/")
+            if slash:
+                yield Token(element.type.at(0, len(package)), "namespace")
+            name = element.type.at(len(package) + len(slash), len(element.type.text))
+            yield Token(name, "struct")
+        for number in (type_.bound, type_.size):
+            if number is not None:
+                yield Token(element.span(number), "number")
+        is_constant = isinstance(element.body, tree.Constant)
+        modifiers = ("declaration", "readonly") if is_constant else ("declaration",)
+        yield Token(element.name, "enumMember" if is_constant else "property", modifiers)
+        if element.value is not None and element.value.text:
+            is_text = type_.name.text in STRINGS and not type_.brackets
+            yield Token(element.value, "string" if is_text else "number")
     yield from (Token(span, "comment") for _, span in comments(context))
     for before, after in pairwise(sections(context)):
         mark = Span(context.source, before.end, after.start)
         yield Token(mark.at(0, len(mark.text.rstrip())), "keyword")
 
 
-def _definition(element: Element) -> Iterator[Token]:
-    type_ = element.body.type
-    if type_.name.text in ir.PRIMITIVES or type_.name.text in STRINGS:
-        yield Token(element.type, "type", ("defaultLibrary",))
-    else:
-        package, slash, _ = element.type.text.rpartition("/")
-        if slash:
-            yield Token(element.type.at(0, len(package)), "namespace")
-        yield Token(element.type.at(len(package) + len(slash), len(element.type.text)), "struct")
-    for number in (type_.bound, type_.size):
-        if number is not None:
-            yield Token(element.span(number), "number")
-    is_constant = isinstance(element.body, tree.Constant)
-    modifiers = ("declaration", "readonly") if is_constant else ("declaration",)
-    yield Token(element.name, "enumMember" if is_constant else "property", modifiers)
-    if element.value is not None and element.value.text:
-        text = type_.name.text in STRINGS and not type_.brackets
-        yield Token(element.value, "string" if text else "number")
-
-
-def _encoded(tokens: Iterable[Token], state: ServerState) -> list[int]:
+def _encoded(tokens: Iterable[Token], state: ServerState) -> dict[str, list[int]]:
     """Return tokens as the protocol has them: five numbers each, positions from the last one."""
     data: list[int] = []
-    last = Position(0, 0)
+    last = parts.Position(0, 0)
     for token in sorted(tokens, key=lambda entry: entry.span.start):
         range_ = state.range(token.span)
         start, end = range_.start, range_.end
@@ -226,4 +206,4 @@ def _encoded(tokens: Iterable[Token], state: ServerState) -> list[int]:
         data += [start.line - last.line, across, end.character - start.character]
         data += [TYPES.index(token.kind), modifiers]
         last = start
-    return data
+    return {"data": data}

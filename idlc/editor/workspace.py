@@ -10,7 +10,7 @@ from __future__ import annotations
 import gc
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -171,7 +171,11 @@ class Workspace:
                 files = list_files(paths, root, report, self._scope.exclude)
                 self._packages = inputs.packages(files.files, self._scope, report, files.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
-            on_disk = (path for path in self._files_read(files) if not root.is_open(path))
+            homes = {self.folder, *files.packages, *(file.root for file in files.files)}
+            homes |= {settings.folder} if settings.folder else set()
+            read = [root.absolute(file.path) for file in files.files]
+            read += [home / name for home in homes for name in OTHER_INPUTS]
+            on_disk = (path for path in read if not root.is_open(path))
             self._picture = DiskSnapshot(files.folders, on_disk, begun)
         self._places = {
             in_folder(self.folder, entry.file.shown): (number, at)
@@ -217,7 +221,8 @@ class Workspace:
         """Use a new text for a file; `None` for the one on disk."""
         if not self.is_loaded:
             return
-        current = self._text(path)
+        number, at = self._places.get(path, (-1, -1))
+        current = self._packages[number].files[at].data if number >= 0 else None
         if current is not None and data == current:
             return
         if data is not None and self._change(path, data):
@@ -225,23 +230,11 @@ class Workspace:
         elif current is not None or self._concerns(path):
             self.forget()
 
-    def _files_read(self, files: Listing) -> Iterator[Path]:
-        """Yield the absolute paths of the files that a load reads in packages and for settings."""
-        yield from (self._root.absolute(file.path) for file in files.files)
-        homes = {self.folder, *files.packages, *(file.root for file in files.files)}
-        homes |= {self._settings.folder} if self._settings.folder else set()
-        yield from (home / name for home in homes for name in OTHER_INPUTS)
-
     def is_current(self) -> bool:
         """Return whether the disk is certainly as it was read last."""
         if not self.is_loaded:
             return self.failure is not None or not is_folder(self.folder)
         return self._picture.is_current()
-
-    def _text(self, path: Path) -> bytes | None:
-        """Return the text of a file that is checked; `None` for other files."""
-        number, at = self._places.get(path, (-1, -1))
-        return self._packages[number].files[at].data if number >= 0 else None
 
     def _change(self, path: Path, data: bytes) -> bool:
         """Use a text for a file that is checked, if no other file depends on it.
@@ -249,9 +242,12 @@ class Workspace:
         Return whether that was so; otherwise, a load is needed.
         """
         number, at = self._places.get(path, (-1, -1))
-        if number < 0 or len(data) > MAX_SIZE or self._is_named_by_lock(number):
+        if number < 0 or len(data) > MAX_SIZE:
             return False
-        packages = list(self._packages)
+        packages, root = list(self._packages), self._root
+        home = packages[number].home
+        if not root.manifest(home) and any(map(root.locks, output_folders(home, root))):
+            return False  # its texts may decide its name
         files = list(packages[number].files)
         files[at] = inputs.Input(files[at].file, data)
         packages[number] = msgspec.structs.replace(packages[number], files=tuple(files))
@@ -266,12 +262,6 @@ class Workspace:
             return self._checked() if is_changed else None
         finally:
             self._packages = packages
-
-    def _is_named_by_lock(self, number: int) -> bool:
-        """Return whether the texts of a package may decide its name."""
-        home = self._packages[number].home
-        root = self._root
-        return not root.manifest(home) and any(map(root.locks, output_folders(home, root)))
 
     def _concerns(self, path: Path) -> bool:
         """Return whether a file outside of the packages may change the result of a check."""

@@ -185,6 +185,12 @@ def load_settings(root: Root, report: Report) -> Config:
     return Config(root)
 
 
+def settings_here() -> tuple[Config, Report]:
+    """Return the settings for the working folder, and a new report with what is wrong in them."""
+    report = Report()
+    return load_settings(Root.here(), report), report
+
+
 def _read(path: Path, root: Root, report: Report) -> Config:
     name = root.shown(path)
     data = root.read_bytes(path, name, report)
