@@ -13,7 +13,6 @@ from idlc.diagnostics.codes import Code
 from idlc.diagnostics.report import Diagnostic, Label
 from idlc.diagnostics.source import Span
 from idlc.model import ir
-from idlc.model.describe import individual
 
 Level: TypeAlias = Literal["wire", "hash", "source", "behaviour"]
 
@@ -174,12 +173,6 @@ def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> It
             yield gap
             gap = []
     yield gap
-
-
-def describe_type(field: ir.Field) -> object:
-    """Return a field's type as it enters the type hash."""
-    message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
-    return individual(message)["fields"][0]["type"]
 
 
 def without_bound(element: ir.Element) -> ir.Element:

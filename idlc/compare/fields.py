@@ -10,7 +10,6 @@ from idlc.compare.changes import (
     Change,
     Level,
     Pairing,
-    describe_type,
     native,
     pair,
     tighter,
@@ -19,6 +18,7 @@ from idlc.compare.changes import (
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Span
 from idlc.model import ir
+from idlc.model.describe import type_dict
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.wire.compatible import reads_alike, type_reads_alike
@@ -185,7 +185,7 @@ def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change
             code = codes.USED_TYPE_CHANGED
             yield sides.change(code, new, message, levels, new.type_span, cause=target)
         return
-    if describe_type(old) != describe_type(new):
+    if type_dict(old.type) != type_dict(new.type):
         levels.add("hash")
     if native(old.type) != native(new.type):
         levels.add("source")
