@@ -104,19 +104,13 @@ def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -
     kept = [(element, new[places[element.name]]) for element in common]
     moved = frozenset(element.name for element in common if places[element.name] not in steady)
     renamed = list(_renamed(old, new, moved, content))
-    renamed_from = {id(element) for element, _ in renamed}
-    renamed_to = {id(element) for _, element in renamed}
-    names = {element.name for element in common}
+    paired = {id(element) for both in (*kept, *renamed) for element in both}
     return Pairing(
         kept,
         renamed,
         moved,
-        [
-            element
-            for element in old
-            if element.name not in names and id(element) not in renamed_from
-        ],
-        [element for element in new if element.name not in names and id(element) not in renamed_to],
+        [element for element in old if id(element) not in paired],
+        [element for element in new if id(element) not in paired],
     )
 
 
@@ -142,7 +136,9 @@ def _renamed(
     old: Sequence[T], new: Sequence[T], moved: frozenset[str], content: Callable[[T], Hashable]
 ) -> Iterator[tuple[T, T]]:
     """Yield the pairs of like elements in each gap between elements that kept name and order."""
-    for removed, added in _gaps(old, new, moved):
+    common = {element.name for element in old} & {element.name for element in new}
+    gaps = zip(_split(old, common, moved), _split(new, common, moved), strict=True)
+    for removed, added in gaps:
         candidates: dict[Hashable, deque[int]] = {}
         for at, other in enumerate(added):
             candidates.setdefault(content(other), deque()).append(at)
@@ -154,13 +150,6 @@ def _renamed(
             if like:
                 first = like[0] + 1
                 yield element, added[like[0]]
-
-
-def _gaps(
-    old: Sequence[T], new: Sequence[T], moved: frozenset[str]
-) -> Iterator[tuple[list[T], list[T]]]:
-    common = {element.name for element in old} & {element.name for element in new}
-    return zip(_split(old, common, moved), _split(new, common, moved), strict=True)
 
 
 def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> Iterator[list[T]]:

@@ -47,6 +47,12 @@ class Sides(NamedTuple):
         return Change(code, subject, message, frozenset(levels), span, old, path, **facts)
 
     @property
+    def hashes(self) -> tuple[str, str]:
+        """The type hashes of the structure."""
+        name = str(self.new.name)
+        return self.before.describer.hash(name), self.after.describer.hash(name)
+
+    @property
     def top(self) -> Span | None:
         """The beginning of the new version, for what it no longer has."""
         return Span(self.new.source, 0, 0) if self.new.source else None
@@ -57,23 +63,23 @@ def field_changes(sides: Sides) -> Iterator[Change]:
 
     The level `wire` is decided for the structure as a whole: two changes can cancel each other.
     """
-    changes = list(_changes(sides))
     broken = not reads_alike(sides.old, sides.new, sides.before.messages, sides.after.messages)
-    if not broken:
-        changes = [change.without("wire") for change in changes]
-    elif not any("wire" in change.levels for change in changes):
-        changes = [
-            change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
-            for change in changes
-        ]
-    if any("hash" in change.levels for change in changes) and _same_hash(sides):
+    changes = with_wire(list(_changes(sides)), broken)
+    if any("hash" in change.levels for change in changes) and len({*sides.hashes}) == 1:
         changes = [change.without("hash") for change in changes]
     yield from (change for change in changes if change.levels)
 
 
-def _same_hash(sides: Sides) -> bool:
-    name = str(sides.new.name)
-    return sides.before.describer.hash(name) == sides.after.describer.hash(name)
+def with_wire(changes: list[Change], misread: bool) -> list[Change]:
+    """Return changes with the level `wire` if and only if somebody misreads the bytes."""
+    if not misread:
+        return [change.without("wire") for change in changes]
+    if any("wire" in change.levels for change in changes):
+        return changes
+    return [
+        change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
+        for change in changes
+    ]
 
 
 def _changes(sides: Sides) -> Iterator[Change]:

@@ -44,7 +44,7 @@ from idlc.project.settings import Scope
 from idlc.wire.layout import oversized
 
 if TYPE_CHECKING:
-    from idlc.model.describe import DescriptionDict, IndividualDict
+    from idlc.model.describe import DescriptionDict
 
 #: A graph that never comes to rest is watched for this many times the patience.
 RESTLESS = 10
@@ -231,39 +231,21 @@ def _answer(result: Any, is_offered: bool) -> Answer:
         return Answer(None, "does not answer")
     if not result.successful:
         return Answer(None, f"says: {one_line(result.failure_reason)}")
-    description = result.type_description
-    return Answer(
-        {
-            "type_description": _individual(description.type_description),
-            "referenced_type_descriptions": [
-                _individual(referenced) for referenced in description.referenced_type_descriptions
-            ],
-        },
-        sources={
-            source.type_name: source.raw_file_contents
-            for source in result.type_sources
-            if source.encoding == "msg"
-        },
-    )
-
-
-def _individual(description: Any) -> IndividualDict:
-    return {
-        "type_name": description.type_name,
-        "fields": [
-            {
-                "name": field.name,
-                "type": {
-                    "type_id": field.type.type_id,
-                    "capacity": field.type.capacity,
-                    "string_capacity": field.type.string_capacity,
-                    "nested_type_name": field.type.nested_type_name,
-                },
-                "default_value": field.default_value,
-            }
-            for field in description.fields
-        ],
+    sources = {
+        source.type_name: source.raw_file_contents
+        for source in result.type_sources
+        if source.encoding == "msg"
     }
+    return Answer(_plain(result.type_description), sources=sources)
+
+
+def _plain(value: Any) -> Any:
+    """Return a message as dictionaries by field."""
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    if not hasattr(value, "get_fields_and_field_types"):
+        return value
+    return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
 
 
 #: A structure's full name and type hash.
@@ -297,7 +279,12 @@ def compare_with_graph(
 
     `patience`: seconds without a change; without files, the installed types are compared.
     """
-    local_models = _local_models(options, report, has_paths=has_paths)
+    scope = options.scope
+    listing = list_files(options.paths, scope.root, report, scope.exclude)
+    if has_paths:
+        report.extend(no_interfaces(path, scope.root, scope.exclude) for path in listing.empty)
+    packages = inputs.packages(listing.files, scope, report)
+    local_models = error_free_models(packages, scope, report).values()
     if report.had_errors:
         return None
     with join_graph(report) as graph:
@@ -310,7 +297,7 @@ def compare_with_graph(
             message = f"no node was found within {patience:g} seconds"
             report.extend([codes.EMPTY_GRAPH.of("graph", message, hint=hint)] if graph else [])
             return None
-        models, local = _local_versions(local_models, endpoints, options.scope)
+        models, local = _local_versions(local_models, endpoints, scope)
         versions = list(several_versions(endpoints, local))
         questions = dict(_questions(versions, endpoints, models))
         answers = graph.ask(chain.from_iterable(questions.values()), patience)
@@ -335,16 +322,6 @@ def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
     return {"node": len(nodes)} | {entity: entities[entity] for entity in get_args(Entity)}
 
 
-def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) -> list[Model]:
-    """Return the models of the user's files, or of the files in the working folder."""
-    root, exclude = options.scope.root, options.scope.exclude
-    listing = list_files(options.paths, root, report, exclude)
-    if has_paths:
-        report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
-    packages = inputs.packages(listing.files, options.scope, report)
-    return [*error_free_models(packages, options.scope, report).values()]
-
-
 def _local_versions(
     local_models: Iterable[Model], endpoints: Iterable[Endpoint], scope: Scope
 ) -> tuple[dict[Key, Model], dict[str, LocalType]]:
@@ -353,7 +330,7 @@ def _local_versions(
     local: dict[str, LocalType] = {}
     for model in local_models:
         local |= {name: LocalType(hash_, True) for name, hash_ in _add(model, models)}
-    for model in _installed({endpoint.structure for endpoint in endpoints}, scope):
+    for model in _installed((endpoint.structure for endpoint in endpoints), scope):
         for name, hash_ in _add(model, models):
             local.setdefault(name, LocalType(hash_, False))
     return models, local
@@ -401,13 +378,13 @@ def _questions(
         if endpoint.structure.endswith("_Event") and endpoint.hash:
             events.setdefault(endpoint.structure, []).append(endpoint)
     for version in chain.from_iterable(versions):
-        key, nodes = (version.type, version.hash), version.nodes
-        if key not in models:
-            questions = [Question(node, *key) for node in nodes[:ASKED]]
+        nodes = version.nodes
+        if version.key not in models:
+            questions = [Question(node, *version.key) for node in nodes[:ASKED]]
             if event := event_of(version.type):
                 ends = [end for end in events.get(event, ()) if end.node in nodes]
                 questions = [Question(end.node, event, end.hash) for end in ends]
-            yield key, questions
+            yield version.key, questions
 
 
 def _add_described(
@@ -426,10 +403,9 @@ def _add_described(
                     model = reported_model(description, sources, name, type_hash, node)
                     if any(oversized(model)):
                         raise DescriptionError("it is larger than anybody can use")
+                    list(_add(model, models))
                 except DescriptionError as error:
                     problem = f"is not believed: {error}"
-                else:
-                    list(_add(model, models))
             if problem:
                 problems.setdefault(key, []).append(f"`{node}` {problem}")
     return {
