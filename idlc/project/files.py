@@ -33,7 +33,9 @@ def cache_folder() -> Path | None:
         if not _is_ours(existing):  # `sudo idlc` leaves nothing in another user's home
             return None
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        private = _is_ours(place) and not _is_open(place)
+        # on Windows, modes do not show who may write
+        is_open = sys.platform != "win32" and place.stat().st_mode & 0o022
+        private = _is_ours(place) and not is_open
         return place if private and os.access(place, os.W_OK) else None
     except OSError:
         return None
@@ -52,11 +54,6 @@ def _base() -> Path | None:
     except RuntimeError:
         return None
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-
-
-def _is_open(path: Path) -> bool:
-    """Return whether others may write; on Windows, modes do not show it."""
-    return sys.platform != "win32" and bool(path.stat().st_mode & 0o022)
 
 
 def _is_ours(path: Path) -> bool:

@@ -195,10 +195,6 @@ def owned_files(outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
     }
 
 
-def _stages(folder: Path) -> list[Path]:
-    return [path for path in entries(folder) if path.name.startswith(STAGE.removesuffix("new"))]
-
-
 def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -> bool:
     """Make changes, all or none; report IDL612 and return `False` on a failure.
 
@@ -250,8 +246,9 @@ def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]
 def sweep(folder: Path) -> None:
     """Remove the drafts that killed runs left in a folder, if no other run can be at work."""
     with exclusive(folder) as is_locked:
-        for stage in _stages(folder) if is_locked else ():
-            _remove(stage)
+        for path in entries(folder) if is_locked else ():
+            if path.name.startswith(STAGE.removesuffix("new")):
+                _remove(path)
 
 
 def _remove(stage: Path) -> None:
@@ -277,7 +274,15 @@ class _Transaction:
     def run(self, changes: list[Change], name: str, report: Report) -> bool:
         """Make all changes, in order, or none; report IDL612."""
         try:
-            self._write_drafts(changes)
+            make_folder(self._stage.parent, self._created)
+            self._stage.mkdir()
+            self._created.append(self._stage)
+            for number, change in enumerate(changes):
+                if change.new is not None:
+                    self._current = change.path
+                    # only the record must be on the disk when the others move
+                    is_record = change.path == self._record
+                    create(f"{self._stage}/{number}", change.new, sync=is_record)
             with uninterrupted():
                 for number, change in enumerate(changes):
                     self._current = change.path
@@ -297,16 +302,6 @@ class _Transaction:
             return False
         self._tidy(changes)
         return True
-
-    def _write_drafts(self, changes: list[Change]) -> None:
-        make_folder(self._stage.parent, self._created)
-        self._stage.mkdir()
-        self._created.append(self._stage)
-        for number, change in enumerate(changes):
-            if change.new is not None:
-                self._current = change.path
-                # only the record must be on the disk when the others move
-                create(f"{self._stage}/{number}", change.new, sync=change.path == self._record)
 
     def _make(self, change: Change, draft: str) -> None:
         path, old, new, ownership = change
