@@ -89,9 +89,8 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         return None
     # unused allowances may be for what was left out
     judged = judge(comparison.changes, options, report, is_all=not comparison.left_out)
-    part = None
-    if not (comparison.left_out or is_distro(options.against)):
-        part = part_to_raise(comparison)
+    is_version = not (comparison.left_out or is_distro(options.against))
+    part = part_to_raise(comparison) if is_version else None
     version = _version(packages, root, report)
     return Verdict(
         judged.levels,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
@@ -70,15 +70,7 @@ def levels_of(changes: Iterable[Change]) -> str:
     return ", ".join(level for level in LEVELS if level in broken)
 
 
-class Named(Protocol):
-    """An element with a name."""
-
-    @property
-    def name(self) -> str:
-        """The name."""
-
-
-T = TypeVar("T", bound=Named)
+T = TypeVar("T", bound=ir.Field | ir.Constant)
 
 
 class Pairing(msgspec.Struct, Generic[T], frozen=True):

@@ -71,12 +71,7 @@ class _LayeredLibrary(Library):
     ) -> None:
         own = {package.package: package.folders for package in packages}
         super().__init__(
-            scope.include,
-            scope.root,
-            Report(),
-            own=own,
-            exclude=scope.exclude,
-            distro=scope.distro,
+            scope.include, scope.root, Report(), own=own, exclude=scope.exclude, distro=scope.distro
         )
         self.other = other
         self._other_first = other_first

@@ -7,6 +7,7 @@ from collections.abc import Hashable, Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.compare.changes import (
+    LEVELS,
     Change,
     Level,
     Pairing,
@@ -86,51 +87,31 @@ def _changes(sides: Sides) -> Iterator[Change]:
     pairing = pair(sides.old.fields, sides.new.fields, lambda field: field.type)
     yield from _removed(sides, pairing)
     for old, new in pairing.renamed:
-        yield sides.change(
-            codes.FIELD_RENAMED,
-            old,
-            f"field `{old.name}` is called `{new.name}` now",
-            ("hash", "source"),
-            new.name_span,
-            old.name_span,
-        )
+        message = f"field `{old.name}` is called `{new.name}` now"
+        spans = new.name_span, old.name_span
+        yield sides.change(codes.FIELD_RENAMED, old, message, ("hash", "source"), *spans)
     yield from _added(sides, pairing)
     for old, new in pairing.kept:
         if new.name in pairing.moved:
-            yield sides.change(
-                codes.FIELD_MOVED,
-                new,
-                f"field `{new.name}` was moved",
-                ("wire", "hash", "source"),
-                new.name_span,
-                old.name_span,
-                hint="put it back; the order of the fields is the order of the bytes",
-            )
+            message = f"field `{new.name}` was moved"
+            hint = "put it back; the order of the fields is the order of the bytes"
+            spans = new.name_span, old.name_span
+            yield sides.change(codes.FIELD_MOVED, new, message, LEVELS[:3], *spans, hint=hint)
     # the first such field stands for the structure
     first = next((field for field in sides.new.fields if field.optional), None)
     if first is not None and not any(field.optional for field in sides.old.fields):
-        yield sides.change(
-            codes.OPTIONAL_ADDED,
-            first,
-            f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file",
-            ("source",),
-            first.name_span,
-            hint="leave it out; it has no effect",
-        )
+        message = f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file"
+        hint, span = "leave it out; it has no effect", first.name_span
+        yield sides.change(codes.OPTIONAL_ADDED, first, message, ("source",), span, hint=hint)
     for old, new in (*pairing.kept, *pairing.renamed):
         yield from _type_changes(sides, old, new)
         if _default(old) != _default(new):
             yield _default_changed(sides, old, new)
         if old.unit and new.unit and old.unit != new.unit:
-            yield sides.change(
-                codes.UNIT_CHANGED,
-                new,
-                f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now",
-                ("behaviour",),
-                new.name_span,
-                old.name_span,
-                hint="give the field another name, so that nobody uses the old unit by mistake",
-            )
+            message = f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now"
+            hint = "give the field another name, so that nobody uses the old unit by mistake"
+            spans = new.name_span, old.name_span
+            yield sides.change(codes.UNIT_CHANGED, new, message, ("behaviour",), *spans, hint=hint)
 
 
 def _places(fields: Iterable[ir.Field]) -> dict[str, int]:
@@ -161,16 +142,12 @@ def _removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
 def _added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.new.fields)
     last = max((places[new.name] for _, new in (*pairing.kept, *pairing.renamed)), default=-1)
+    hint = "add a new message instead, if old and new programs must understand each other"
     for field in pairing.added:
-        yield sides.change(
-            codes.FIELD_ADDED,
-            field,
-            f"field `{field.name}` was added",
-            # positional arguments and patterns refer to other fields if it is not the last
-            ("wire", "hash") if last < places[field.name] else ("wire", "hash", "source"),
-            field.name_span,
-            hint="add a new message instead, if old and new programs must understand each other",
-        )
+        # positional arguments and patterns refer to other fields if it is not the last
+        levels: set[Level] = {"wire", "hash"} if last < places[field.name] else {*LEVELS[:3]}
+        message, span = f"field `{field.name}` was added", field.name_span
+        yield sides.change(codes.FIELD_ADDED, field, message, levels, span, hint=hint)
 
 
 def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change]:
@@ -186,10 +163,9 @@ def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change
         target = str(after.target)
         if sides.before.describer.hash(target) != sides.after.describer.hash(target):
             levels.add("hash")
-        message = f"`{target}`, the type of field `{new.name}`, changed"
         if levels:
-            code = codes.USED_TYPE_CHANGED
-            yield sides.change(code, new, message, levels, new.type_span, cause=target)
+            message, span = f"`{target}`, the type of field `{new.name}`, changed", new.type_span
+            yield sides.change(codes.USED_TYPE_CHANGED, new, message, levels, span, cause=target)
         return
     if type_dict(old.type) != type_dict(new.type):
         levels.add("hash")
@@ -198,16 +174,10 @@ def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change
     if tighter(before, after):
         levels.add("behaviour")
     only_bounds = type(old.type) is type(new.type) and without_bound(before) == without_bound(after)
-    package = sides.new.name.package
-    yield sides.change(
-        codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED,
-        new,
-        f"field `{new.name}` was `{spell(old.type, package)}` "
-        f"and is `{spell(new.type, package)}` now",
-        levels,
-        new.type_span,
-        old.type_span,
-    )
+    code = codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED
+    was, now = (spell(field.type, sides.new.name.package) for field in (old, new))
+    message = f"field `{new.name}` was `{was}` and is `{now}` now"
+    yield sides.change(code, new, message, levels, new.type_span, old.type_span)
 
 
 def _default(field: ir.Field) -> str | None:
@@ -233,46 +203,28 @@ def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
 def constant_changes(sides: Sides) -> Iterator[Change]:
     """Yield the changes of the constants; their order has no meaning."""
     pairing = pair(sides.old.constants, sides.new.constants, _content)
+    source: tuple[Level] = ("source",)
     for constant in pairing.removed:
-        yield sides.change(
-            codes.CONSTANT_REMOVED,
-            constant,
-            f"constant `{constant.name}` was removed",
-            ("source",),
-            sides.top,
-            constant.name_span,
-        )
+        message = f"constant `{constant.name}` was removed"
+        spans = sides.top, constant.name_span
+        yield sides.change(codes.CONSTANT_REMOVED, constant, message, source, *spans)
     for old, new in pairing.renamed:
-        yield sides.change(
-            codes.CONSTANT_RENAMED,
-            old,
-            f"constant `{old.name}` is called `{new.name}` now",
-            ("source",),
-            new.name_span,
-            old.name_span,
-            hint=f"keep `{old.name}` beside it, with the same value",
-        )
+        message = f"constant `{old.name}` is called `{new.name}` now"
+        hint = f"keep `{old.name}` beside it, with the same value"
+        spans = new.name_span, old.name_span
+        yield sides.change(codes.CONSTANT_RENAMED, old, message, source, *spans, hint=hint)
     for old, new in pairing.kept:
         if native(old.type) != native(new.type):
-            yield sides.change(
-                codes.CONSTANT_TYPE_CHANGED,
-                new,
-                f"constant `{new.name}` was `{spell(old.type)}` and is `{spell(new.type)}` now",
-                ("source",),
-                new.name_span,
-                old.name_span,
-            )
+            was, now = spell(old.type), spell(new.type)
+            message = f"constant `{new.name}` was `{was}` and is `{now}` now"
+            spans = new.name_span, old.name_span
+            yield sides.change(codes.CONSTANT_TYPE_CHANGED, new, message, source, *spans)
         if repr(old.value) != repr(new.value):
             was, now = spell_value(old.value), spell_value(new.value)
-            yield sides.change(
-                codes.CONSTANT_VALUE_CHANGED,
-                new,
-                f"constant `{new.name}` was {was} and is {now} now",
-                ("behaviour",),
-                new.value_span,
-                old.value_span,
-                hint="both values are in use as long as not everything is rebuilt",
-            )
+            message = f"constant `{new.name}` was {was} and is {now} now"
+            hint = "both values are in use as long as not everything is rebuilt"
+            spans, code = (new.value_span, old.value_span), codes.CONSTANT_VALUE_CHANGED
+            yield sides.change(code, new, message, ("behaviour",), *spans, hint=hint)
 
 
 def added(sides: Sides) -> Iterator[str]:

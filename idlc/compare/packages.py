@@ -81,10 +81,8 @@ def compare(before: Model, after: Model) -> Comparison:
 
 def _differ(old: ir.Interface, new: ir.Interface) -> bool:
     """Return whether two versions of an interface differ, ignoring line ends."""
-    texts = [
-        interface.source.text.splitlines() if interface.source else None for interface in (old, new)
-    ]
-    return texts[0] != texts[1] or meaning(old) != meaning(new)
+    before, after = (each.source and each.source.text.splitlines() for each in (old, new))
+    return before != after or meaning(old) != meaning(new)
 
 
 def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:

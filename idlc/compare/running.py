@@ -94,9 +94,7 @@ def join_graph(report: Report) -> Iterator[Graph | None]:
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
-            parameter_overrides=[
-                rclpy.Parameter("start_type_description_service", value=False),
-            ],
+            parameter_overrides=[rclpy.Parameter("start_type_description_service", value=False)],
         )
     except ImportError as error:
         hint = "source your ROS 2 and use its Python, or pip install ros-jazzy-rclpy"
@@ -150,9 +148,8 @@ class Graph:
         owner, is_action, _ = name.partition(_ACTION)
         for role, sends in zip(roles, (True, False), strict=True):
             for node, type_, hash_ in self._ends(topic, sends, no_mangle=entity == "service"):
-                yield Endpoint(
-                    node, "action" if is_action else entity, owner, role, sends, type_, hash_
-                )
+                kind: Entity = "action" if is_action else entity
+                yield Endpoint(node, kind, owner, role, sends, type_, hash_)
 
     def _ends(self, topic: str, sends: bool, *, no_mangle: bool) -> Iterator[tuple[str, str, str]]:
         """Yield node, type and hash of each end of a topic, except idlc's own."""
@@ -309,17 +306,11 @@ def compare_with_graph(
             changes += version_changes(several, models, problems, seen)
     judged = judge(changes, options, report)
     silent = sum(not endpoint.hash for endpoint in endpoints)
-    return GraphVerdict(
-        judged.levels, judged.allowed, _counts(endpoints), silent, endpoints, judged.hidden
-    )
-
-
-def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
-    nodes = {endpoint.node for endpoint in endpoints if endpoint.node}
-    entities = Counter(
-        entity for entity, _ in {(endpoint.entity, endpoint.name) for endpoint in endpoints}
-    )
-    return {"node": len(nodes)} | {entity: entities[entity] for entity in get_args(Entity)}
+    named: set[tuple[str, str]] = {(endpoint.entity, endpoint.name) for endpoint in endpoints}
+    named |= {("node", endpoint.node) for endpoint in endpoints if endpoint.node}
+    numbers = Counter(kind for kind, _ in named)
+    counts = {kind: numbers[kind] for kind in ("node", *get_args(Entity))}
+    return GraphVerdict(judged.levels, judged.allowed, counts, silent, endpoints, judged.hidden)
 
 
 def _local_versions(

@@ -30,9 +30,7 @@ def condense(lines: Sequence[str]) -> Comment:
         return Comment()
     unit: str | None = None
     kept = list(lines)
-    units = (
-        list(islice(brackets("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
-    )
+    units = list(islice(brackets("\n".join(lines)), 2))
     if len(units) == 1:
         whole, unit = units[0]
         kept = [line.replace(whole, "") for line in kept]

@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import (
-    Callable,
-    Container,
-    Hashable,
-    Iterable,
-    Iterator,
-    Mapping,
-    MutableMapping,
-)
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
 
@@ -36,9 +28,7 @@ NAMED = 10
 
 
 def circles(
-    roots: Iterable[Node],
-    edges: Callable[[Node], Iterable[tuple[Edge, Node]]],
-    done: set[Node],
+    roots: Iterable[Node], edges: Callable[[Node], Iterable[tuple[Edge, Node]]], done: set[Node]
 ) -> Iterator[tuple[list[Node], Edge]]:
     """Yield each circle as its nodes, with the edge from the last back to the first.
 
@@ -66,8 +56,7 @@ def circles(
 
 
 def dependents(
-    names: Iterable[ir.TypeName],
-    references: Iterable[tuple[ir.TypeName, Iterable[ir.TypeName]]],
+    names: Iterable[ir.TypeName], references: Iterable[tuple[ir.TypeName, Iterable[ir.TypeName]]]
 ) -> set[ir.TypeName]:
     """Return interfaces with all that refer to one of them, in linear time, circles or not.
 
@@ -341,7 +330,7 @@ def link(
     return Model(package, tuple(interfaces[name] for name in mine), interfaces, pool)
 
 
-def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool: Pool) -> None:
+def _load_references(interfaces: dict[ir.TypeName, ir.Interface], pool: Pool) -> None:
     """Add every interface that is referred to; add an error for each that does not exist."""
     unknown = _UnknownTypes(interfaces, pool.library)
     queue = list(interfaces)
@@ -390,13 +379,11 @@ class _UnknownTypes:
         packages = self._library.packages() if self._hints >= 0 else ()
         is_known = siblings is not None or target.package in packages
         if "/" in written and not is_known and not self._library.names(target.package):
-            return codes.UNKNOWN_PACKAGE.at(
-                span.at(0, len(target.package)),
-                f"unknown package `{target.package}`",
-                hint=self._library.nearby(target.package)
-                or _of_others(target)
-                or package_hint(target.package, packages),
-            )
+            package = target.package
+            nearby = self._library.nearby(package) or _of_others(target)
+            hint = nearby or package_hint(package, packages)
+            at, message = span.at(0, len(package)), f"unknown package `{package}`"
+            return codes.UNKNOWN_PACKAGE.at(at, message, hint=hint)
         at = span.at(written.rfind("/") + 1, len(written))
         hint = self._hint(target, qualified="/" in written)
         return codes.UNKNOWN_TYPE.at(at, f"unknown type `{written}`", hint=hint)

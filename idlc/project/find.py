@@ -151,11 +151,9 @@ def no_interfaces(
     if exclude is not NOTHING and list_files((folder,), root, Report()).files:
         message = f"every interface file in `{folder}` is excluded"
         return codes.NO_INTERFACES.of(folder, message, hint="see `exclude` in [tool.idlc]")
-    return codes.NO_INTERFACES.of(
-        folder,
-        f"no {also}.msg, .srv or .action file in `{folder}`",
-        hint="interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself",
-    )
+    message = f"no {also}.msg, .srv or .action file in `{folder}`"
+    hint = "interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself"
+    return codes.NO_INTERFACES.of(folder, message, hint=hint)
 
 
 def list_files(
@@ -277,11 +275,8 @@ def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
     """Return whether `walk` would not reach a folder within another."""
     for name in inside:
         folder /= name
-        if (
-            name.startswith(".")
-            or name in SKIPPED
-            or any(is_file(folder / marker) for marker in CLOSING)
-        ):
+        is_closing = any(is_file(folder / marker) for marker in CLOSING)
+        if is_closing or name.startswith(".") or name in SKIPPED:
             return True
     return False
 

@@ -36,12 +36,8 @@ class Folder:
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
-        direct = [
-            root
-            for root in (self._path / package, self._path / "share" / package)
-            if _has_interfaces(root)
-        ]
-        yield from direct or self._packages.get(package, [])
+        candidates = (self._path / package, self._path / "share" / package)
+        yield from list(filter(_has_interfaces, candidates)) or self._packages.get(package, [])
 
     def packages(self) -> Iterable[str]:
         """Return the names of the packages found in it."""
@@ -113,12 +109,9 @@ class Library:
     ) -> None:
         self.distro = distro
         self.texts = texts
-        places = [Folder(path, root) for path in folders]
         self._missing = [path for path in folders if not is_folder(Path(root.path(path)))]
-        self._places: tuple[Folder | Prefix, ...] = (
-            *places,
-            *(Prefix(path, distro) for path in prefixes.ament_prefixes()),
-        )
+        self._places: list[Folder | Prefix] = [Folder(path, root) for path in folders]
+        self._places += [Prefix(path, distro) for path in prefixes.ament_prefixes()]
         self._own = own or {}
         self._exclude = exclude
         self._root = root
@@ -175,9 +168,7 @@ class Library:
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
-        in_texts = [
-            name.name for name in self.texts if (name.package, name.kind) == (package, "msg")
-        ]
+        in_texts = [name for of, kind, name in self.texts if (of, kind) == (package, "msg")]
         on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
         return [*in_texts, *(on_disk or catalog.names(package, self.distro))]
 

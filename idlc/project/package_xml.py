@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -190,22 +190,19 @@ def statements(source: Source) -> tuple[Statement, ...]:
     """Return the statements of a package.xml, in order; empty if it is not XML."""
     data = source.text.encode("utf-8")
     try:
-        manifest = read(data, "utf-8")
+        elements = read(data, "utf-8").elements
     except _NOT_XML:
         return ()
-    return tuple(_placed(manifest.elements, source, data))
-
-
-def _placed(elements: Iterable[Element], source: Source, data: bytes) -> Iterator[Statement]:
     offsets = sorted({at for element in elements for at in (element.start, element.end)})
     characters = {0: 0}
     for before, at in zip([0, *offsets], offsets, strict=False):
         characters[at] = characters[before] + len(data[before:at].decode("utf-8"))
-    for element in elements:
-        start = characters[element.start]
-        span = Span(source, start, start + len(element.tag) + 2)
-        end = characters[element.end]
-        yield Statement(element.tag, element.text, span, end, element.attributes)
+    placed = []
+    for _, tag, text, first, end, attributes in elements:
+        start = characters[first]
+        span = Span(source, start, start + len(tag) + 2)
+        placed.append(Statement(tag, text, span, characters[end], attributes))
+    return tuple(placed)
 
 
 def declared_name(path: Path, root: Root, report: Report) -> str | None:
@@ -220,15 +217,10 @@ def declared_name(path: Path, root: Root, report: Report) -> str | None:
         report.add(_broken(data, name, error))
         return None
     if not declared:
-        report.add(
-            codes.BAD_PACKAGE_XML.of(
-                name,
-                "no package name in this file",
-                hint="add `<name>my_package</name>` within `<package>`, or give --package NAME",
-            )
-        )
-        return None
-    return declared
+        message = "no package name in this file"
+        hint = "add `<name>my_package</name>` within `<package>`, or give --package NAME"
+        report.add(codes.BAD_PACKAGE_XML.of(name, message, hint=hint))
+    return declared or None
 
 
 def declared_version(path: Path) -> str:

@@ -204,13 +204,11 @@ def _broken(source: Source, message: str) -> Diagnostic:
     if not place:
         return codes.BAD_CONFIG.at(Span(source, 0, len(source.text)), message)
     numbers = [int(number) for number in re.findall(r"\d+", place)]
+    start = len(source.text)
     if len(numbers) == 2 and numbers[0] <= len(source.line_starts):
         start = source.line_starts[numbers[0] - 1] + numbers[1] - 1
-    else:
-        start = len(source.text)
-    return codes.BAD_CONFIG.at(
-        Span(source, start, start + 1), f"not valid TOML: {text[:1].lower()}{text[1:]}"
-    )
+    span = Span(source, start, start + 1)
+    return codes.BAD_CONFIG.at(span, f"not valid TOML: {text[:1].lower()}{text[1:]}")
 
 
 def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
@@ -280,7 +278,7 @@ class Scope(msgspec.Struct, frozen=True):
     @property
     def distro(self) -> Distro:
         """The distribution that files are read for where that is one."""
-        return self.distros[0] if self.distros else _installed()
+        return self.distros[0] if self.distros else BY_NAME.get(distribution().name, DEFAULT)
 
 
 def scope(
@@ -308,8 +306,3 @@ def scope(
 def _distros_named(names: Sequence[str]) -> tuple[Distro, ...]:
     """Return the distributions with these names, each once."""
     return tuple(dict.fromkeys(BY_NAME[name] for name in names))
-
-
-def _installed() -> Distro:
-    """Return the distribution that is installed here, or the default for an unknown one."""
-    return BY_NAME.get(distribution().name, DEFAULT)

@@ -143,11 +143,9 @@ def plan(
 
 
 def _in_the_way(shown_path: str, obstacle: Obstacle) -> Diagnostic:
-    return codes.FOREIGN_FILE.of(
-        shown_path,
-        f"cannot write `{shown_path}`: {obstacle.what}",
-        hint="move it away, or write to another folder",
-    )
+    message = f"cannot write `{shown_path}`: {obstacle.what}"
+    hint = "move it away, or write to another folder"
+    return codes.FOREIGN_FILE.of(shown_path, message, hint=hint)
 
 
 def _refusal(path: str, change: Change, force: bool | None, *, in_full: bool) -> Diagnostic:
@@ -171,16 +169,11 @@ def difference(old: bytes, new: bytes) -> Iterator[str]:
     """Yield a unified diff from the file on disk to idlc's, cut when long."""
     import difflib
 
-    lines = list(
-        difflib.unified_diff(_lines(old), _lines(new), "on disk", "from idlc", lineterm="", n=1)
-    )
+    before, after = (data.decode("utf-8", errors="replace").splitlines() for data in (old, new))
+    lines = [*difflib.unified_diff(before, after, "on disk", "from idlc", lineterm="", n=1)]
     yield from lines[:DIFF_LINES]
     if len(lines) > DIFF_LINES:
         yield f"… and {len(lines) - DIFF_LINES} more lines"
-
-
-def _lines(data: bytes) -> list[str]:
-    return data.decode("utf-8", errors="replace").splitlines()
 
 
 def owned_files(outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
@@ -238,9 +231,8 @@ def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]
             if old is not None and ownership is Ownership.OWN:
                 digests[path] = f"{digests.get(path, '')} {digest(old)}".lstrip()
         first = render(digests)
-    records = ((plan.recorded, first), (first, final))
-    before, after = ([Change(plan.record, *each)] if each[0] != each[1] else [] for each in records)
-    return [*before, *changes, *after]
+    before, after = Change(plan.record, plan.recorded, first), Change(plan.record, first, final)
+    return [each for each in (before, *changes, after) if each.old != each.new]
 
 
 def sweep(folder: Path) -> None:
