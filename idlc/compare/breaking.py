@@ -92,16 +92,9 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     is_version = not (comparison.left_out or is_distro(options.against))
     part = part_to_raise(comparison) if is_version else None
     version = _version(packages, root, report)
-    return Verdict(
-        judged.levels,
-        judged.allowed,
-        part,
-        version,
-        raised(version, part) if version and part else None,
-        comparison.additions,
-        comparison.left_out,
-        judged.hidden,
-    )
+    following = raised(version, part) if version and part else None
+    facts = comparison.additions, comparison.left_out, judged.hidden
+    return Verdict(judged.levels, judged.allowed, part, version, following, *facts)
 
 
 class Judged(NamedTuple):

@@ -97,13 +97,8 @@ def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -
     moved = frozenset(element.name for element in common if places[element.name] not in steady)
     renamed = list(_renamed(old, new, moved, content))
     paired = {id(element) for both in (*kept, *renamed) for element in both}
-    return Pairing(
-        kept,
-        renamed,
-        moved,
-        [element for element in old if id(element) not in paired],
-        [element for element in new if id(element) not in paired],
-    )
+    removed, added = ([each for each in side if id(each) not in paired] for side in (old, new))
+    return Pairing(kept, renamed, moved, removed, added)
 
 
 def _longest_increasing(numbers: Sequence[int]) -> list[int]:

@@ -122,21 +122,17 @@ def _removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.old.fields)
     last = max((places[old.name] for old, _ in (*pairing.kept, *pairing.renamed)), default=-1)
     kept = [places[old.name] for old, _ in pairing.kept]
+    hint = "keep it and say in its comment that it is no longer used"
     for field in pairing.removed:
         place = places[field.name]
         following = bisect_right(kept, place)
         beside = [new for _, new in pairing.kept[following : following + 1]]
         spans = [new.type_span for new in (*beside, *sides.new.fields[-1:])]
-        yield sides.change(
-            codes.FIELD_REMOVED,
-            field,
-            f"field `{field.name}` was removed",
-            # no field that stayed comes after it
-            ("hash", "source") if last < place else ("hash", "source", "wire"),
-            (spans[0] if spans else None) or sides.top,
-            field.name_span,
-            hint="keep it and say in its comment that it is no longer used",
-        )
+        # where no field that stayed comes after it, the others are read right
+        levels: set[Level] = {"hash", "source"} if last < place else {*LEVELS[:3]}
+        message, at = f"field `{field.name}` was removed", next(iter(spans), None) or sides.top
+        own = field.name_span
+        yield sides.change(codes.FIELD_REMOVED, field, message, levels, at, own, hint=hint)
 
 
 def _added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:

@@ -175,50 +175,37 @@ class Graph:
             return dict.fromkeys(questions, Answer(None, problem))
         nodes = dict.fromkeys(question.node for question in questions)
         clients = {node: self._client(service, node) for node in nodes}
+        futures: dict[Question, Any] = {}
         try:
-            futures = self._answers(service, clients, questions, patience)
+            executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
+            executor.add_node(self._node)
+            end = time.monotonic() + patience
+            while time.monotonic() < end:
+                for question in questions:
+                    client = clients[question.node]
+                    if question not in futures and client is not None and client.service_is_ready():
+                        _, name, hash_ = question
+                        request = service.Request(
+                            type_name=name, type_hash=hash_, include_type_sources=True
+                        )
+                        futures[question] = client.call_async(request)
+                if len(futures) == len(questions) and all(each.done() for each in futures.values()):
+                    break
+                executor.spin_once(timeout_sec=_PAUSE)
+            executor.remove_node(self._node)
+            executor.shutdown()
+            results = {question: each.result() for question, each in futures.items() if each.done()}
         finally:
             for client in filter(None, clients.values()):
                 self._node.destroy_client(client)
-        offered = {name for name, _ in self._node.get_service_names_and_types()}
-        return {
-            question: _answer(
-                futures.get(question), f"{question.node}/get_type_description" in offered
-            )
-            for question in questions
-        }
+        names = {name for name, _ in self._node.get_service_names_and_types()}
+        offered = {node for node in nodes if f"{node}/get_type_description" in names}
+        return {each: _answer(results.get(each), each.node in offered) for each in questions}
 
     def _client(self, service: Any, node: str) -> Any:
         with suppress(Exception):  # a name that no rclpy gives itself
             return self._node.create_client(service, f"{node}/get_type_description")
         return None
-
-    def _answers(
-        self,
-        service: Any,
-        clients: Mapping[str, Any],
-        questions: Sequence[Question],
-        patience: float,
-    ) -> dict[Question, Any]:
-        """Return the results of the questions that were answered in time."""
-        executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
-        executor.add_node(self._node)
-        futures: dict[Question, Any] = {}
-        end = time.monotonic() + patience
-        while time.monotonic() < end:
-            for question in questions:
-                client = clients[question.node]
-                if question not in futures and client is not None and client.service_is_ready():
-                    request = service.Request(
-                        type_name=question.type, type_hash=question.hash, include_type_sources=True
-                    )
-                    futures[question] = client.call_async(request)
-            if len(futures) == len(questions) and all(future.done() for future in futures.values()):
-                break
-            executor.spin_once(timeout_sec=_PAUSE)
-        executor.remove_node(self._node)
-        executor.shutdown()
-        return {question: future.result() for question, future in futures.items() if future.done()}
 
 
 def _answer(result: Any, is_offered: bool) -> Answer:

@@ -7,6 +7,7 @@ spelling of a text.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import msgspec
@@ -80,21 +81,14 @@ def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
     if value.is_text and isinstance(type_, ir.String) and _fits(type_, words):
         return ir.Default(words, words)
     if value.is_text and isinstance(type_, (ir.Array, ir.Sequence)):
-        values = _elements(type_, words)
-        if values is not None:
+        values = None
+        with suppress(ValueError):  # the defaults of arrays travel as the text of a tuple
+            values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
+        if values is not None and all(_fits(type_.element, each) for each in values):
             wrong = lower_values.wrong_length(type_, len(values), words)
             return wrong or ir.Default(values, words)
     message = f"this is no value of type `{ir.spell(type_)}`"
     return Fault(codes.BAD_VALUE, message, 0, value.end - value.start)
-
-
-def _elements(type_: ir.Array | ir.Sequence, words: str) -> tuple[ir.Scalar, ...] | None:
-    """Read the text of a Python tuple, as which the defaults of arrays travel."""
-    try:
-        values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
-    except ValueError:
-        return None
-    return values if all(_fits(type_.element, value) for value in values or ()) else None
 
 
 def _fits(type_: ir.Element, value: object) -> bool:

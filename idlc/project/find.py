@@ -182,7 +182,10 @@ def list_files(
                 report.add(codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint))
             else:
                 has_files = True
-                by_path.setdefault(whole, _interface(path, whole, argument, root))
+                place, kind = Path(root.path(path)), KINDS[path.suffix]
+                home = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path takes as long again
+                file = InterfaceFile(place, path.as_posix(), kind, path.stem, argument, home)
+                by_path.setdefault(whole, file)
         if not has_files:
             empty.setdefault(argument)
     files = sorted(by_path.values(), key=lambda file: (file.shown, file.argument))
@@ -218,13 +221,6 @@ def _files_of(
         report.add(codes.NOT_AN_INTERFACE.of(argument, message))
     else:
         yield path
-
-
-def _interface(path: Path, whole: str, argument: str, root: Root) -> InterfaceFile:
-    kind = KINDS[path.suffix]
-    package = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
-    place = Path(root.path(path))
-    return InterfaceFile(place, path.as_posix(), kind, path.stem, argument, package)
 
 
 @lru_cache(maxsize=1024)

@@ -51,8 +51,6 @@ _ELSEWHERE = frozenset(
     "GIT_DIR GIT_WORK_TREE GIT_COMMON_DIR GIT_INDEX_FILE GIT_OBJECT_DIRECTORY "
     "GIT_ALTERNATE_OBJECT_DIRECTORIES GIT_NAMESPACE GIT_PREFIX".split()
 )
-_SHALLOW = "this clone is shallow: `git fetch --unshallow` completes it"
-_PARTIAL = "this clone is partial: `git fetch --refetch --no-filter` completes it"
 _NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
 _DAMAGED = "`git fsck` lists what is missing or damaged"
 #: Prefixes of git's error messages.
@@ -165,9 +163,9 @@ def _completing(top: Path) -> str:
     """Return the hint that completes a shallow or partial clone; empty for any other clone."""
     with suppress(GitError):
         if _git(top, ["rev-parse", "--is-shallow-repository"]).strip() == b"true":
-            return _SHALLOW
+            return "this clone is shallow: `git fetch --unshallow` completes it"
         _git(top, ["config", "--get-regexp", r"^remote\..*\.promisor$", "^true$"])
-        return _PARTIAL
+        return "this clone is partial: `git fetch --refetch --no-filter` completes it"
     return ""
 
 

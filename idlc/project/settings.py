@@ -180,7 +180,30 @@ def _read(path: Path, root: Root, report: Report) -> Config:
         return Config(root=root)
     tool = document.get("tool", {})
     table = tool.get("idlc", {}) if isinstance(tool, dict) else {}
-    return _checked(table, source, path.parent, root, report)
+    place = TableLocation(source, "tool.idlc", "[tool.idlc]")
+    if not isinstance(table, dict):
+        place.wrong("idlc", "`tool.idlc` must be a table", report)
+        return Config(root=root)
+    settings = read_table(table, Settings, place, report)
+    assert settings is not None
+    for url in settings.paths:
+        place.no_url("paths", url, report)
+    wanted = settings.distro
+    distros = split_names(wanted) if isinstance(wanted, str) else wanted
+    for name in distros:
+        if name and name not in BY_NAME:
+            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
+            place.wrong("distro", message, report, unknown_distro(name))
+    folder = path.parent
+    values = {
+        **msgspec.structs.asdict(settings),
+        "paths": tuple(_typed(folder, each, root) for each in settings.paths),
+        "out": settings.out and _typed(folder, settings.out, root),
+        "include": tuple(_typed(folder, each, root) for each in settings.include),
+        "distro": tuple(name for name in distros if name in BY_NAME),
+        "templates": settings.templates and _typed(folder, settings.templates, root),
+    }
+    return Config(root=root, source=source, folder=folder, **values)
 
 
 def toml(text: str) -> dict[str, Any]:
@@ -209,33 +232,6 @@ def _broken(source: Source, message: str) -> Diagnostic:
         start = source.line_starts[numbers[0] - 1] + numbers[1] - 1
     span = Span(source, start, start + 1)
     return codes.BAD_CONFIG.at(span, f"not valid TOML: {text[:1].lower()}{text[1:]}")
-
-
-def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
-    """Return the settings in a table; report unknown ones and wrong types."""
-    place = TableLocation(source, "tool.idlc", "[tool.idlc]")
-    if not isinstance(table, dict):
-        place.wrong("idlc", "`tool.idlc` must be a table", report)
-        return Config(root=root)
-    settings = read_table(table, Settings, place, report)
-    assert settings is not None
-    for path in settings.paths:
-        place.no_url("paths", path, report)
-    wanted = settings.distro
-    distros = split_names(wanted) if isinstance(wanted, str) else wanted
-    for name in distros:
-        if name and name not in BY_NAME:
-            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
-            place.wrong("distro", message, report, unknown_distro(name))
-    values = {
-        **msgspec.structs.asdict(settings),
-        "paths": tuple(_typed(folder, path, root) for path in settings.paths),
-        "out": settings.out and _typed(folder, settings.out, root),
-        "include": tuple(_typed(folder, path, root) for path in settings.include),
-        "distro": tuple(name for name in distros if name in BY_NAME),
-        "templates": settings.templates and _typed(folder, settings.templates, root),
-    }
-    return Config(root=root, source=source, folder=folder, **values)
 
 
 def _typed(folder: Path, path: str, root: Root) -> str:
