@@ -50,7 +50,7 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
             message = "`vendor-deps` is `beside`: a wheel would overwrite packages of ROS 2"
             hint = "set it to true, so that the types that are used are in the package itself"
             place.wrong("vendor-deps", message, report, hint)
-        if config.package not in (None, name):
+        if config.package not in ("", name):
             message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
             place.wrong("package", message, report, "remove `package` from [tool.idlc]")
     settings = scope(config, distro=options.distribution and options.distribution.name)

@@ -120,12 +120,10 @@ class Compiler:
         self, packages: Iterable[inputs.Inputs], report: Report
     ) -> Iterator[tuple[inputs.Inputs, Model]]:
         """Yield the model of each package; all of them see each other."""
-        from idlc.model.link import check_packages
-
         added = [(package, self.add(sources_of(package, report), report)) for package in packages]
         for package, own in added:
             yield package, self.model(package.package, own, report)
-        check_packages(self._pool, report)
+        self._pool.check_packages(report)
 
 
 def compile_package(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -88,20 +89,12 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         return None
     # unused allowances may be for what was left out
     judged = judge(comparison.changes, options, report, is_all=not comparison.left_out)
-    part = None
-    if not (comparison.left_out or is_distro(options.against)):
-        part = part_to_raise(comparison)
+    is_version = not (comparison.left_out or is_distro(options.against))
+    part = part_to_raise(comparison) if is_version else None
     version = _version(packages, root, report)
-    return Verdict(
-        judged.levels,
-        judged.allowed,
-        part,
-        version,
-        raised(version, part) if version and part else None,
-        comparison.additions,
-        comparison.left_out,
-        judged.hidden,
-    )
+    following = raised(version, part) if version and part else None
+    facts = comparison.additions, comparison.left_out, judged.hidden
+    return Verdict(judged.levels, judged.allowed, part, version, following, *facts)
 
 
 class Judged(NamedTuple):
@@ -126,13 +119,10 @@ def judge(
     """
     left = not_allowed(changes, options, report, is_all=is_all)
     levels = set(options.levels)
-    selected = [
-        change for change in left if (change.levels & levels if levels else concerns(change))
-    ]
+    selected = [each for each in left if (each.levels & levels if levels else concerns(each))]
     report.extend(change.diagnostic for change in selected)
-    counts: dict[str, int] = {
-        level: sum(level in change.levels for change in selected) for level in LEVELS
-    }
+    broken = Counter[str](level for change in selected for level in change.levels)
+    counts: dict[str, int] = {level: broken[level] for level in LEVELS}
     return Judged(counts, len(changes) - len(left), len(left) - len(selected))
 
 
@@ -167,13 +157,9 @@ def _against(options: BreakingOptions, packages: Packages, report: Report) -> Co
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
-        report.add(
-            codes.NO_SUCH_PATH.of(
-                options.against,
-                f"no such file or folder: `{options.against}`",
-                hint=f"the git revision is `--against {GIT}{options.against}`",
-            )
-        )
+        message = f"no such file or folder: `{options.against}`"
+        hint = f"the git revision is `--against {GIT}{options.against}`"
+        report.add(codes.NO_SUCH_PATH.of(options.against, message, hint=hint))
         return None
     return _compare(options, packages, None, report)
 
@@ -198,15 +184,6 @@ class Side(NamedTuple):
     def names(self) -> frozenset[ir.TypeName]:
         """The names of all interfaces, broken ones included."""
         return self.broken.union(own.name for own in self.interfaces)
-
-
-def read_baseline(options: BreakingOptions, packages: Packages, report: Report) -> Side | None:
-    """Return the packages as they are in a folder or git revision; `None` after errors."""
-    if not options.against.startswith(GIT):
-        return _before(options, packages, None, report)
-    name, root = options.against.removeprefix(GIT), options.scope.root
-    with checked_out(name, options.paths[0], root, report) as revision:
-        return _before(options, packages, revision, report) if revision else None
 
 
 def _compare(
@@ -272,7 +249,13 @@ def _before(
             scope, include=include, exclude=scope.exclude.seen_from(revision.folder, revision.top)
         )
     problems = Report()
-    old = _named_alike(inputs.packages(files, scope, problems), packages, files, scope, problems)
+    old = inputs.packages(files, scope, problems)
+    if len(old) == len(packages) == 1 and old[0].package != packages[0].package:
+        # two single packages get one name, unless both are named by a package.xml
+        folders = [package.folders[0] for package in (*old, *packages) if package.folders]
+        if not all(map(scope.root.manifest, folders)):
+            named = msgspec.structs.replace(scope, package=packages[0].package)
+            old = inputs.packages(files, named, problems)
     report.extend(problem for problem in problems if problem.code in codes.USAGE)
     if any(problem.code in codes.USAGE for problem in report):
         return None
@@ -310,23 +293,6 @@ def _side(
         line = first.span.source.position(first.span.start)[0] if first.span else 1
         error = f"the first error is {first.code} at {first.where[0]}:{line}: {first.message}"
     return Side({model.package: model for model in models}, frozenset(names - sound), error)
-
-
-def _named_alike(
-    old: Packages,
-    new: Packages,
-    files: tuple[InterfaceFile, ...],
-    scope: Scope,
-    report: Report,
-) -> Packages:
-    """Give two single packages one name, unless both are named by a package.xml."""
-    if len(old) != 1 or len(new) != 1 or old[0].package == new[0].package:
-        return old
-    if all(
-        scope.root.manifest(package.folders[0]) for package in (old[0], new[0]) if package.folders
-    ):
-        return old
-    return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
 
 def error_free_models(packages: Packages, scope: Scope, report: Report) -> dict[str, Model]:
@@ -386,12 +352,7 @@ class Baseline:
         comparable = version.startswith(GIT) or (bool(version) and is_folder(folder / version))
         self._folder = folder
         self.name = version if comparable else ""
-        self._options = BreakingOptions(
-            (),
-            self.name,
-            scope,
-            allowed=allowances(settings, ignored),
-        )
+        self._options = BreakingOptions((), self.name, scope, allowed=allowances(settings, ignored))
         self.commit: str | None = None
         self._side: Side | None = None
 
@@ -404,7 +365,13 @@ class Baseline:
             scope = self._options.scope
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = msgspec.structs.replace(self._options, paths=paths, scope=scope)
-            side = read_baseline(options, tuple(packages), report) if paths and self.name else None
+            side = None
+            if paths and self.name.startswith(GIT):
+                name = self.name.removeprefix(GIT)
+                with checked_out(name, paths[0], scope.root, report) as revision:
+                    side = revision and _before(options, packages, revision, report)
+            elif paths and self.name:
+                side = _before(options, packages, None, report)
             why = next((problem.message for problem in report.errors), "")
             self._side = side or Side({}, frozenset(), why)
         return self._side

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
@@ -13,7 +13,6 @@ from idlc.diagnostics.codes import Code
 from idlc.diagnostics.report import Diagnostic, Label
 from idlc.diagnostics.source import Span
 from idlc.model import ir
-from idlc.model.describe import individual
 
 Level: TypeAlias = Literal["wire", "hash", "source", "behaviour"]
 
@@ -71,15 +70,7 @@ def levels_of(changes: Iterable[Change]) -> str:
     return ", ".join(level for level in LEVELS if level in broken)
 
 
-class Named(Protocol):
-    """An element with a name."""
-
-    @property
-    def name(self) -> str:
-        """The name."""
-
-
-T = TypeVar("T", bound=Named)
+T = TypeVar("T", bound=ir.Field | ir.Constant)
 
 
 class Pairing(msgspec.Struct, Generic[T], frozen=True):
@@ -105,20 +96,9 @@ def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -
     kept = [(element, new[places[element.name]]) for element in common]
     moved = frozenset(element.name for element in common if places[element.name] not in steady)
     renamed = list(_renamed(old, new, moved, content))
-    renamed_from = {id(element) for element, _ in renamed}
-    renamed_to = {id(element) for _, element in renamed}
-    names = {element.name for element in common}
-    return Pairing(
-        kept,
-        renamed,
-        moved,
-        [
-            element
-            for element in old
-            if element.name not in names and id(element) not in renamed_from
-        ],
-        [element for element in new if element.name not in names and id(element) not in renamed_to],
-    )
+    paired = {id(element) for both in (*kept, *renamed) for element in both}
+    removed, added = ([each for each in side if id(each) not in paired] for side in (old, new))
+    return Pairing(kept, renamed, moved, removed, added)
 
 
 def _longest_increasing(numbers: Sequence[int]) -> list[int]:
@@ -143,7 +123,9 @@ def _renamed(
     old: Sequence[T], new: Sequence[T], moved: frozenset[str], content: Callable[[T], Hashable]
 ) -> Iterator[tuple[T, T]]:
     """Yield the pairs of like elements in each gap between elements that kept name and order."""
-    for removed, added in _gaps(old, new, moved):
+    common = {element.name for element in old} & {element.name for element in new}
+    gaps = zip(_split(old, common, moved), _split(new, common, moved), strict=True)
+    for removed, added in gaps:
         candidates: dict[Hashable, deque[int]] = {}
         for at, other in enumerate(added):
             candidates.setdefault(content(other), deque()).append(at)
@@ -157,13 +139,6 @@ def _renamed(
                 yield element, added[like[0]]
 
 
-def _gaps(
-    old: Sequence[T], new: Sequence[T], moved: frozenset[str]
-) -> Iterator[tuple[list[T], list[T]]]:
-    common = {element.name for element in old} & {element.name for element in new}
-    return zip(_split(old, common, moved), _split(new, common, moved), strict=True)
-
-
 def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> Iterator[list[T]]:
     """Yield the runs of names without a counterpart between the steady ones."""
     gap: list[T] = []
@@ -174,12 +149,6 @@ def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> It
             yield gap
             gap = []
     yield gap
-
-
-def describe_type(field: ir.Field) -> object:
-    """Return a field's type as it enters the type hash."""
-    message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
-    return individual(message)["fields"][0]["type"]
 
 
 def without_bound(element: ir.Element) -> ir.Element:

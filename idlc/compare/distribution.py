@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 
 from idlc.check.compiler import Compiler, compile_package, library_for, stage
 from idlc.compare.packages import Comparison, combine, compare
@@ -48,13 +49,9 @@ def compare_with_distro(
     with stage("compare", against):
         standard = (package.names for package in packages if package not in own)
         used = set[ir.TypeName]().union(*map(_used, after), *standard)
-        comparisons = [compare(old, new) for old, new in zip(before, after, strict=True)]
-        return combine(
-            [
-                *comparisons,
-                *_of_packages(used if packages else _all(library, other), library, other_library),
-            ]
-        )
+        names = used if packages else _all(library, other)
+        of_packages = _of_packages(names, library, other_library)
+        return combine([*map(compare, before, after), *of_packages])
 
 
 class _LayeredLibrary(Library):
@@ -74,12 +71,7 @@ class _LayeredLibrary(Library):
     ) -> None:
         own = {package.package: package.folders for package in packages}
         super().__init__(
-            scope.include,
-            scope.root,
-            Report(),
-            own=own,
-            exclude=scope.exclude,
-            distro=scope.distro,
+            scope.include, scope.root, Report(), own=own, exclude=scope.exclude, distro=scope.distro
         )
         self.other = other
         self._other_first = other_first
@@ -121,16 +113,10 @@ def _of_packages(
     names: Iterable[ir.TypeName], library: Library, other_library: _LayeredLibrary
 ) -> Iterator[Comparison]:
     """Yield the differences in standard interfaces, package by package."""
-    by_package: dict[str, list[ir.TypeName]] = {}
-    for name in sorted(names):
-        by_package.setdefault(name.package, []).append(name)
-    for package, mine in by_package.items():
-        texts = (
-            (name, catalog.source(name, other_library.other), library.source(name)) for name in mine
-        )
-        both = list(texts)
-        old = [(name, source) for name, source, _ in both if source]
-        new = [(name, source) for name, _, source in both if source]
+    for package, group in groupby(sorted(names), lambda name: name.package):
+        mine, other = list(group), other_library.other
+        old = [(name, source) for name in mine if (source := catalog.source(name, other))]
+        new = [(name, source) for name in mine if (source := library.source(name))]
         comparison = compare(
             compile_package(package, old, other_library, Report()).only(mine),
             compile_package(package, new, library, Report()).only(mine),

@@ -7,10 +7,10 @@ from collections.abc import Hashable, Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.compare.changes import (
+    LEVELS,
     Change,
     Level,
     Pairing,
-    describe_type,
     native,
     pair,
     tighter,
@@ -19,6 +19,7 @@ from idlc.compare.changes import (
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Span
 from idlc.model import ir
+from idlc.model.describe import type_dict
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.wire.compatible import reads_alike, type_reads_alike
@@ -47,6 +48,12 @@ class Sides(NamedTuple):
         return Change(code, subject, message, frozenset(levels), span, old, path, **facts)
 
     @property
+    def hashes(self) -> tuple[str, str]:
+        """The type hashes of the structure."""
+        name = str(self.new.name)
+        return self.before.describer.hash(name), self.after.describer.hash(name)
+
+    @property
     def top(self) -> Span | None:
         """The beginning of the new version, for what it no longer has."""
         return Span(self.new.source, 0, 0) if self.new.source else None
@@ -57,74 +64,54 @@ def field_changes(sides: Sides) -> Iterator[Change]:
 
     The level `wire` is decided for the structure as a whole: two changes can cancel each other.
     """
-    changes = list(_changes(sides))
     broken = not reads_alike(sides.old, sides.new, sides.before.messages, sides.after.messages)
-    if not broken:
-        changes = [change.without("wire") for change in changes]
-    elif not any("wire" in change.levels for change in changes):
-        changes = [
-            change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
-            for change in changes
-        ]
-    if any("hash" in change.levels for change in changes) and _same_hash(sides):
+    changes = with_wire(list(_changes(sides)), broken)
+    if any("hash" in change.levels for change in changes) and len({*sides.hashes}) == 1:
         changes = [change.without("hash") for change in changes]
     yield from (change for change in changes if change.levels)
 
 
-def _same_hash(sides: Sides) -> bool:
-    name = str(sides.new.name)
-    return sides.before.describer.hash(name) == sides.after.describer.hash(name)
+def with_wire(changes: list[Change], misread: bool) -> list[Change]:
+    """Return changes with the level `wire` if and only if somebody misreads the bytes."""
+    if not misread:
+        return [change.without("wire") for change in changes]
+    if any("wire" in change.levels for change in changes):
+        return changes
+    return [
+        change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
+        for change in changes
+    ]
 
 
 def _changes(sides: Sides) -> Iterator[Change]:
     pairing = pair(sides.old.fields, sides.new.fields, lambda field: field.type)
     yield from _removed(sides, pairing)
     for old, new in pairing.renamed:
-        yield sides.change(
-            codes.FIELD_RENAMED,
-            old,
-            f"field `{old.name}` is called `{new.name}` now",
-            ("hash", "source"),
-            new.name_span,
-            old.name_span,
-        )
+        message = f"field `{old.name}` is called `{new.name}` now"
+        spans = new.name_span, old.name_span
+        yield sides.change(codes.FIELD_RENAMED, old, message, ("hash", "source"), *spans)
     yield from _added(sides, pairing)
     for old, new in pairing.kept:
         if new.name in pairing.moved:
-            yield sides.change(
-                codes.FIELD_MOVED,
-                new,
-                f"field `{new.name}` was moved",
-                ("wire", "hash", "source"),
-                new.name_span,
-                old.name_span,
-                hint="put it back; the order of the fields is the order of the bytes",
-            )
+            message = f"field `{new.name}` was moved"
+            hint = "put it back; the order of the fields is the order of the bytes"
+            spans = new.name_span, old.name_span
+            yield sides.change(codes.FIELD_MOVED, new, message, LEVELS[:3], *spans, hint=hint)
     # the first such field stands for the structure
     first = next((field for field in sides.new.fields if field.optional), None)
     if first is not None and not any(field.optional for field in sides.old.fields):
-        yield sides.change(
-            codes.OPTIONAL_ADDED,
-            first,
-            f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file",
-            ("source",),
-            first.name_span,
-            hint="leave it out; it has no effect",
-        )
+        message = f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file"
+        hint, span = "leave it out; it has no effect", first.name_span
+        yield sides.change(codes.OPTIONAL_ADDED, first, message, ("source",), span, hint=hint)
     for old, new in (*pairing.kept, *pairing.renamed):
         yield from _type_changes(sides, old, new)
         if _default(old) != _default(new):
             yield _default_changed(sides, old, new)
         if old.unit and new.unit and old.unit != new.unit:
-            yield sides.change(
-                codes.UNIT_CHANGED,
-                new,
-                f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now",
-                ("behaviour",),
-                new.name_span,
-                old.name_span,
-                hint="give the field another name, so that nobody uses the old unit by mistake",
-            )
+            message = f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now"
+            hint = "give the field another name, so that nobody uses the old unit by mistake"
+            spans = new.name_span, old.name_span
+            yield sides.change(codes.UNIT_CHANGED, new, message, ("behaviour",), *spans, hint=hint)
 
 
 def _places(fields: Iterable[ir.Field]) -> dict[str, int]:
@@ -135,36 +122,28 @@ def _removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.old.fields)
     last = max((places[old.name] for old, _ in (*pairing.kept, *pairing.renamed)), default=-1)
     kept = [places[old.name] for old, _ in pairing.kept]
+    hint = "keep it and say in its comment that it is no longer used"
     for field in pairing.removed:
         place = places[field.name]
         following = bisect_right(kept, place)
         beside = [new for _, new in pairing.kept[following : following + 1]]
         spans = [new.type_span for new in (*beside, *sides.new.fields[-1:])]
-        yield sides.change(
-            codes.FIELD_REMOVED,
-            field,
-            f"field `{field.name}` was removed",
-            # no field that stayed comes after it
-            ("hash", "source") if last < place else ("hash", "source", "wire"),
-            (spans[0] if spans else None) or sides.top,
-            field.name_span,
-            hint="keep it and say in its comment that it is no longer used",
-        )
+        # where no field that stayed comes after it, the others are read right
+        levels: set[Level] = {"hash", "source"} if last < place else {*LEVELS[:3]}
+        message, at = f"field `{field.name}` was removed", next(iter(spans), None) or sides.top
+        own = field.name_span
+        yield sides.change(codes.FIELD_REMOVED, field, message, levels, at, own, hint=hint)
 
 
 def _added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.new.fields)
     last = max((places[new.name] for _, new in (*pairing.kept, *pairing.renamed)), default=-1)
+    hint = "add a new message instead, if old and new programs must understand each other"
     for field in pairing.added:
-        yield sides.change(
-            codes.FIELD_ADDED,
-            field,
-            f"field `{field.name}` was added",
-            # positional arguments and patterns refer to other fields if it is not the last
-            ("wire", "hash") if last < places[field.name] else ("wire", "hash", "source"),
-            field.name_span,
-            hint="add a new message instead, if old and new programs must understand each other",
-        )
+        # positional arguments and patterns refer to other fields if it is not the last
+        levels: set[Level] = {"wire", "hash"} if last < places[field.name] else {*LEVELS[:3]}
+        message, span = f"field `{field.name}` was added", field.name_span
+        yield sides.change(codes.FIELD_ADDED, field, message, levels, span, hint=hint)
 
 
 def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change]:
@@ -180,28 +159,21 @@ def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change
         target = str(after.target)
         if sides.before.describer.hash(target) != sides.after.describer.hash(target):
             levels.add("hash")
-        message = f"`{target}`, the type of field `{new.name}`, changed"
         if levels:
-            code = codes.USED_TYPE_CHANGED
-            yield sides.change(code, new, message, levels, new.type_span, cause=target)
+            message, span = f"`{target}`, the type of field `{new.name}`, changed", new.type_span
+            yield sides.change(codes.USED_TYPE_CHANGED, new, message, levels, span, cause=target)
         return
-    if describe_type(old) != describe_type(new):
+    if type_dict(old.type) != type_dict(new.type):
         levels.add("hash")
     if native(old.type) != native(new.type):
         levels.add("source")
     if tighter(before, after):
         levels.add("behaviour")
     only_bounds = type(old.type) is type(new.type) and without_bound(before) == without_bound(after)
-    package = sides.new.name.package
-    yield sides.change(
-        codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED,
-        new,
-        f"field `{new.name}` was `{spell(old.type, package)}` "
-        f"and is `{spell(new.type, package)}` now",
-        levels,
-        new.type_span,
-        old.type_span,
-    )
+    code = codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED
+    was, now = (spell(field.type, sides.new.name.package) for field in (old, new))
+    message = f"field `{new.name}` was `{was}` and is `{now}` now"
+    yield sides.change(code, new, message, levels, new.type_span, old.type_span)
 
 
 def _default(field: ir.Field) -> str | None:
@@ -227,46 +199,28 @@ def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
 def constant_changes(sides: Sides) -> Iterator[Change]:
     """Yield the changes of the constants; their order has no meaning."""
     pairing = pair(sides.old.constants, sides.new.constants, _content)
+    source: tuple[Level] = ("source",)
     for constant in pairing.removed:
-        yield sides.change(
-            codes.CONSTANT_REMOVED,
-            constant,
-            f"constant `{constant.name}` was removed",
-            ("source",),
-            sides.top,
-            constant.name_span,
-        )
+        message = f"constant `{constant.name}` was removed"
+        spans = sides.top, constant.name_span
+        yield sides.change(codes.CONSTANT_REMOVED, constant, message, source, *spans)
     for old, new in pairing.renamed:
-        yield sides.change(
-            codes.CONSTANT_RENAMED,
-            old,
-            f"constant `{old.name}` is called `{new.name}` now",
-            ("source",),
-            new.name_span,
-            old.name_span,
-            hint=f"keep `{old.name}` beside it, with the same value",
-        )
+        message = f"constant `{old.name}` is called `{new.name}` now"
+        hint = f"keep `{old.name}` beside it, with the same value"
+        spans = new.name_span, old.name_span
+        yield sides.change(codes.CONSTANT_RENAMED, old, message, source, *spans, hint=hint)
     for old, new in pairing.kept:
         if native(old.type) != native(new.type):
-            yield sides.change(
-                codes.CONSTANT_TYPE_CHANGED,
-                new,
-                f"constant `{new.name}` was `{spell(old.type)}` and is `{spell(new.type)}` now",
-                ("source",),
-                new.name_span,
-                old.name_span,
-            )
+            was, now = spell(old.type), spell(new.type)
+            message = f"constant `{new.name}` was `{was}` and is `{now}` now"
+            spans = new.name_span, old.name_span
+            yield sides.change(codes.CONSTANT_TYPE_CHANGED, new, message, source, *spans)
         if repr(old.value) != repr(new.value):
             was, now = spell_value(old.value), spell_value(new.value)
-            yield sides.change(
-                codes.CONSTANT_VALUE_CHANGED,
-                new,
-                f"constant `{new.name}` was {was} and is {now} now",
-                ("behaviour",),
-                new.value_span,
-                old.value_span,
-                hint="both values are in use as long as not everything is rebuilt",
-            )
+            message = f"constant `{new.name}` was {was} and is {now} now"
+            hint = "both values are in use as long as not everything is rebuilt"
+            spans, code = (new.value_span, old.value_span), codes.CONSTANT_VALUE_CHANGED
+            yield sides.change(code, new, message, ("behaviour",), *spans, hint=hint)
 
 
 def added(sides: Sides) -> Iterator[str]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 from idlc.compare.changes import Change, Level
-from idlc.compare.fields import Sides, constant_changes, field_changes
+from idlc.compare.fields import Sides, constant_changes, field_changes, with_wire
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.text import one_line
@@ -82,6 +82,11 @@ class Version(NamedTuple):
     local: LocalType | None = None
 
     @property
+    def key(self) -> tuple[str, str]:
+        """The type and its hash."""
+        return self.type, self.hash
+
+    @property
     def label(self) -> str:
         """Its users, for a sentence."""
         nodes = sorted({endpoint.label for endpoint in self.endpoints})
@@ -124,11 +129,9 @@ def several_versions(
             for hash_, users in hashes.items()
         ]
         if len(versions) > 1:
-            yield tuple(sorted(versions, key=_rank))
-
-
-def _rank(version: Version) -> tuple[bool, int, str]:
-    return version.local is not None, len(version.endpoints), version.hash
+            yield tuple(
+                sorted(versions, key=lambda v: (v.local is not None, len(v.endpoints), v.hash))
+            )
 
 
 def interface_of(name: str) -> str:
@@ -198,7 +201,12 @@ def version_changes(
     structures = sorted({str(difference.new.name) for difference, *_ in sides})
     pairs = [(a, b) for a in versions for b in versions if a is not b and a.sends and b.reads]
     lines = [line for version in versions for line in _version(version, models, problems)]
-    lines += _effects(pairs, models)
+    # the effect of each sent version on the readers of another one
+    for sender, reader in pairs:
+        effect = "misread" if _misreads(sender, reader, models) else "read right"
+        if not {sender.key, reader.key} <= models.keys():
+            effect = "may be misread"
+        lines.append(f"{sender.label} → {reader.label}: {effect}, or not delivered")
     if structures and structures != [last.type]:
         lines.append(f"what differs is in {', '.join(f'`{name}`' for name in structures)}")
     misread = any(_misreads(a, b, models) for a, b in pairs)
@@ -213,8 +221,14 @@ def version_changes(
         hint="build everything that uses it from one version, and start it again",
         detail="\n".join(lines),
     )
-    for difference in sides:
-        yield from _reported_once(*difference, models, seen)
+    for difference, old, new in sides:
+        key = (str(difference.new.name), *difference.hashes)
+        if key not in seen:
+            seen.add(key)
+            met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
+            misread = any(_misreads(a, b, models) for a, b in met or [(old, new)])
+            for change in with_wire(_changes(difference), misread):
+                yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
 
 
 def _version(
@@ -223,29 +237,15 @@ def _version(
     where = f", that of {version.local.label}" if version.local else ""
     yield f"{version.hash}{where}:"
     yield from activities(version.endpoints) if version.endpoints else ["  no node"]
-    key = (version.type, version.hash)
-    if key not in models:
-        yield f"  only its hash is known: {problems.get(key, 'nobody was asked')}"
-
-
-def _effects(pairs: Iterable[tuple[Version, Version]], models: Models) -> Iterator[str]:
-    """Yield the effect of each sent version on the readers of another one."""
-    for sender, reader in pairs:
-        if any((version.type, version.hash) not in models for version in (sender, reader)):
-            effect = "may be misread, or not delivered"
-        elif _misreads(sender, reader, models):
-            effect = "misread, or not delivered"
-        else:
-            effect = "read right, or not delivered"
-        yield f"{sender.label} → {reader.label}: {effect}"
+    if version.key not in models:
+        yield f"  only its hash is known: {problems.get(version.key, 'nobody was asked')}"
 
 
 def _misreads(sender: Version, reader: Version, models: Models) -> bool:
     """Return whether `reader` certainly misreads the bytes of `sender`."""
-    keys = [(version.type, version.hash) for version in (sender, reader)]
-    if any(key not in models for key in keys):
+    if not {sender.key, reader.key} <= models.keys():
         return False
-    before, after = (models[key].messages for key in keys)
+    before, after = models[sender.key].messages, models[reader.key].messages
     name = ir.TypeName.parse(sender.type)
     return not reads_alike(before[name], after[name], before, after)
 
@@ -259,48 +259,21 @@ def _all_sides(
     """
     backwards = not (left.sends and right.reads) and right.sends and left.reads
     old, new = (right, left) if backwards else (left, right)
-    keys = [(old.type, old.hash), (new.type, new.hash)]
-    if any(key not in models for key in keys):
+    if not {old.key, new.key} <= models.keys():
         return
-    before, after = (models[key] for key in keys)
+    before, after = models[old.key], models[new.key]
     name = ir.TypeName.parse(old.type)
     for shared in sorted(_with_nested(name, before) & _with_nested(name, after)):
         if before.describer.hash(str(shared)) != after.describer.hash(str(shared)):
             sides = Sides(before.messages[shared], after.messages[shared], before, after)
-            if any(_changes(sides)):
+            if _changes(sides):
                 yield sides, old, new
 
 
-def _reported_once(
-    sides: Sides, old: Version, new: Version, models: Models, seen: Reported
-) -> Iterator[Change]:
-    name = str(sides.new.name)
-    key = (name, sides.before.describer.hash(name), sides.after.describer.hash(name))
-    if key not in seen:
-        seen.add(key)
-        met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
-        misread = any(_misreads(a, b, models) for a, b in met or [(old, new)])
-        for change in _with_wire(list(_changes(sides)), misread):
-            yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
-
-
-def _changes(sides: Sides) -> Iterator[Change]:
-    """Yield the changes of a structure, without those of nested types, which have their own."""
-    for change in (*field_changes(sides), *constant_changes(sides)):
-        if change.code is not codes.USED_TYPE_CHANGED:
-            yield change
-
-
-def _with_wire(changes: Sequence[Change], misread: bool) -> Iterator[Change]:
-    """Yield changes with the level `wire` if and only if somebody misreads the bytes."""
-    has_wire = any("wire" in change.levels for change in changes)
-    for change in changes:
-        if not misread:
-            yield change.without("wire")
-        elif not has_wire and "hash" in change.levels:
-            yield change._replace(levels=change.levels | {"wire"})
-        else:
-            yield change
+def _changes(sides: Sides) -> list[Change]:
+    """Return the changes of a structure, without those of nested types, which have their own."""
+    changes = (*field_changes(sides), *constant_changes(sides))
+    return [change for change in changes if change.code is not codes.USED_TYPE_CHANGED]
 
 
 def _with_nested(name: ir.TypeName, model: Model) -> set[ir.TypeName]:

@@ -81,10 +81,8 @@ def compare(before: Model, after: Model) -> Comparison:
 
 def _differ(old: ir.Interface, new: ir.Interface) -> bool:
     """Return whether two versions of an interface differ, ignoring line ends."""
-    texts = [
-        interface.source.text.splitlines() if interface.source else None for interface in (old, new)
-    ]
-    return texts[0] != texts[1] or meaning(old) != meaning(new)
+    before, after = (each.source and each.source.text.splitlines() for each in (old, new))
+    return before != after or meaning(old) != meaning(new)
 
 
 def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
@@ -93,7 +91,8 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
     paths = {str(own.name): ir.path_of(own) for own in after.own}
     for name in sorted(recorded):
         kind = name.split("/")[1]
-        if kind != "msg" and any(own in recorded for own in _shorter(name)):
+        shorter = (name[:at] for at, character in enumerate(name) if character == "_")
+        if kind != "msg" and any(own in recorded for own in shorter):
             continue  # follows from the interface that it is derived from
         if name not in paths:
             levels = frozenset[Level](LEVELS[:3])
@@ -107,11 +106,6 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
             changes.append(change)
     come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)
     return Comparison(tuple(changes), come, bool(changes or come))
-
-
-def _shorter(name: str) -> Iterator[str]:
-    """Yield the part before each underscore of a name."""
-    return (name[:at] for at, character in enumerate(name) if character == "_")
 
 
 def _noun(kind: str) -> str:

@@ -14,7 +14,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import list_files, no_interfaces
+from idlc.project.find import find
 from idlc.recordings.types import NAMED, LocalTypes, recorded_types, topics_of, versions
 
 
@@ -40,12 +40,9 @@ def compare_with_recordings(
     The interfaces of PATHs are compared, or without PATHs the ones of this machine. Without levels,
     only changes that affect readers are reported.
     """
-    listing = list_files(options.paths, options.scope.root, report, options.scope.exclude)
-    report.extend(
-        no_interfaces(path, options.scope.root, options.scope.exclude) for path in listing.empty
-    )
+    files = find(options.paths, options.scope.root, report, options.scope.exclude)
     problems = Report()
-    packages = inputs.packages(listing.files, options.scope, problems)
+    packages = inputs.packages(files, options.scope, problems)
     report.extend(problems)
     topics = topics_of(recordings, (), options.scope.root, report)
     if topics is None or report.had_errors:
@@ -65,7 +62,9 @@ def compare_with_recordings(
                 **{(change.subject, change.message): change for change in new_ones},
                 **changes,
             }
-    local.note_unknown(report)
+    if local.unknown:
+        names = first_few((f"`{name}`" for name in sorted(local.unknown)), NAMED)
+        report.notes.append(f"not known here, so not compared: {names}")
     if packages and not seen:
         report.notes.append("none of these interfaces was recorded")
     counts = {"interface": len(seen), "recording": len(recordings)}
@@ -84,7 +83,8 @@ class _LocalVersions:
         self._root = options.scope.root
         self._packages = {package.package: package for package in packages}
         self._models = error_free_models(packages, options.scope, report)
-        self._unknown: set[ir.TypeName] = set()
+        #: Interfaces that could not be compared.
+        self.unknown: set[ir.TypeName] = set()
 
     def pairs(
         self, models: Iterable[Model], recorded: Container[ir.TypeName]
@@ -94,7 +94,7 @@ class _LocalVersions:
             old = model.only(recorded)
             if not self._packages:
                 new = self.types.model(model.package, _names(old))
-                self._unknown |= _names(old) - _names(new)
+                self.unknown |= _names(old) - _names(new)
             elif model.package in self._packages:
                 new = self._models[model.package]
                 if self._packages[model.package].is_whole(self._root):
@@ -114,12 +114,6 @@ class _LocalVersions:
             else change
             for change in changes
         ]
-
-    def note_unknown(self, report: Report) -> None:
-        """Add a note to the report about interfaces that could not be compared."""
-        if self._unknown:
-            names = first_few((f"`{name}`" for name in sorted(self._unknown)), NAMED)
-            report.notes.append(f"not known here, so not compared: {names}")
 
 
 def _names(model: Model) -> set[ir.TypeName]:

@@ -44,7 +44,7 @@ from idlc.project.settings import Scope
 from idlc.wire.layout import oversized
 
 if TYPE_CHECKING:
-    from idlc.model.describe import DescriptionDict, IndividualDict
+    from idlc.model.describe import DescriptionDict
 
 #: A graph that never comes to rest is watched for this many times the patience.
 RESTLESS = 10
@@ -94,9 +94,7 @@ def join_graph(report: Report) -> Iterator[Graph | None]:
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
-            parameter_overrides=[
-                rclpy.Parameter("start_type_description_service", value=False),
-            ],
+            parameter_overrides=[rclpy.Parameter("start_type_description_service", value=False)],
         )
     except ImportError as error:
         hint = "source your ROS 2 and use its Python, or pip install ros-jazzy-rclpy"
@@ -150,9 +148,8 @@ class Graph:
         owner, is_action, _ = name.partition(_ACTION)
         for role, sends in zip(roles, (True, False), strict=True):
             for node, type_, hash_ in self._ends(topic, sends, no_mangle=entity == "service"):
-                yield Endpoint(
-                    node, "action" if is_action else entity, owner, role, sends, type_, hash_
-                )
+                kind: Entity = "action" if is_action else entity
+                yield Endpoint(node, kind, owner, role, sends, type_, hash_)
 
     def _ends(self, topic: str, sends: bool, *, no_mangle: bool) -> Iterator[tuple[str, str, str]]:
         """Yield node, type and hash of each end of a topic, except idlc's own."""
@@ -178,50 +175,37 @@ class Graph:
             return dict.fromkeys(questions, Answer(None, problem))
         nodes = dict.fromkeys(question.node for question in questions)
         clients = {node: self._client(service, node) for node in nodes}
+        futures: dict[Question, Any] = {}
         try:
-            futures = self._answers(service, clients, questions, patience)
+            executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
+            executor.add_node(self._node)
+            end = time.monotonic() + patience
+            while time.monotonic() < end:
+                for question in questions:
+                    client = clients[question.node]
+                    if question not in futures and client is not None and client.service_is_ready():
+                        _, name, hash_ = question
+                        request = service.Request(
+                            type_name=name, type_hash=hash_, include_type_sources=True
+                        )
+                        futures[question] = client.call_async(request)
+                if len(futures) == len(questions) and all(each.done() for each in futures.values()):
+                    break
+                executor.spin_once(timeout_sec=_PAUSE)
+            executor.remove_node(self._node)
+            executor.shutdown()
+            results = {question: each.result() for question, each in futures.items() if each.done()}
         finally:
             for client in filter(None, clients.values()):
                 self._node.destroy_client(client)
-        offered = {name for name, _ in self._node.get_service_names_and_types()}
-        return {
-            question: _answer(
-                futures.get(question), f"{question.node}/get_type_description" in offered
-            )
-            for question in questions
-        }
+        names = {name for name, _ in self._node.get_service_names_and_types()}
+        offered = {node for node in nodes if f"{node}/get_type_description" in names}
+        return {each: _answer(results.get(each), each.node in offered) for each in questions}
 
     def _client(self, service: Any, node: str) -> Any:
         with suppress(Exception):  # a name that no rclpy gives itself
             return self._node.create_client(service, f"{node}/get_type_description")
         return None
-
-    def _answers(
-        self,
-        service: Any,
-        clients: Mapping[str, Any],
-        questions: Sequence[Question],
-        patience: float,
-    ) -> dict[Question, Any]:
-        """Return the results of the questions that were answered in time."""
-        executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
-        executor.add_node(self._node)
-        futures: dict[Question, Any] = {}
-        end = time.monotonic() + patience
-        while time.monotonic() < end:
-            for question in questions:
-                client = clients[question.node]
-                if question not in futures and client is not None and client.service_is_ready():
-                    request = service.Request(
-                        type_name=question.type, type_hash=question.hash, include_type_sources=True
-                    )
-                    futures[question] = client.call_async(request)
-            if len(futures) == len(questions) and all(future.done() for future in futures.values()):
-                break
-            executor.spin_once(timeout_sec=_PAUSE)
-        executor.remove_node(self._node)
-        executor.shutdown()
-        return {question: future.result() for question, future in futures.items() if future.done()}
 
 
 def _answer(result: Any, is_offered: bool) -> Answer:
@@ -231,39 +215,21 @@ def _answer(result: Any, is_offered: bool) -> Answer:
         return Answer(None, "does not answer")
     if not result.successful:
         return Answer(None, f"says: {one_line(result.failure_reason)}")
-    description = result.type_description
-    return Answer(
-        {
-            "type_description": _individual(description.type_description),
-            "referenced_type_descriptions": [
-                _individual(referenced) for referenced in description.referenced_type_descriptions
-            ],
-        },
-        sources={
-            source.type_name: source.raw_file_contents
-            for source in result.type_sources
-            if source.encoding == "msg"
-        },
-    )
-
-
-def _individual(description: Any) -> IndividualDict:
-    return {
-        "type_name": description.type_name,
-        "fields": [
-            {
-                "name": field.name,
-                "type": {
-                    "type_id": field.type.type_id,
-                    "capacity": field.type.capacity,
-                    "string_capacity": field.type.string_capacity,
-                    "nested_type_name": field.type.nested_type_name,
-                },
-                "default_value": field.default_value,
-            }
-            for field in description.fields
-        ],
+    sources = {
+        source.type_name: source.raw_file_contents
+        for source in result.type_sources
+        if source.encoding == "msg"
     }
+    return Answer(_plain(result.type_description), sources=sources)
+
+
+def _plain(value: Any) -> Any:
+    """Return a message as dictionaries by field."""
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    if not hasattr(value, "get_fields_and_field_types"):
+        return value
+    return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
 
 
 #: A structure's full name and type hash.
@@ -297,7 +263,12 @@ def compare_with_graph(
 
     `patience`: seconds without a change; without files, the installed types are compared.
     """
-    local_models = _local_models(options, report, has_paths=has_paths)
+    scope = options.scope
+    listing = list_files(options.paths, scope.root, report, scope.exclude)
+    if has_paths:
+        report.extend(no_interfaces(path, scope.root, scope.exclude) for path in listing.empty)
+    packages = inputs.packages(listing.files, scope, report)
+    local_models = error_free_models(packages, scope, report).values()
     if report.had_errors:
         return None
     with join_graph(report) as graph:
@@ -310,7 +281,7 @@ def compare_with_graph(
             message = f"no node was found within {patience:g} seconds"
             report.extend([codes.EMPTY_GRAPH.of("graph", message, hint=hint)] if graph else [])
             return None
-        models, local = _local_versions(local_models, endpoints, options.scope)
+        models, local = _local_versions(local_models, endpoints, scope)
         versions = list(several_versions(endpoints, local))
         questions = dict(_questions(versions, endpoints, models))
         answers = graph.ask(chain.from_iterable(questions.values()), patience)
@@ -322,27 +293,11 @@ def compare_with_graph(
             changes += version_changes(several, models, problems, seen)
     judged = judge(changes, options, report)
     silent = sum(not endpoint.hash for endpoint in endpoints)
-    return GraphVerdict(
-        judged.levels, judged.allowed, _counts(endpoints), silent, endpoints, judged.hidden
-    )
-
-
-def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
-    nodes = {endpoint.node for endpoint in endpoints if endpoint.node}
-    entities = Counter(
-        entity for entity, _ in {(endpoint.entity, endpoint.name) for endpoint in endpoints}
-    )
-    return {"node": len(nodes)} | {entity: entities[entity] for entity in get_args(Entity)}
-
-
-def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) -> list[Model]:
-    """Return the models of the user's files, or of the files in the working folder."""
-    root, exclude = options.scope.root, options.scope.exclude
-    listing = list_files(options.paths, root, report, exclude)
-    if has_paths:
-        report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
-    packages = inputs.packages(listing.files, options.scope, report)
-    return [*error_free_models(packages, options.scope, report).values()]
+    named: set[tuple[str, str]] = {(endpoint.entity, endpoint.name) for endpoint in endpoints}
+    named |= {("node", endpoint.node) for endpoint in endpoints if endpoint.node}
+    numbers = Counter(kind for kind, _ in named)
+    counts = {kind: numbers[kind] for kind in ("node", *get_args(Entity))}
+    return GraphVerdict(judged.levels, judged.allowed, counts, silent, endpoints, judged.hidden)
 
 
 def _local_versions(
@@ -353,7 +308,7 @@ def _local_versions(
     local: dict[str, LocalType] = {}
     for model in local_models:
         local |= {name: LocalType(hash_, True) for name, hash_ in _add(model, models)}
-    for model in _installed({endpoint.structure for endpoint in endpoints}, scope):
+    for model in _installed((endpoint.structure for endpoint in endpoints), scope):
         for name, hash_ in _add(model, models):
             local.setdefault(name, LocalType(hash_, False))
     return models, local
@@ -401,13 +356,13 @@ def _questions(
         if endpoint.structure.endswith("_Event") and endpoint.hash:
             events.setdefault(endpoint.structure, []).append(endpoint)
     for version in chain.from_iterable(versions):
-        key, nodes = (version.type, version.hash), version.nodes
-        if key not in models:
-            questions = [Question(node, *key) for node in nodes[:ASKED]]
+        nodes = version.nodes
+        if version.key not in models:
+            questions = [Question(node, *version.key) for node in nodes[:ASKED]]
             if event := event_of(version.type):
                 ends = [end for end in events.get(event, ()) if end.node in nodes]
                 questions = [Question(end.node, event, end.hash) for end in ends]
-            yield key, questions
+            yield version.key, questions
 
 
 def _add_described(
@@ -426,10 +381,9 @@ def _add_described(
                     model = reported_model(description, sources, name, type_hash, node)
                     if any(oversized(model)):
                         raise DescriptionError("it is larger than anybody can use")
+                    list(_add(model, models))
                 except DescriptionError as error:
                     problem = f"is not believed: {error}"
-                else:
-                    list(_add(model, models))
             if problem:
                 problems.setdefault(key, []).append(f"`{node}` {problem}")
     return {

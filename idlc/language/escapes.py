@@ -34,16 +34,12 @@ def through_idl(text: str) -> str:
     """
     if "\\" not in text and "\n" not in text:
         return text
-    return read_back(_interpreted(text).replace('"', '\\"'), text)
-
-
-def _interpreted(text: str) -> str:
-    """Return the text with the escapes interpreted over its UTF-8 bytes (step B)."""
     data = text.encode()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # unknown escapes, which stay
         try:
-            return data.decode("unicode_escape")
+            interpreted = data.decode("unicode_escape")  # of UTF-8, byte by byte (step B)
+            return read_back(interpreted.replace('"', '\\"'), text)
         except UnicodeDecodeError as error:
             refused = re.compile(_REFUSED).match(data, error.start)
     assert refused is not None, text
@@ -66,7 +62,8 @@ def read_back(literal: str, text: str) -> str:
     except UnicodeError:
         place = _place(text, r"\\[xuUN0-7]|[^\x00-\x7f]")
         raise EscapeError("a character that they cannot write", *place) from None
-    if _end_of_literal(literal) != len(literal):
+    quote = re.search(_CLOSING_QUOTE, literal + '"')
+    if quote is None or quote.end() <= len(literal):
         raise EscapeError("a backslash that swallows the closing quote", *_place(text, r"\\+"))
     try:
         return inside_literal(literal)
@@ -98,11 +95,6 @@ def _reread(match: re.Match[str]) -> str:
     if len(hexadecimal) != 2:
         raise ValueError("one digit")
     return chr(int(hexadecimal, 16))
-
-
-def _end_of_literal(literal: str) -> int:
-    quote = re.search(_CLOSING_QUOTE, literal + '"')
-    return quote.end() - 1 if quote else -1
 
 
 def _place(text: str, pattern: str) -> tuple[int, int]:

@@ -97,12 +97,16 @@ class _Row:
 _Column: TypeAlias = "list[tuple[_Row, _Word]]"
 
 
-def lay_out(lines: Sequence[tree.Line]) -> list[str]:
-    """Return the texts of a section's lines, without trailing whitespace."""
+def _texts(section: tree.Section) -> list[str]:
+    """Return the texts of a section's lines, without trailing whitespace but at its head."""
+    # ROS 2 keeps trailing whitespace of the comment lines that head a section
+    heading = takewhile(lambda line: line.comment and not line.code, section.lines)
+    head = [line.comment for line in heading]
+    lines = section.lines[len(head) :]
     old = [(line.code + line.comment).rstrip() for line in lines]
     tabs = TAB_WIDTHS if any("\t" in line.code for line in lines) else TAB_WIDTHS[:1]
     layouts = [_laid_out(lines, old, tab) for tab in tabs]
-    return min(layouts, key=lambda new: sum(map(str.__ne__, old, new)))
+    return [*head, *min(layouts, key=lambda new: sum(map(str.__ne__, old, new)))]
 
 
 def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[str]:
@@ -120,7 +124,10 @@ def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[
             in_column = bool(word.gap) and not columns.isdisjoint(word.edges)
             word.keeps_column = word.is_wide or in_column
     for row in rows.values():
-        _balance(row)
+        # a space on both sides of `=` if there is one on either side
+        sign, value = row.find("sign"), row.find("value")
+        if sign is not None and value is not None and bool(sign.gap) != bool(value.gap):
+            row.change(value if sign.gap else sign, " ")
     for column in kinds:
         _place(column)
     return [rows[number].text if number in rows else text for number, text in enumerate(old)]
@@ -159,13 +166,6 @@ def _pieces(text: str) -> Iterator[tuple[str, tree.Piece]]:
         yield "default", body.default
 
 
-def _balance(row: _Row) -> None:
-    """Put a space on both sides of `=` if there is one on either side."""
-    sign, value = row.find("sign"), row.find("value")
-    if sign is not None and value is not None and bool(sign.gap) != bool(value.gap):
-        row.change(value if sign.gap else sign, " ")
-
-
 def _columns(words: _Column) -> set[_Edge]:
     """Return the edges that several words share, at least one of them after a wide gap."""
     placed = [word for _, word in words if word.gap]
@@ -182,25 +182,17 @@ def _place(words: _Column) -> None:
     for row, word in words:
         blocks[row.block].append((row, word))
     for block in blocks.values():
-        if _is_even(block):
-            continue
-        anchors = [(at, word.start) for at, (_, word) in enumerate(block) if _in(columns, word)]
+        gaps = {word.gap for row, word in block if not row.is_comment}
+        alone = len(block) == 1 and block[0][1].kind != "comment"
+        if len(gaps) == 1 and "" not in gaps and not alone:
+            continue  # they are the same; a single comment may be anywhere
+        starts = ((at, word.start) for at, (_, word) in enumerate(block))
+        anchors = [(at, start) for at, start in starts if ("start", start) in columns]
         for at, (row, word) in enumerate(block):
             is_loose = word.is_wide or (not word.gap and "" not in NARROW[word.kind])
             if is_loose and not row.is_comment and columns.isdisjoint(word.edges):
                 width = _nearest(anchors, at) - word.after
                 row.change(word, " " * width if width > 0 else usual)
-
-
-def _in(columns: set[_Edge], word: _Word) -> bool:
-    return ("start", word.start) in columns
-
-
-def _is_even(block: _Column) -> bool:
-    """Return whether the block's gaps are the same; a single comment may be anywhere."""
-    gaps = {word.gap for row, word in block if not row.is_comment}
-    alone = len(block) == 1 and block[0][1].kind != "comment"
-    return len(gaps) == 1 and "" not in gaps and not alone
 
 
 def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
@@ -229,7 +221,11 @@ def format_file(file: tree.File) -> str:
 
     A file that differs only in trailing whitespace, of lines and of the file, is in order.
     """
-    newline = _newline(file)
+    ends = (line.newline for section in file.sections for line in section.lines)
+    # the first usual line end, which all lines get
+    newline = next((end for end in ends if end in ("\n", "\r\n")), "\n")
+    if file.separators and file.source.text.startswith("---\r\n", file.separators[0]):
+        newline = "\r\n"
     out: list[str] = []
     for number, section in enumerate(file.sections):
         if number:
@@ -238,30 +234,8 @@ def format_file(file: tree.File) -> str:
     while out and not out[-1]:
         del out[-1]
     text = "".join(line + newline for line in out)
-    return file.source.text if _look_alike(text, file.source.text) else text
-
-
-def _look_alike(left: str, right: str) -> bool:
-    return _INVISIBLE.sub("", left).rstrip() == _INVISIBLE.sub("", right).rstrip()
-
-
-def _newline(file: tree.File) -> str:
-    """Return the file's first usual line end, which all lines get."""
-    ends = (line.newline for section in file.sections for line in section.lines)
-    usual = next((end for end in ends if end in ("\n", "\r\n")), "\n")
-    if file.separators and file.source.text.startswith("---\r\n", file.separators[0]):
-        return "\r\n"
-    return usual
-
-
-def _texts(section: tree.Section) -> list[str]:
-    # ROS 2 keeps trailing whitespace of the comment lines that head a section
-    head = [line.comment for line in takewhile(_is_comment_line, section.lines)]
-    return [*head, *lay_out(section.lines[len(head) :])]
-
-
-def _is_comment_line(line: tree.Line) -> bool:
-    return bool(line.comment) and not line.code
+    bare, own = (_INVISIBLE.sub("", words).rstrip() for words in (text, file.source.text))
+    return file.source.text if bare == own else text
 
 
 def _trimmed(texts: Iterable[str], *, first: bool) -> Iterator[str]:

@@ -128,7 +128,11 @@ def _fault(text: str, type_: str) -> tree.Fault:
         hint = "write `TYPE name`; a comment begins with `#`"
     else:
         code, message = codes.MALFORMED_TYPE, f"malformed type `{type_}`"
-        hint = _type_hint(type_)
+        hint = "write `T`, `T[]`, `T[3]`, `T[<=3]`, `string<=10` or `package/Name`"
+        if type_.count("[") > 1:
+            hint = "arrays do not nest; put the inner array into a message of its own"
+        elif "<" in type_ and "<=" not in type_:
+            hint = "an upper bound is written `<=`, as in `string<=10` or `int32[<=10]`"
         start = _error(text, end - 1)
     return tree.Fault(code, message, start, end, hint)
 
@@ -150,11 +154,3 @@ def lark() -> Lark:
     from lark import Lark
 
     return Lark(grammar(), parser="lalr", start=["file", "definition", "literal"])
-
-
-def _type_hint(type_: str) -> str:
-    if type_.count("[") > 1:
-        return "arrays do not nest; put the inner array into a message of its own"
-    if "<" in type_ and "<=" not in type_:
-        return "an upper bound is written `<=`, as in `string<=10` or `int32[<=10]`"
-    return "write `T`, `T[]`, `T[3]`, `T[<=3]`, `string<=10` or `package/Name`"

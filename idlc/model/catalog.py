@@ -128,15 +128,11 @@ def _sections(key: str, of: Distro) -> list[dict[str, list[list[Any]]]] | None:
 def _layout(key: str, of: Distro) -> tuple[Hashable, ...]:
     """Return the fields of a message, nested ones included; empty if there is no such message."""
     return tuple(
-        (type_, name, _layout(_target(type_), of) if "/" in type_ else ())
+        # of a type such as `std_msgs/Header[3]`, the layout of the message
+        (type_, name, _layout(re.sub(r"/(\w+).*", r"/msg/\1", type_), of) if "/" in type_ else ())
         for section in _sections(key, of) or ()
         for type_, name, *_ in section["fields"]
     )
-
-
-def _target(type_: str) -> str:
-    """Return the full name of the message that a type such as `std_msgs/Header[3]` holds."""
-    return re.sub(r"(\w+)/(\w+).*", r"\1/msg/\2", type_)
 
 
 def _section(section: dict[str, list[list[Any]]]) -> str:

@@ -11,6 +11,7 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.language.escapes import EscapeError, through_idl
+from idlc.language.tree import Fault
 
 # a comma makes it a range, not a unit
 _UNIT_END = re.compile(r"[,\]]")
@@ -29,9 +30,7 @@ def condense(lines: Sequence[str]) -> Comment:
         return Comment()
     unit: str | None = None
     kept = list(lines)
-    units = (
-        list(islice(brackets("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
-    )
+    units = list(islice(brackets("\n".join(lines)), 2))
     if len(units) == 1:
         whole, unit = units[0]
         kept = [line.replace(whole, "") for line in kept]
@@ -58,32 +57,21 @@ def brackets(text: str) -> Iterator[tuple[str, str]]:
         at = text.find("[", end.end())
 
 
-class Problem(msgspec.Struct, frozen=True):
-    """A comment that breaks ROS 2's pipeline; `text` is the piece at fault."""
+def problem(comment: Comment) -> tuple[str, Fault] | None:
+    """Return the text that breaks ROS 2's pipeline (language 1.4, 1.5), and its fault, or `None`.
 
-    code: codes.Code
-    text: str
-    message: str
-    hint: str
-
-
-def problem(comment: Comment) -> Problem | None:
-    """Return the problem of a comment or its unit (language 1.4, 1.5), or `None`."""
+    The text is a piece of the comment or of its unit.
+    """
     if comment.unit is not None and "\n" in comment.unit:
-        return Problem(
-            codes.UNIT_ACROSS_LINES,
-            "[",
-            "this bracket is closed on another line; ROS 2's tools fail on such a unit",
-            "close the bracket on the same line",
-        )
+        message = "this bracket is closed on another line; ROS 2's tools fail on such a unit"
+        hint = "close the bracket on the same line"
+        return "[", Fault(codes.UNIT_ACROSS_LINES, message, 0, 1, hint)
     for text in (*comment.lines, *filter(None, [comment.unit])):
         try:
             through_idl(text)
         except EscapeError as error:
-            return Problem(
-                codes.BAD_ESCAPE,
-                text[error.start : error.end],
-                f"ROS 2's tools fail on {error} in a comment",
-                "write the path or formula without backslashes",
-            )
+            piece = text[error.start : error.end]
+            message = f"ROS 2's tools fail on {error} in a comment"
+            hint = "write the path or formula without backslashes"
+            return piece, Fault(codes.BAD_ESCAPE, message, 0, len(piece), hint)
     return None

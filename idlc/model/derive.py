@@ -15,10 +15,7 @@ TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
 
 #: What clients and servers of all actions use.
 ACTION_PROTOCOL = frozenset(
-    {
-        ir.TypeName("action_msgs", "srv", "CancelGoal"),
-        ir.TypeName("action_msgs", "msg", "GoalStatusArray"),
-    }
+    map(ir.TypeName.parse, ("action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"))
 )
 
 #: Packages that each kind of file needs beside the types that it names.

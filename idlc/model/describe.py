@@ -9,12 +9,8 @@ from typing import TypedDict
 
 from idlc.model import derive, ir
 
-STRING_TYPE_IDS = {
-    (False, False): 17,
-    (True, False): 18,
-    (False, True): 21,
-    (True, True): 22,
-}
+#: By whether a string is wide, and whether it is bounded.
+STRING_TYPE_IDS = {(False, False): 17, (True, False): 18, (False, True): 21, (True, True): 22}
 ARRAY_OFFSET = 48
 BOUNDED_SEQUENCE_OFFSET = 96
 SEQUENCE_OFFSET = 144
@@ -51,27 +47,24 @@ class DescriptionDict(TypedDict):
     referenced_type_descriptions: list[IndividualDict]
 
 
-def _element_type(element: ir.Element) -> tuple[int, int, str]:
-    match element:
-        case ir.Primitive():
-            return element.info.type_id, 0, ""
-        case ir.String():
-            type_id = STRING_TYPE_IDS[element.wide, element.bound is not None]
-            return type_id, element.bound or 0, ""
-        case ir.Ref():
-            return 1, 0, str(element.target)
-        case ir.Unknown():
-            raise ValueError("an unknown type has no description")
-
-
-def _type(type_: ir.FieldType) -> TypeDict:
-    capacity = offset = 0
+def type_dict(type_: ir.FieldType) -> TypeDict:
+    """Return a type as it enters the type hash."""
+    capacity = offset = string_capacity = 0
+    nested = ""
     if isinstance(type_, ir.Array):
         capacity, offset = type_.size, ARRAY_OFFSET
     elif isinstance(type_, ir.Sequence):
         capacity = type_.bound or 0
         offset = SEQUENCE_OFFSET if type_.bound is None else BOUNDED_SEQUENCE_OFFSET
-    type_id, string_capacity, nested = _element_type(ir.element_of(type_))
+    match ir.element_of(type_):
+        case ir.Primitive() as element:
+            type_id = element.info.type_id
+        case ir.String(wide, bound):
+            type_id, string_capacity = STRING_TYPE_IDS[wide, bound is not None], bound or 0
+        case ir.Ref(target):
+            type_id, nested = 1, str(target)
+        case ir.Unknown():
+            raise ValueError("an unknown type has no description")
     return {
         "type_id": type_id + offset,
         "capacity": capacity,
@@ -87,7 +80,7 @@ def individual(message: ir.Message) -> IndividualDict:
         "fields": [
             {
                 "name": field.name,
-                "type": _type(field.type),
+                "type": type_dict(field.type),
                 "default_value": field.default.text if field.default else "",
             }
             for field in message.wire_fields

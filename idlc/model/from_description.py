@@ -7,7 +7,7 @@ hash that the program announces; idlc prints its names, and uses them for nothin
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
@@ -50,23 +50,8 @@ def model_of_description(
 
     Raises DescriptionError. Each message has a source of its own, for locations in it.
     """
-    parts = (description["type_description"], *description["referenced_type_descriptions"])
-    messages = dict(_messages(parts, program))
-    top = next(iter(messages))
-    if str(top) != name:
-        raise DescriptionError(f"it describes `{one_line(str(top))}` instead")
-    model = Model(top.package, (messages[top],), messages)
-    if model.describer.hash(name) != type_hash:
-        raise DescriptionError("its description has another type hash")
-    return model
-
-
-def _messages(
-    parts: Iterable[IndividualDict], program: str
-) -> Iterator[tuple[ir.TypeName, ir.Message]]:
-    """Yield the messages of a description by name, after all of them were checked."""
     messages: dict[ir.TypeName, ir.Message] = {}
-    for part in parts:
+    for part in (description["type_description"], *description["referenced_type_descriptions"]):
         message = _message(part, program)
         if message.name in messages:
             raise DescriptionError(f"it describes `{message.name}` twice")
@@ -77,7 +62,13 @@ def _messages(
                 raise DescriptionError(f"it does not describe `{target}`")
     if next(circles(messages, lambda name: messages[name].holders, set()), None):
         raise DescriptionError("it describes a message that contains itself")
-    yield from messages.items()
+    top = next(iter(messages))
+    if str(top) != name:
+        raise DescriptionError(f"it describes `{one_line(str(top))}` instead")
+    model = Model(top.package, (messages[top],), messages)
+    if model.describer.hash(name) != type_hash:
+        raise DescriptionError("its description has another type hash")
+    return model
 
 
 def _message(part: IndividualDict, program: str) -> ir.Message:
@@ -115,7 +106,16 @@ def _type_name(text: str) -> ir.TypeName:
 
 def _type(type_: TypeDict) -> ir.FieldType:
     shape, element_id = divmod(type_["type_id"], ARRAY_OFFSET)
-    element = _element(element_id, type_)
+    element: ir.Element
+    if element_id == 1:
+        element = ir.Ref(_type_name(type_["nested_type_name"]))
+    elif element_id in _STRINGS:
+        wide, bounded = _STRINGS[element_id]
+        element = ir.String(wide, type_["string_capacity"] if bounded else None)
+    elif element_id in _PRIMITIVES:
+        element = _PRIMITIVES[element_id]
+    else:
+        raise DescriptionError(f"it uses type {element_id}, which .msg files do not have")
     match shape:
         case 0:
             return element
@@ -126,17 +126,6 @@ def _type(type_: TypeDict) -> ir.FieldType:
         case 3:
             return ir.Sequence(element)
     raise DescriptionError(f"it uses the unknown type {type_['type_id']}")
-
-
-def _element(type_id: int, type_: TypeDict) -> ir.Element:
-    if type_id == 1:
-        return ir.Ref(_type_name(type_["nested_type_name"]))
-    if type_id in _STRINGS:
-        wide, bounded = _STRINGS[type_id]
-        return ir.String(wide, type_["string_capacity"] if bounded else None)
-    if type_id in _PRIMITIVES:
-        return _PRIMITIVES[type_id]
-    raise DescriptionError(f"it uses type {type_id}, which .msg files do not have")
 
 
 #: Characters of all sources together; more are left alone.
@@ -155,22 +144,15 @@ def reported_model(
     The sources have constants, units and comments, so they are preferred if they have that hash. A
     program may leave them out, and has none for the types that services and actions imply.
     """
-    compiled = _compiled(sources, name, program)
-    if compiled is not None and compiled.describer.hash(name) == type_hash:
-        return compiled
-    return model_of_description(description, name, type_hash, program)
-
-
-def _compiled(sources: Mapping[str, str], name: str, program: str) -> Model | None:
-    """Return the model of a message, nested messages included, if the sources have it."""
-    report = Report()
     texts = {_type_name(text_name): text for text_name, text in sources.items()}
     top = _type_name(name)
-    if top.kind != "msg" or top not in texts or sum(map(len, sources.values())) > MAX_TEXT:
-        return None
-    own = [
-        lower(parse(Source(f"{own} ({program})", text)), own, report, NEWEST)
-        for own, text in texts.items()
-    ]
-    model = link(top.package, own, catalog, report)
-    return None if report.had_errors else model.only({top})
+    if top.kind == "msg" and top in texts and sum(map(len, sources.values())) <= MAX_TEXT:
+        report = Report()
+        own = [
+            lower(parse(Source(f"{own} ({program})", text)), own, report, NEWEST)
+            for own, text in texts.items()
+        ]
+        model = link(top.package, own, catalog, report)
+        if not report.had_errors and model.only({top}).describer.hash(name) == type_hash:
+            return model.only({top})
+    return model_of_description(description, name, type_hash, program)

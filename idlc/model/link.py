@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import (
-    Callable,
-    Container,
-    Hashable,
-    Iterable,
-    Iterator,
-    Mapping,
-    MutableMapping,
-)
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
 
@@ -36,9 +28,7 @@ NAMED = 10
 
 
 def circles(
-    roots: Iterable[Node],
-    edges: Callable[[Node], Iterable[tuple[Edge, Node]]],
-    done: set[Node],
+    roots: Iterable[Node], edges: Callable[[Node], Iterable[tuple[Edge, Node]]], done: set[Node]
 ) -> Iterator[tuple[list[Node], Edge]]:
     """Yield each circle as its nodes, with the edge from the last back to the first.
 
@@ -66,8 +56,7 @@ def circles(
 
 
 def dependents(
-    names: Iterable[ir.TypeName],
-    references: Iterable[tuple[ir.TypeName, Iterable[ir.TypeName]]],
+    names: Iterable[ir.TypeName], references: Iterable[tuple[ir.TypeName, Iterable[ir.TypeName]]]
 ) -> set[ir.TypeName]:
     """Return interfaces with all that refer to one of them, in linear time, circles or not.
 
@@ -80,24 +69,17 @@ def dependents(
     return derive.closure(names, lambda name: users.get(name, ()))
 
 
-def check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
+def _check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
     """Add an error for each field that closes a circle."""
+    hint = "ROS 2 has no recursive types; refer to the other message by an id"
     for path, field in circles(interfaces, pool.references, pool.searched):
         if field.type_span is not None:
-            pool.linked[path[-1]].append(_circle(path, field.type_span))
-
-
-def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
-    """Return the problem with a circle of the messages on `path`."""
-    left_out = len(path) - NAMED
-    shown = [name.name for name in path[:NAMED]]
-    shown += [f"{left_out} more"] if left_out > 0 else []
-    circle = " → ".join((*shown, path[0].name))
-    return codes.RECURSIVE_TYPE.at(
-        span,
-        f"`{path[0].name}` contains itself: {circle}",
-        hint="ROS 2 has no recursive types; refer to the other message by an id",
-    )
+            more = [f"{len(path) - NAMED} more"] if len(path) > NAMED else []
+            first = path[0].name
+            circle = " → ".join((*(name.name for name in path[:NAMED]), *more, first))
+            message = f"`{first}` contains itself: {circle}"
+            error = codes.RECURSIVE_TYPE.at(field.type_span, message, hint=hint)
+            pool.linked[path[-1]].append(error)
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -177,15 +159,21 @@ class Pool:
         entry = self._entries.get(name)
         return [*(entry.problems.errors if entry else ()), *self.linked.get(name, ())]
 
-    def package_references(self) -> dict[str, dict[str, Span]]:
-        """Return where a package first names each other one; ROS 2 adds others by itself."""
+    def check_packages(self, report: Report) -> None:
+        """Report each circle of packages, which no build tool could put into an order."""
+        # where a package first names each other one; ROS 2 adds others by itself
         packages: dict[str, dict[str, Span]] = {}
         for entry in filter(None, self._entries.values()):
             own = entry.interface.name.package
             for field, target in entry.references:
                 if target.package != own and field.type_span is not None:
                     packages.setdefault(own, {}).setdefault(target.package, field.type_span)
-        return packages
+        edges = {own: [(at, to) for to, at in spans.items()] for own, spans in packages.items()}
+        for circle, span in circles(sorted(edges), lambda own: edges.get(own, ()), set()):
+            names = " → ".join((*circle, circle[0]))
+            message = f"packages that need each other cannot be built: {names}"
+            hint = "move the messages that both use to a package of their own"
+            report.add(codes.PACKAGE_CIRCLE.at(span, message, hint=hint))
 
     @cached_property
     def describer(self) -> Describer:
@@ -199,25 +187,6 @@ def _entry(interface: ir.Interface, problems: Report) -> Entry:
     holders = (holder for part in derive.messages(interface) for holder in part.holders)
     references = tuple(holder for holder in holders if holder[1].kind == "msg")
     return Entry(interface, problems, references)
-
-
-def check_packages(pool: Pool, report: Report) -> None:
-    """Report each circle of packages, which no build tool could put into an order."""
-    edges = pool.package_references()
-    package_circles = circles(
-        sorted(edges),
-        lambda package: ((at, to) for to, at in edges.get(package, {}).items()),
-        set(),
-    )
-    for packages, span in package_circles:
-        names = " → ".join((*packages, packages[0]))
-        report.add(
-            codes.PACKAGE_CIRCLE.at(
-                span,
-                f"packages that need each other cannot be built: {names}",
-                hint="move the messages that both use to a package of their own",
-            )
-        )
 
 
 #: Problems after which idlc no longer looks for the nearest names; people see fewer than these.
@@ -354,14 +323,14 @@ def link(
     for interface in interfaces.values():
         pool.add(interface)
     _load_references(interfaces, pool)
-    check_recursion(interfaces, pool)
+    _check_recursion(interfaces, pool)
     for name in interfaces:
         report.extend(pool.errors(name))
     mine = sorted(name for name in interfaces if name.package == package)
     return Model(package, tuple(interfaces[name] for name in mine), interfaces, pool)
 
 
-def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool: Pool) -> None:
+def _load_references(interfaces: dict[ir.TypeName, ir.Interface], pool: Pool) -> None:
     """Add every interface that is referred to; add an error for each that does not exist."""
     unknown = _UnknownTypes(interfaces, pool.library)
     queue = list(interfaces)
@@ -410,13 +379,11 @@ class _UnknownTypes:
         packages = self._library.packages() if self._hints >= 0 else ()
         is_known = siblings is not None or target.package in packages
         if "/" in written and not is_known and not self._library.names(target.package):
-            return codes.UNKNOWN_PACKAGE.at(
-                span.at(0, len(target.package)),
-                f"unknown package `{target.package}`",
-                hint=self._library.nearby(target.package)
-                or _of_others(target)
-                or package_hint(target.package, packages),
-            )
+            package = target.package
+            nearby = self._library.nearby(package) or _of_others(target)
+            hint = nearby or package_hint(package, packages)
+            at, message = span.at(0, len(package)), f"unknown package `{package}`"
+            return codes.UNKNOWN_PACKAGE.at(at, message, hint=hint)
         at = span.at(written.rfind("/") + 1, len(written))
         hint = self._hint(target, qualified="/" in written)
         return codes.UNKNOWN_TYPE.at(at, f"unknown type `{written}`", hint=hint)
@@ -427,27 +394,25 @@ class _UnknownTypes:
             other = target._replace(kind=kind)
             if other in self._interfaces or (self._hints >= 0 and self._library.source(other)):
                 return f"`{target.name}` is {noun}; only messages can be the type of a field"
-        return (
-            (None if qualified else self._in_other_package(target.name))
-            or self._misnamed(target)
-            or _of_others(target)
-            or self._near(target)
-            or _missing(target, self._library)
-        )
-
-    def _misnamed(self, target: ir.TypeName) -> str | None:
-        """Return a hint at a file whose name differs only in its capitals."""
-        for name in sorted(self._messages.get(target.package, ())):
-            if name.lower() == target.name.lower() and not names.is_message_name(name):
-                return f"rename `{name}.msg` to `{target.name}.msg`"
-        return None
-
-    def _near(self, target: ir.TypeName) -> str | None:
-        if self._hints < 0:
-            return None
-        own = filter(names.is_message_name, self._messages.get(target.package, ()))
-        candidates = {*own, *self._library.names(target.package), *_PRIMITIVES}
-        return did_you_mean(target.name, candidates)
+        name, package, distro = target.name, target.package, self._library.distro
+        if not qualified and (hint := self._in_other_package(name)):
+            return hint
+        own = self._messages.get(package, set())
+        for other_name in sorted(own):
+            if other_name.lower() == name.lower() and not names.is_message_name(other_name):
+                return f"rename `{other_name}.msg` to `{name}.msg`"
+        if hint := _of_others(target):
+            return hint
+        messages = set(self._library.names(package))
+        candidates = {*filter(names.is_message_name, own), *messages, *_PRIMITIVES}
+        if self._hints >= 0 and (hint := did_you_mean(name, candidates)):
+            return hint
+        if messages and messages == set(catalog.names(package, distro)):
+            return (
+                f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`;"
+                f" if yours does, {including('DIR')} with its sources, or source your ROS 2"
+            )
+        return f"there is no `{name}.msg` in package `{package}`"
 
     def _in_other_package(self, name: str) -> str | None:
         """Return a hint at a basic type, or at a package that has a message of just this name."""
@@ -462,18 +427,6 @@ class _UnknownTypes:
             other = f", or the message `{package}/{name}`" if package else ""
             return f"did you mean `{name.lower()}`{other}?"
         return f"did you mean `{package}/{name}`?" if package else lower_types.type_hint(name)
-
-
-def _missing(target: ir.TypeName, library: Library) -> str:
-    """Return the hint for a name that is like none of its package."""
-    package, name = target.package, target.name
-    messages, distro = set(library.names(package)), library.distro
-    if messages and messages == set(catalog.names(package, distro)):
-        return (
-            f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`; "
-            f"if yours does, {including('DIR')} with its sources, or source your ROS 2"
-        )
-    return f"there is no `{name}.msg` in package `{package}`"
 
 
 def _of_others(target: ir.TypeName) -> str | None:

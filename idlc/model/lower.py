@@ -10,7 +10,7 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Edit, Report
-from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.source import Span
 from idlc.language import tree
 from idlc.language.escapes import EscapeError, through_idl
 from idlc.language.parse import parse_definition
@@ -19,7 +19,7 @@ from idlc.model import ir, lower_types
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.distros import DEFAULT, Distro
 from idlc.model.lower_types import STRINGS, as_parsed, fault_at, lower_type
-from idlc.model.lower_values import Text, default, scalar
+from idlc.model.lower_values import default, scalar
 
 if TYPE_CHECKING:
     from idlc.language import idl
@@ -34,23 +34,14 @@ class _Element(msgspec.Struct, frozen=True):
     optional: bool
 
 
-class _Section:
-    """Lowers one section; holds the state that its steps share."""
+class _Section(msgspec.Struct):
+    """Lowers one section; holds what its steps share."""
 
-    def __init__(
-        self,
-        file: tree.File,
-        lines: tuple[tree.Line, ...],
-        name: ir.TypeName,
-        report: Report,
-        distro: Distro,
-    ) -> None:
-        self.file = file
-        self.lines = lines
-        self.name = name
-        self.report = report
-        self.distro = distro
-        self.optional = False
+    file: tree.File
+    lines: tuple[tree.Line, ...]
+    name: ir.TypeName
+    report: Report
+    distro: Distro
 
     def lower(self) -> ir.Message:
         # the comment lines at the very start describe the whole structure
@@ -81,6 +72,7 @@ class _Section:
         """Return the sound definitions with their comments; report the broken ones."""
         elements: list[_Element] = []
         pending: list[tree.Line] = []
+        optional = False
         for line in self.lines[first:]:
             if line.is_indented_comment:
                 if elements:
@@ -88,8 +80,12 @@ class _Section:
                 continue
             if line.comment:
                 pending.append(line)
-            if line.code.startswith(tree.OPTIONAL):
-                line = self._after_optional(line)
+            if (rest := line.after_optional) is not None:
+                self._report_optional(line, is_second=optional)
+                optional, line = True, rest
+                if line.after_optional is not None:
+                    self._report_optional(line, is_second=True)
+                    line = msgspec.structs.replace(line, code="")
             text = line.definition
             if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
@@ -100,20 +96,10 @@ class _Section:
                 self._add(line, 0, body, self._edits(line, body))
             else:
                 self._warn_hash(line, text)
-                elements.append(_Element(line, body, pending, self.optional))
+                elements.append(_Element(line, body, pending, optional))
             pending = []
-            self.optional = False
+            optional = False
         return elements
-
-    def _after_optional(self, line: tree.Line) -> tree.Line:
-        """Return the rest of a line that begins with `@optional`; empty after a second one."""
-        self._report_optional(line, is_second=self.optional)
-        self.optional = True
-        rest = line.after_optional or line
-        if rest.after_optional is None:
-            return rest
-        self._report_optional(rest, is_second=True)
-        return msgspec.structs.replace(rest, code="")
 
     def _report_optional(self, line: tree.Line, *, is_second: bool) -> None:
         end = len(tree.OPTIONAL)
@@ -140,14 +126,12 @@ class _Section:
         comment = condense(texts)
         defect = problem(comment if has_unit else msgspec.structs.replace(comment, unit=None))
         if defect is not None:
+            text, fault = defect
             # the range of the text at fault in the comments, or the first comment
-            line, at = next(
-                ((line, at) for line in lines if (at := line.comment.find(defect.text)) >= 0),
-                (lines[0], 0),
-            )
-            end = at + len(defect.text) if at else len(line.comment)
-            fault = Fault(defect.code, defect.message, at, end, defect.hint)
-            self._add(line, len(line.code), fault)
+            places = ((line, line.comment.find(text)) for line in lines)
+            line, at = next((place for place in places if place[1] >= 0), (lines[0], 0))
+            end = at + len(text) if at else len(line.comment)
+            self._add(line, len(line.code), msgspec.structs.replace(fault, start=at, end=end))
         return comment
 
     def _edits(self, line: tree.Line, fault: Fault) -> tuple[Edit, ...]:
@@ -248,7 +232,7 @@ class _Section:
         return ir.Constant(
             name=body.name.text,
             type=type_,
-            value=value.value if isinstance(value, Text) else value,
+            value=value,
             comment=about.lines,
             unit=about.unit,
             name_span=self.file.span(line, body.name),
@@ -277,36 +261,26 @@ def lower(
 
     Reports everything that is wrong inside the file; types of other files are `link`'s.
     """
-    suffixes = SECTIONS[name.kind]
-    if not isinstance(file, tree.File):
+    structures = [name._replace(name=name.name + suffix) for suffix in SECTIONS[name.kind]]
+    if isinstance(file, tree.File):
+        _check_reading(file, report)
+        _check_separators(file, name.kind, report)
+        lines = [section.lines for section in file.sections] + [()] * len(structures)
+        parts = [
+            _Section(file, own, structure, report, distro).lower()
+            for structure, own in zip(structures, lines, strict=False)
+        ]
+    else:
         from idlc.model.lower_idl import lower_idl  # only recordings hold IDL
 
-        structures = [name._replace(name=name.name + suffix) for suffix in suffixes]
-        return _assembled(name, lower_idl(file, structures, report), file.source, report)
-    _check_reading(file, report)
-    _check_separators(file, name.kind, len(suffixes), report)
-    empty = tree.Section(len(file.source.text), ())
-    sections = (*file.sections, *([empty] * len(suffixes)))
-    parts = [
-        _Section(
-            file, section.lines, name._replace(name=name.name + suffix), report, distro
-        ).lower()
-        for suffix, section in zip(suffixes, sections, strict=False)
-    ]
-    return _assembled(name, parts, file.source, report)
-
-
-def _assembled(
-    name: ir.TypeName, parts: list[ir.Message], source: Source, report: Report
-) -> ir.Interface:
-    """Return the interface that consists of these sections."""
+        parts = lower_idl(file, structures, report)
     parts = _without_moved_constants(parts, report)
     if name.kind == "msg":
         return parts[0]
     if name.kind == "srv":
-        return ir.Service(name=name, request=parts[0], response=parts[1], source=source)
+        return ir.Service(name=name, request=parts[0], response=parts[1], source=file.source)
     goal, result, feedback = parts
-    return ir.Action(name=name, goal=goal, result=result, feedback=feedback, source=source)
+    return ir.Action(name=name, goal=goal, result=result, feedback=feedback, source=file.source)
 
 
 def _check_reading(file: tree.File, report: Report) -> None:
@@ -326,11 +300,13 @@ def _check_reading(file: tree.File, report: Report) -> None:
                 report.add(codes.UNUSUAL_LINE_END.at(span, message, hint=hint))
 
 
-def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Report) -> None:
-    count = len(file.separators)
-    needed = expected - 1
-    if count == needed or _has_near_separator(file, expected):
+def _check_separators(file: tree.File, kind: ir.Kind, report: Report) -> None:
+    count, needed = len(file.separators), ir.KINDS.index(kind)
+    if count == needed or file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
         return
+    lines = (line for section in file.sections[: needed + 1] for line in section.lines)
+    if any(map(_is_dashes, lines)):
+        return  # it resembles a separator, and is reported as such
     message = f"a .{kind} file has {_NUMBERS[needed]} `---` line{'s' * (needed > 1)}"
     if count > needed:
         at = file.separators[needed]
@@ -342,17 +318,6 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
         hint = "write `---` on a line of its own between the parts"
         message += f"; this file has {_NUMBERS[count] if count else 'none'}"
     report.add(codes.SEPARATOR_COUNT.at(span, message, hint=hint))
-
-
-def _has_near_separator(file: tree.File, expected: int) -> bool:
-    """Return whether some line resembles a separator and is reported as such.
-
-    Lines after the `expected` sections are ignored.
-    """
-    if file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
-        return True
-    lines = (line for section in file.sections[:expected] for line in section.lines)
-    return any(text and set(text) == {"-"} for line in lines if (text := line.definition))
 
 
 def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir.Message]:

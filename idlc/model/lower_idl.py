@@ -7,6 +7,7 @@ spelling of a text.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import msgspec
@@ -80,21 +81,14 @@ def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
     if value.is_text and isinstance(type_, ir.String) and _fits(type_, words):
         return ir.Default(words, words)
     if value.is_text and isinstance(type_, (ir.Array, ir.Sequence)):
-        values = _elements(type_, words)
-        if values is not None:
+        values = None
+        with suppress(ValueError):  # the defaults of arrays travel as the text of a tuple
+            values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
+        if values is not None and all(_fits(type_.element, each) for each in values):
             wrong = lower_values.wrong_length(type_, len(values), words)
             return wrong or ir.Default(values, words)
     message = f"this is no value of type `{ir.spell(type_)}`"
     return Fault(codes.BAD_VALUE, message, 0, value.end - value.start)
-
-
-def _elements(type_: ir.Array | ir.Sequence, words: str) -> tuple[ir.Scalar, ...] | None:
-    """Read the text of a Python tuple, as which the defaults of arrays travel."""
-    try:
-        values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
-    except ValueError:
-        return None
-    return values if all(_fits(type_.element, value) for value in values or ()) else None
 
 
 def _fits(type_: ir.Element, value: object) -> bool:
@@ -108,8 +102,8 @@ def _fits(type_: ir.Element, value: object) -> bool:
             low, high = type_.info.low, type_.info.high
             if low is None or high is None:
                 return isinstance(value, float)
-            is_number = isinstance(value, int) and not isinstance(value, bool)
-            return is_number and low <= value <= high  # type: ignore[operator]
+            # a bool is no number here
+            return type(value) is int and low <= value <= high
     return False
 
 
@@ -120,20 +114,13 @@ def lower_idl(file: IdlFile, names: Sequence[ir.TypeName], report: Report) -> li
         lowering.transform(file.tree)
     else:
         word = f"`{file.broken.text}`" if file.broken.text else "this end of the text"
-        _add_foreign(file.source, file.broken, word, report)
+        lowering.foreign(file.broken, word)
     return [*lowering.messages.values()]
-
-
-def _add_foreign(source: Source, part: Piece, subject: str, report: Report) -> None:
-    message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
-    hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
-    span = Span(source, part.start, part.end)
-    report.add(codes.FOREIGN_IDL.at(span, message, hint=hint))
 
 
 @v_args(inline=True)
 class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x only
-    """Lowers the tree of one file; its public methods are the rules of the grammar."""
+    """Lowers the tree of one file; `foreign` reports, other public methods are grammar rules."""
 
     def __init__(self, source: Source, names: Sequence[ir.TypeName], report: Report) -> None:
         super().__init__()
@@ -149,15 +136,15 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         package, kind = (piece(part) for part in parts if isinstance(part, Token))
         for name, written in ((package, self._top.package), (kind, self._top.kind)):
             if name.text != written:
-                self._foreign(name, f"module `{name.text}` for `{self._top}`")
+                self.foreign(name, f"module `{name.text}` for `{self._top}`")
         for missing in () if self._strange else self._missing:
-            self._foreign(kind, f"a module without `{missing}`")
+            self.foreign(kind, f"a module without `{missing}`")
 
     def typedef(self, target: _Type, name: Token, size: Token | None = None) -> None:
         type_ = target.type
         if length := self._positive(size, "the array's size"):
             if isinstance(type_, (ir.Array, ir.Sequence)):
-                self._foreign(piece(name), "an array of arrays")
+                self.foreign(piece(name), "an array of arrays")
                 type_ = ir.Unknown()
             else:
                 type_ = ir.Array(type_, length)
@@ -165,7 +152,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
 
     def sequence(self, element: _Type, bound: Token | None = None) -> _Type:
         if isinstance(element.type, (ir.Array, ir.Sequence)):
-            self._foreign(element.piece, "a sequence of arrays")
+            self.foreign(element.piece, "a sequence of arrays")
             return _Type(ir.Unknown(), element.piece)
         most = self._positive(bound, "the array's size")
         return _Type(as_parsed(ir.Sequence(element.type, most)), element.piece)
@@ -182,12 +169,10 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
                 return _Type(_PRIMITIVES[whole.text], whole)
             if whole.text in self._typedefs:
                 return self._typedefs[whole.text]
-            match parts:
-                case [package, "msg", name] if names.is_package_name(
-                    package
-                ) and names.is_message_name(name):
-                    return _Type(ir.Ref(ir.TypeName(package, "msg", name)), whole)
-        self._foreign(whole, f"the type `{whole.text}`")
+            package, kind, name = parts if len(parts) == 3 else ("", "", "")
+            if kind == "msg" and names.is_package_name(package) and names.is_message_name(name):
+                return _Type(ir.Ref(ir.TypeName(package, "msg", name)), whole)
+        self.foreign(whole, f"the type `{whole.text}`")
         return _Type(ir.Unknown(), whole)
 
     def annotation(self, name: Token, *parameters: tuple[str, _Value]) -> _Annotation:
@@ -206,7 +191,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         name = str(parts[at])
         if message := self._message(parts[at], name):
             if name not in self._missing:
-                self._foreign(piece(parts[at]), f"a second `{name}`")
+                self.foreign(piece(parts[at]), f"a second `{name}`")
                 return
             self._missing.remove(name)
             fields = parts[at + 1 :]
@@ -241,7 +226,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         *annotations, (type_, at), token, value = parts
         name = self._name(token, annotations, lower_types.constant_name)
         if not isinstance(type_, (ir.Primitive, ir.String)):
-            self._foreign(at, f"a constant of the type `{at.text}`")
+            self.foreign(at, f"a constant of the type `{at.text}`")
             return None
         lowered = self._default(type_, value)
         if lowered is None:
@@ -255,9 +240,11 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
             name_span=self._span(name),
         )
 
-    def _foreign(self, part: Piece, subject: str) -> None:
+    def foreign(self, part: Piece, subject: str) -> None:
         self._strange = True
-        _add_foreign(self._source, part, subject, self._report)
+        message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
+        hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
+        self._report.add(codes.FOREIGN_IDL.at(self._span(part), message, hint=hint))
 
     def _fault(self, fault: Fault) -> None:
         span = Span(self._source, fault.start, fault.end)
@@ -268,7 +255,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
 
     def _message(self, token: Token, name: str) -> ir.Message | None:
         if name not in self.messages:
-            self._foreign(piece(token), f"`{token}` among the parts of `{self._top}`")
+            self.foreign(piece(token), f"`{token}` among the parts of `{self._top}`")
         return self.messages.get(name)
 
     def _positive(self, token: Token | None, subject: str) -> int | None:
@@ -287,7 +274,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         """Return a name; report one that ROS 2 does not allow, and unknown annotations."""
         for annotation in annotations:
             if annotation.name.text not in ANNOTATIONS:
-                self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
+                self.foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
         name = piece(token)
         if fault := fault_of(name.text):
             self._fault(fault.moved(name.start))
@@ -296,7 +283,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
     def _default(self, type_: ir.FieldType, value: _Value) -> ir.Default | None:
         element = ir.element_of(type_)
         if isinstance(element, ir.Ref):
-            self._foreign(Piece(value.words, value.start), "a default for a message")
+            self.foreign(Piece(value.words, value.start), "a default for a message")
         if isinstance(element, (ir.Ref, ir.Unknown)):
             return None
         lowered = _default(type_, value)

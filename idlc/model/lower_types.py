@@ -16,40 +16,33 @@ from idlc.language import tree
 from idlc.language.tree import Fault
 from idlc.model import ir, names
 
-#: Names of types in other languages, in lower case, and their names in interface files.
+#: Types in interface files, and the names of other languages for them, in lower case.
+_NAMES = {
+    "bool": "boolean",
+    "float32": "f32 float",
+    "float64": "double f64 number real",
+    "int16": "short",
+    "int32": "int integer signed",
+    "int64": "long",
+    "string": "str text",
+    "uint8": "uchar",
+    "uint8[]": "blob buffer bytearray bytes octets",
+    "uint16": "ushort",
+    "uint32": "uint unsigned",
+    "uint64": "size_t ulong",
+    "builtin_interfaces/Duration": "timedelta",
+    "builtin_interfaces/Time": "datetime timestamp",
+}
 _TYPES = {
-    "boolean": "bool",
-    "double": "float64",
-    "f32": "float32",
-    "f64": "float64",
-    "float": "float32",
-    "int": "int32",
-    "integer": "int32",
-    "long": "int64",
-    "number": "float64",
-    "real": "float64",
-    "short": "int16",
-    "signed": "int32",
-    "size_t": "uint64",
-    "str": "string",
-    "text": "string",
-    "uchar": "uint8",
-    "uint": "uint32",
-    "ulong": "uint64",
-    "unsigned": "uint32",
-    "ushort": "uint16",
+    **{name: type_ for type_, spellings in _NAMES.items() for name in spellings.split()},
     **{f"{sign}{bits}": f"{sign}nt{bits}" for sign in ("i", "ui") for bits in (8, 16, 32, 64)},
     **{f"u{bits}": f"uint{bits}" for bits in (8, 16, 32, 64)},
     **{f"{sign}int{bits}_t": f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)},
-    **dict.fromkeys(("bytes", "bytearray", "buffer", "blob", "octets"), "uint8[]"),
-    **dict.fromkeys(("datetime", "timestamp"), "builtin_interfaces/Time"),
-    "timedelta": "builtin_interfaces/Duration",
 }
 #: Types of several words, without a last `int`.
 _C_TYPES = {
     "long double": "float64",
     "long long": "int64",
-    "short": "int16",
     "signed char": "int8",
     "unsigned char": "uint8",
     "unsigned long": "uint64",
@@ -72,11 +65,10 @@ _LIST_HINT = "a list of any length is `TYPE[]`, one of at most ten elements `TYP
 
 def type_hint(name: str) -> str | None:
     """Return the hint for a name that other languages give to a type."""
+    own = (*ir.PRIMITIVES, *STRINGS)
     word = re.split(r"::|\.", name)[-1].lower()
-    if word in (*ir.PRIMITIVES, "string", "wstring"):
+    if word in own:
         return f"did you mean `{word}`?" if word != name else None
-    if word in _TYPES:
-        return f"did you mean `{_TYPES[word]}`?"
     if word in _ANY:
         return "a field has one type, which a message names: there is none for all values"
     if word in _LISTS:
@@ -85,7 +77,7 @@ def type_hint(name: str) -> str | None:
         return "ROS 2 has no maps and no structures within messages; make a message for its fields"
     if word == "enum":
         return "ROS 2 has no enums; make a uint8 field, and a constant for each of its values"
-    near = closest(name, (*ir.PRIMITIVES, "string", "wstring")) or closest(name, _NUMBERS)
+    near = word if word in _TYPES else closest(name, own) or closest(name, _NUMBERS)
     return f"did you mean `{_TYPES.get(near, near)}`?" if near else None
 
 
@@ -117,7 +109,13 @@ def find_slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
         return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
     if isinstance(body, Fault):
         return _broken(text, body, kind)
-    return _qualified(text, body) or _of_c(text, body) or _other_shape(body)
+    word = body.type.whole.text
+    if word in _QUALIFIERS:
+        hint = f"a line begins with its type: `{text[len(word) :].strip()}`"
+        return _invalid(codes.INVALID_TYPE_NAME, "type", body.type.whole, hint)
+    if word in _C_WORDS and (fault := _of_c(text)):
+        return fault
+    return _constant(body) if isinstance(body, tree.Constant) else _field(body)
 
 
 def _broken(text: str, fault: Fault, kind: ir.Kind) -> Fault | None:
@@ -130,18 +128,8 @@ def _broken(text: str, fault: Fault, kind: ir.Kind) -> Fault | None:
     return None
 
 
-def _qualified(text: str, body: tree.Field | tree.Constant) -> Fault | None:
-    word = body.type.whole.text
-    if word not in _QUALIFIERS:
-        return None
-    hint = f"a line begins with its type: `{text[len(word) :].strip()}`"
-    return Fault(codes.INVALID_TYPE_NAME, f"`{word}` cannot be a type name", 0, len(word), hint)
-
-
-def _of_c(text: str, body: tree.Field | tree.Constant) -> Fault | None:
+def _of_c(text: str) -> Fault | None:
     """Return the fault of a type of several words, such as `unsigned int`."""
-    if body.type.whole.text not in _C_WORDS:
-        return None
     words = list(takewhile(lambda word: word.group() in _C_WORDS, re.finditer(r"\S+", text)))
     if len(words) == 1 or words[0].group() == "char":
         return None
@@ -152,10 +140,8 @@ def _of_c(text: str, body: tree.Field | tree.Constant) -> Fault | None:
     return Fault(codes.UNKNOWN_TYPE, message, 0, words[-1].end(), f"did you mean `{primitive}`?")
 
 
-def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
+def _field(body: tree.Field) -> Fault | None:
     type_, name = body.type.whole.text, body.name
-    if isinstance(body, tree.Constant):
-        return _constant(body)
     if "," in name.text:
         listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
         definitions = [f"`{type_} {part.strip()}`" for part in listed if part.strip()]
@@ -164,12 +150,10 @@ def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
     plain, bracket, size = name.text.partition("[")
     if bracket and size.endswith("]"):
         hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
-        message = f"`{name.text}` cannot be a field name"
-        return fault_at(codes.INVALID_FIELD_NAME, name, message, hint)
+        return _invalid(codes.INVALID_FIELD_NAME, "field", name, hint)
     if type_.endswith(":"):
         hint = f"the type comes first: `{name.text} {type_[:-1]}`"
-        message = f"`{type_}` cannot be a type name"
-        return fault_at(codes.INVALID_TYPE_NAME, body.type.whole, message, hint)
+        return _invalid(codes.INVALID_TYPE_NAME, "type", body.type.whole, hint)
     return None
 
 
@@ -182,11 +166,10 @@ def _constant(body: tree.Constant) -> Fault | None:
         code, end = codes.INVALID_CONSTANT_NAME, name.end + 1
         return Fault(code, "a constant has no name", name.start, end, hint)
     if names.is_field_name(name.text):
-        message = f"`{name.text}` cannot be a constant name"
         hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
-        if type_ in (*ir.PRIMITIVES, "string", "wstring"):
+        if type_ in (*ir.PRIMITIVES, *STRINGS):
             hint += f"; a constant is called `{name.text.upper()}`"
-        return fault_at(codes.INVALID_CONSTANT_NAME, name, message, hint)
+        return _invalid(codes.INVALID_CONSTANT_NAME, "constant", name, hint)
     return None
 
 
@@ -196,8 +179,7 @@ def field_name(name: str) -> Fault | None:
         return None
     like = names.field_name_like(name)
     hint = f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT
-    message = f"`{name}` cannot be a field name"
-    return Fault(codes.INVALID_FIELD_NAME, message, 0, len(name), hint)
+    return _invalid(codes.INVALID_FIELD_NAME, "field", tree.Piece(name, 0), hint)
 
 
 def constant_name(name: str) -> Fault | None:
@@ -206,8 +188,7 @@ def constant_name(name: str) -> Fault | None:
         return None
     upper = names.field_name_like(name).upper()
     hint = f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT
-    message = f"`{name}` cannot be a constant name"
-    return Fault(codes.INVALID_CONSTANT_NAME, message, 0, len(name), hint)
+    return _invalid(codes.INVALID_CONSTANT_NAME, "constant", tree.Piece(name, 0), hint)
 
 
 STRINGS = {"string": False, "wstring": True}
@@ -265,25 +246,19 @@ def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
         return fault_at(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
     if len(parts) == 2 and not names.is_package_name(parts[0]):
         wrong = tree.Piece(parts[0], piece.start)
-        message = f"`{parts[0]}` cannot be a package name"
-        return fault_at(codes.INVALID_TYPE_NAME, wrong, message, names.PACKAGE_HINT)
+        return _invalid(codes.INVALID_TYPE_NAME, "package", wrong, names.PACKAGE_HINT)
     name = parts[-1]
-    if not names.is_message_name(name):
-        return _bad_name(tree.Piece(name, piece.end - len(name)), qualified=len(parts) == 2)
-    return ir.Ref(ir.TypeName(parts[0] if len(parts) == 2 else package, "msg", name))
-
-
-def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
-    name = piece.text
-    if not qualified:
-        if dotted := ros_spelling(name):
-            message = f"`{name}` cannot be a type name"
-            return fault_at(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
-        if spelling := type_hint(name):
-            return fault_at(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", spelling)
+    if names.is_message_name(name):
+        return ir.Ref(ir.TypeName(parts[0] if len(parts) == 2 else package, "msg", name))
     like = names.message_name_like(name.removesuffix(".msg"))
     hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
-    return fault_at(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
+    if len(parts) == 1:
+        if dotted := ros_spelling(name):
+            hint = f"write `{dotted}`"
+        elif spelling := type_hint(name):
+            return fault_at(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", spelling)
+    wrong = tree.Piece(name, piece.end - len(name))
+    return _invalid(codes.INVALID_TYPE_NAME, "type", wrong, hint)
 
 
 def positive(piece: tree.Piece, subject: str) -> int | Fault:
@@ -301,3 +276,7 @@ def positive(piece: tree.Piece, subject: str) -> int | Fault:
 def fault_at(code: codes.Code, piece: tree.Piece, message: str, hint: str) -> Fault:
     """Return the fault of a piece of a line."""
     return Fault(code, message, piece.start, piece.end, hint)
+
+
+def _invalid(code: codes.Code, noun: str, name: tree.Piece, hint: str) -> Fault:
+    return fault_at(code, name, f"`{name.text}` cannot be a {noun} name", hint)

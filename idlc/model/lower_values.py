@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeAlias
-
-import msgspec
 
 from idlc.diagnostics import codes
 from idlc.language.escapes import EscapeError, read_back, through_idl
@@ -113,26 +113,13 @@ FLOAT32_MAX = 3.402823466e38
 LONG = 1000
 
 
-class Text(msgspec.Struct, frozen=True):
-    """A string value: as rosidl's adapter takes it from the file, and after the pipeline."""
-
-    raw: str
-    value: str
-
-
 Number: TypeAlias = bool | int | float
 BACKSLASH_HINT = "write `\\\\\\\\` for each backslash that should stay"
 
 
-def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | Text | Fault:
+def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault:
     """Return the value that `text` spells for a scalar type."""
-    if isinstance(type_, ir.String):
-        return _text(type_, text)
-    if type_.name == "bool":
-        return _bool(text)
-    if type_.info.low is None:
-        return _float(text)
-    return _integer(type_, text)
+    return _text(type_, text) if isinstance(type_, ir.String) else _number(type_.name, text)
 
 
 def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
@@ -143,17 +130,10 @@ def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
     value = scalar(type_, text)
     if isinstance(value, Fault):
         return value
-    if isinstance(value, Text):
-        return ir.Default(value.value, value.value)
     if isinstance(value, float) and not math.isfinite(value):
         # the .idl holds the bare word, whose sign its parser loses (language 3)
         return ir.Default(value, str(abs(value)))
     return ir.Default(value, str(value))
-
-
-def _is(name: str, text: str) -> bool:
-    """Return whether a text is a literal of a terminal's form."""
-    return re.fullmatch(terminals()[name], text) is not None
 
 
 def _fault(code: codes.Code, text: str, message: str, hint: str) -> Fault:
@@ -164,57 +144,35 @@ def _shown(text: str) -> str:
     return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}...`"
 
 
-def _bool(text: str) -> bool | Fault:
-    if _is("BOOLEAN", text):
-        return text.lower() in ("true", "1")
-    message = f"{_shown(text)} is not a bool" if text else "the value is missing"
-    return _fault(codes.BAD_VALUE, text, message, "write `true`, `false`, `1` or `0`")
+def _number(type_: str, text: str) -> Number | Fault:
+    info = ir.PRIMITIVES[type_]
+    form, noun, hint = "INTEGER", "an integer", "a number such as `10`, `-3`, `0xff` or `0b101`"
+    # as rosidl does: decimal first, leading zeros allowed, then by prefix
+    readers: list[Callable[[str], Number]] = [int, lambda text: int(text, 0)]
+    if type_ == "bool":
+        form, noun, hint = "BOOLEAN", "a bool", "`true`, `false`, `1` or `0`"
+        readers = [lambda text: text.lower() in ("true", "1")]
+    elif info.low is None:
+        form, noun, hint = "REAL", "a number", "a number such as `1`, `-0.5` or `1e-3`"
+        readers = [float]
+    is_long = len(text) > LONG and type_ != "bool"
+    for reader in readers if is_long or re.fullmatch(terminals()[form], text) else ():
+        with suppress(ValueError):
+            value = reader(text)
+            if info.low is None or info.high is None or info.low <= value <= info.high:
+                return value
+            hint = f"{type_} holds {info.low} to {info.high}"
+            return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} is out of range", hint)
+    message = f"{_shown(text)} is not {noun}" if text else "the value is missing"
+    return _fault(codes.BAD_VALUE, text, message, f"write {hint}")
 
 
-def _float(text: str) -> float | Fault:
-    value = _real(text) if len(text) > LONG or _is("REAL", text) else None
-    if value is not None:
-        return value
-    message = f"{_shown(text)} is not a number" if text else "the value is missing"
-    return _fault(codes.BAD_VALUE, text, message, "write a number such as `1`, `-0.5` or `1e-3`")
-
-
-def _integer(type_: ir.Primitive, text: str) -> int | Fault:
-    info = type_.info
-    value = _int(text) if len(text) > LONG or _is("INTEGER", text) else None
-    if value is None:
-        message = f"{_shown(text)} is not an integer" if text else "the value is missing"
-        hint = "write a number such as `10`, `-3`, `0xff` or `0b101`"
-        return _fault(codes.BAD_VALUE, text, message, hint)
-    if info.low is None or info.high is None or info.low <= value <= info.high:
-        return value
-    hint = f"{type_.name} holds {info.low} to {info.high}"
-    return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} is out of range", hint)
-
-
-def _real(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _int(text: str) -> int | None:
-    """Read as rosidl does: decimal first, leading zeros allowed, then by prefix."""
-    for base in (10, 0):
-        try:
-            return int(text, base)
-        except ValueError:
-            continue
-    return None
-
-
-def _text(type_: ir.String, text: str) -> Text | Fault:
+def _text(type_: ir.String, text: str) -> str | Fault:
     raw = _unquote(type_, text)
     if isinstance(raw, Fault):
         return raw
     try:
-        return Text(raw, through_idl(raw))
+        return through_idl(raw)
     except EscapeError as error:
         offset = text.find(raw)
         start, end = error.start + offset, error.end + offset
@@ -249,34 +207,30 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
     if not (text.startswith("[") and text.endswith("]")) or text == "[":
         hint = "write `[1, 2, 3]`"
         return _fault(codes.ARRAY_VALUE, text, "an array's default must stand in brackets", hint)
-    inside = text[1:-1]
-    if not isinstance(type_.element, ir.String) and inside.count(",") >= MAX_ELEMENTS:
-        return _too_many(text)
-    split = string_elements if isinstance(type_.element, ir.String) else elements
+    inside, element = text[1:-1], type_.element
+    assert isinstance(element, (ir.Primitive, ir.String))
+    message = f"more than {MAX_ELEMENTS:,} elements in a default"
+    too_many = _fault(codes.TOO_LARGE, text, message, "set the value in code")
+    if not isinstance(element, ir.String) and inside.count(",") >= MAX_ELEMENTS:
+        return too_many
+    split = string_elements if isinstance(element, ir.String) else elements
     pieces = split(inside)
     if isinstance(pieces, Fault):
         return pieces.moved(1)
     if len(pieces) > MAX_ELEMENTS:
-        return _too_many(text)
+        return too_many
     if (wrong := wrong_length(type_, len(pieces), text)) is not None:
         return wrong
-    assert isinstance(type_.element, (ir.Primitive, ir.String))
     values: list[Number | str] = []
     for piece, start in pieces:
-        value = _element(type_.element, piece)
+        value = (
+            _unquote(element, piece) if isinstance(element, ir.String) else scalar(element, piece)
+        )
         if isinstance(value, Fault):
             # a quoted element's offsets are lost with its escapes; its start is near enough
             return value.moved(1 + start)
         values.append(value)
     return _array_value(tuple(values), text)
-
-
-def _element(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault:
-    if isinstance(type_, ir.String):
-        return _unquote(type_, text)
-    value = scalar(type_, text)
-    assert not isinstance(value, Text)
-    return value
 
 
 def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fault:
@@ -308,11 +262,6 @@ def python_tuple(text: str) -> tuple[ir.Scalar, ...]:
     if not isinstance(value, tuple):
         raise ValueError(text)
     return value
-
-
-def _too_many(text: str) -> Fault:
-    message = f"more than {MAX_ELEMENTS:,} elements in a default"
-    return _fault(codes.TOO_LARGE, text, message, "set the value in code")
 
 
 def wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault | None:

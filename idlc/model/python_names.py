@@ -20,27 +20,15 @@ Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 
 #: Names that the emitted codecs use themselves.
 CODEC_NAMES = frozenset(
-    {"array", "at", "chars", "count", "data", "decode", "each", "encapsulation", "encode", "end"}
-    | {
-        "ended",
-        "join",
-        "kind",
-        "limit",
-        "listed",
-        "message",
-        "order",
-        "pad2",
-        "pad4",
-        "pad8",
-    }
-    | {"parts", "put", "raw", "reading", "size", "sized", "small", "strings", "struct", "text"}
-    | {"to_str", "truths", "unsized", "view", "wide_text", "words"}
+    "array at chars count data decode each encapsulation encode end ended join kind limit listed "
+    "message order pad2 pad4 pad8 parts put raw reading size sized small strings struct text "
+    "to_str truths unsized view wide_text words".split()
 )
 
 #: The methods that a message class inherits; a field of such a name hides the method.
 METHODS = frozenset(
-    {"deserialize", "deserialize_many", "from_dict", "get_fields_and_field_types", "serialize"}
-    | {"serialize_many", "to_arrow", "to_columns", "to_dict", "validate"}
+    "deserialize deserialize_many from_dict get_fields_and_field_types serialize serialize_many "
+    "to_arrow to_columns to_dict validate".split()
 )
 
 #: Names that no value of a field should have.

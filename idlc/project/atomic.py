@@ -23,20 +23,13 @@ _WAITED = 258
 PAUSES = (0.01, 0.05, 0.2, 0.5)
 
 
-def _kernel() -> Any:
-    import ctypes
-
-    kernel: Any = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined]
-    kernel.CreateMutexW.restype = ctypes.c_void_p
-    return kernel
-
-
 @contextlib.contextmanager
 def only_writer_on_windows() -> Iterator[bool]:
     """Wait until no other run writes, and keep others out; the lock ends with the process."""
     import ctypes
 
-    kernel = _kernel()
+    kernel: Any = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined]
+    kernel.CreateMutexW.restype = ctypes.c_void_p
     handle = ctypes.c_void_p(kernel.CreateMutexW(None, False, _MUTEX))
     # in short steps, between which Ctrl-C is heard
     while kernel.WaitForSingleObject(handle, 100) == _WAITED:
@@ -48,25 +41,17 @@ def only_writer_on_windows() -> Iterator[bool]:
         kernel.CloseHandle(handle)
 
 
-def replace_patiently(path: str, target: str) -> None:
-    """Move a file over another one; retry while another process has that open."""
-    for pause in PAUSES:
-        with contextlib.suppress(PermissionError):
-            os.replace(path, target)  # noqa: PTH105 - as everywhere in a transaction
-            return
-        time.sleep(pause)
-    os.replace(path, target)  # noqa: PTH105
-
-
 _WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
 
 
 def move_over(path: str, target: str) -> None:
-    """Move a file over another one."""
-    if sys.platform == "win32":
-        replace_patiently(path, target)
-    else:
-        os.replace(path, target)  # noqa: PTH105 - a Path costs as much as moving
+    """Move a file over another one; on Windows, retry while another process has that open."""
+    for pause in PAUSES if sys.platform == "win32" else ():
+        with contextlib.suppress(PermissionError):
+            os.replace(path, target)  # noqa: PTH105
+            return
+        time.sleep(pause)
+    os.replace(path, target)  # noqa: PTH105 - a Path costs as much as moving
 
 
 def create(path: str, data: bytes, how: int = os.O_TRUNC, *, sync: bool = False) -> None:

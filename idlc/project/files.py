@@ -33,7 +33,9 @@ def cache_folder() -> Path | None:
         if not _is_ours(existing):  # `sudo idlc` leaves nothing in another user's home
             return None
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        private = _is_ours(place) and not _is_open(place)
+        # on Windows, modes do not show who may write
+        is_open = sys.platform != "win32" and place.stat().st_mode & 0o022
+        private = _is_ours(place) and not is_open
         return place if private and os.access(place, os.W_OK) else None
     except OSError:
         return None
@@ -52,11 +54,6 @@ def _base() -> Path | None:
     except RuntimeError:
         return None
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-
-
-def _is_open(path: Path) -> bool:
-    """Return whether others may write; on Windows, modes do not show it."""
-    return sys.platform != "win32" and bool(path.stat().st_mode & 0o022)
 
 
 def _is_ours(path: Path) -> bool:
@@ -78,7 +75,8 @@ _SPECIAL = {
 }
 
 _READING = os.O_RDONLY | getattr(os, "O_BINARY", 0)
-_BYTE_ORDER_MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"))
+#: The byte order marks of UTF-16.
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 def is_file(path: str | Path) -> bool:
@@ -146,11 +144,9 @@ def content(path: str | Path, size: int, most: int = sys.maxsize) -> bytes:
 
 def too_large(name: str) -> Diagnostic:
     """Return the problem with a file of more than `MAX_SIZE` bytes."""
-    return codes.TOO_LARGE.of(
-        name,
-        f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is",
-        hint="is it another kind of file with this extension?",
-    )
+    message = f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is"
+    hint = "is it another kind of file with this extension?"
+    return codes.TOO_LARGE.of(name, message, hint=hint)
 
 
 def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
@@ -175,23 +171,17 @@ def decode(data: bytes, name: str, report: Report) -> Source | None:
 
 
 def _not_text(data: bytes, name: str, offset: int) -> Diagnostic:
-    for mark, encoding in _BYTE_ORDER_MARKS:
-        if data.startswith(mark):
-            return codes.NOT_TEXT.of(
-                name, f"this is {encoding}, not UTF-8", hint="save the file as UTF-8"
-            )
+    hint = "save the file as UTF-8"
+    if data.startswith(_UTF_16):
+        return codes.NOT_TEXT.of(name, "this is UTF-16, not UTF-8", hint=hint)
+    byte, number = f"0x{data[offset]:02X}", offset + 1
     if b"\0" in data[:4096]:
-        return codes.NOT_TEXT.of(
-            name,
-            f"this is a binary file: byte {offset + 1} is 0x{data[offset]:02X}, not UTF-8 text",
-        )
-    source = Source(name, data.decode("utf-8", errors="replace"))
+        message = f"this is a binary file: byte {number} is {byte}, not UTF-8 text"
+        return codes.NOT_TEXT.of(name, message)
     start = len(data[:offset].decode("utf-8"))
-    return codes.NOT_TEXT.at(
-        Span(source, start, start + 1),
-        f"byte 0x{data[offset]:02X} is not UTF-8 (byte {offset + 1} of the file)",
-        hint="save the file as UTF-8",
-    )
+    span = Span(Source(name, data.decode("utf-8", errors="replace")), start, start + 1)
+    message = f"byte {byte} is not UTF-8 (byte {number} of the file)"
+    return codes.NOT_TEXT.at(span, message, hint=hint)
 
 
 def read_source(path: Path, name: str, report: Report) -> Source | None:

@@ -21,53 +21,43 @@ from idlc.model.ir import Kind
 from idlc.project.files import entries, is_file, is_folder, kind_of, unreadable
 from idlc.project.root import MANIFEST, Root
 
+#: The names of each pattern, and the folder that the paths are relative to.
+_Patterns: TypeAlias = tuple[tuple[tuple[str, ...], ...], Path]
 
-class Exclusion(msgspec.Struct, frozen=True):
-    """Patterns such as `msg/ros1/**` or `old_*`, and the folder that their paths are relative to.
+
+class Exclusions(msgspec.Struct, frozen=True):
+    """Patterns such as `msg/ros1/**` or `old_*`, by the folder that their paths are relative to.
 
     `*` and `?` stand for any text within one name, `**` for any number of folders. A pattern may
     begin at any folder, and one that fits a folder leaves out everything in it.
     """
 
-    patterns: tuple[tuple[str, ...], ...] = ()
-    base: Path = Path("/")
+    parts: tuple[_Patterns, ...] = ()
 
     def has(self, path: str | Path) -> bool:
         """Return whether the file of an absolute path is left out."""
-        if not self.patterns:
-            return False
-        whole = Path(path)
-        below = self.base if whole.is_relative_to(self.base) else whole.anchor
-        names = whole.relative_to(below).parts
-        return any(_fits(pattern, names) for pattern in self.patterns)
-
-
-class Exclusions(msgspec.Struct, frozen=True):
-    """All that is left out."""
-
-    parts: tuple[Exclusion, ...] = ()
-
-    def has(self, path: str | Path) -> bool:
-        """Return whether the file of an absolute path is left out."""
-        return any(part.has(path) for part in self.parts)
+        for patterns, base in self.parts:
+            whole = Path(path)
+            names = whole.relative_to(base if whole.is_relative_to(base) else whole.anchor).parts
+            if any(_fits(pattern, names) for pattern in patterns):
+                return True
+        return False
 
     def seen_from(self, place: Path, top: Path) -> Exclusions:
         """Return the same for a copy of the folder `top` that lies in `place`."""
         return Exclusions(
             tuple(
-                msgspec.structs.replace(part, base=place / part.base.relative_to(top))
-                if part.base.is_relative_to(top)
-                else part
-                for part in self.parts
+                (patterns, place / base.relative_to(top) if base.is_relative_to(top) else base)
+                for patterns, base in self.parts
             )
         )
 
 
-def exclusion(patterns: Iterable[str], base: Path) -> Exclusion:
+def exclusion(patterns: Iterable[str], base: Path) -> Exclusions:
     """Return the exclusion by patterns that are written in the folder `base`."""
     split = (pattern.replace("\\", "/").split("/") for pattern in patterns)
     named = (tuple(name for name in names if name not in ("", ".")) for names in split)
-    return Exclusion(tuple(filter(None, named)), base)
+    return Exclusions(((tuple(filter(None, named)), base),))
 
 
 def _fits(pattern: tuple[str, ...], names: Iterable[str]) -> bool:
@@ -161,11 +151,9 @@ def no_interfaces(
     if exclude is not NOTHING and list_files((folder,), root, Report()).files:
         message = f"every interface file in `{folder}` is excluded"
         return codes.NO_INTERFACES.of(folder, message, hint="see `exclude` in [tool.idlc]")
-    return codes.NO_INTERFACES.of(
-        folder,
-        f"no {also}.msg, .srv or .action file in `{folder}`",
-        hint="interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself",
-    )
+    message = f"no {also}.msg, .srv or .action file in `{folder}`"
+    hint = "interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself"
+    return codes.NO_INTERFACES.of(folder, message, hint=hint)
 
 
 def list_files(
@@ -188,10 +176,16 @@ def list_files(
             if path.name == MANIFEST:
                 packages.setdefault(Path(whole).parent)
             elif path.suffix not in KINDS:
-                report.add(_unread(path))
+                extension = path.suffix.lower()
+                message = f"`{path.name}` is not read, because ROS 2 knows `{extension}` only"
+                hint = f"rename it to `{path.stem}{extension}`"
+                report.add(codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint))
             else:
                 has_files = True
-                by_path.setdefault(whole, _interface(path, whole, argument, root))
+                place, kind = Path(root.path(path)), KINDS[path.suffix]
+                home = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path takes as long again
+                file = InterfaceFile(place, path.as_posix(), kind, path.stem, argument, home)
+                by_path.setdefault(whole, file)
         if not has_files:
             empty.setdefault(argument)
     files = sorted(by_path.values(), key=lambda file: (file.shown, file.argument))
@@ -210,9 +204,9 @@ def _files_of(
         mode = os.stat(root.path(path)).st_mode  # noqa: PTH116 - no Path is needed
     except (OSError, ValueError) as error:
         problem = unreadable(argument, error)
-        report.add(
-            codes.CODES[problem.code].of(argument, problem.message, hint=_similar(path, root))
-        )
+        close = closest(path.name, [entry.name for entry in entries(Path(root.path(path.parent)))])
+        hint = f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+        report.add(codes.CODES[problem.code].of(argument, problem.message, hint=hint))
         return
     if stat.S_ISDIR(mode):
         yield from walk(path, root, report, folders)
@@ -223,27 +217,10 @@ def _files_of(
                 yield path / inside
     elif path.suffix not in KINDS or not stat.S_ISREG(mode):
         what = "" if stat.S_ISREG(mode) else f"{kind_of(mode)}, "
-        report.add(
-            codes.NOT_AN_INTERFACE.of(
-                argument, f"`{argument}` is {what}not a .msg, .srv or .action file"
-            )
-        )
+        message = f"`{argument}` is {what}not a .msg, .srv or .action file"
+        report.add(codes.NOT_AN_INTERFACE.of(argument, message))
     else:
         yield path
-
-
-def _unread(path: Path) -> Diagnostic:
-    extension = path.suffix.lower()
-    message = f"`{path.name}` is not read, because ROS 2 knows `{extension}` only"
-    hint = f"rename it to `{path.stem}{extension}`"
-    return codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint)
-
-
-def _interface(path: Path, whole: str, argument: str, root: Root) -> InterfaceFile:
-    kind = KINDS[path.suffix]
-    package = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
-    place = Path(root.path(path))
-    return InterfaceFile(place, path.as_posix(), kind, path.stem, argument, package)
 
 
 @lru_cache(maxsize=1024)
@@ -251,12 +228,6 @@ def root_of(folder: str) -> Path:
     """Return the parent of a folder for one kind of interface; any other folder itself."""
     path = Path(folder)
     return path.parent if path.name in KIND_FOLDERS else path
-
-
-def _similar(path: Path, root: Root) -> str | None:
-    names = (entry.name for entry in entries(Path(root.path(path.parent))))
-    close = closest(path.name, [*names])
-    return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
 
 
 def walk(
@@ -300,11 +271,8 @@ def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
     """Return whether `walk` would not reach a folder within another."""
     for name in inside:
         folder /= name
-        if (
-            name.startswith(".")
-            or name in SKIPPED
-            or any(is_file(folder / marker) for marker in CLOSING)
-        ):
+        is_closing = any(is_file(folder / marker) for marker in CLOSING)
+        if is_closing or name.startswith(".") or name in SKIPPED:
             return True
     return False
 

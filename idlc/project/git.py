@@ -48,14 +48,9 @@ _ENVIRONMENT = {
 }
 #: Variables that name a repository, as hooks of git have them: here, a path does.
 _ELSEWHERE = frozenset(
-    f"GIT_{name}"
-    for name in (
-        "DIR WORK_TREE COMMON_DIR INDEX_FILE OBJECT_DIRECTORY ALTERNATE_OBJECT_DIRECTORIES "
-        "NAMESPACE PREFIX"
-    ).split()
+    "GIT_DIR GIT_WORK_TREE GIT_COMMON_DIR GIT_INDEX_FILE GIT_OBJECT_DIRECTORY "
+    "GIT_ALTERNATE_OBJECT_DIRECTORIES GIT_NAMESPACE GIT_PREFIX".split()
 )
-_SHALLOW = "this clone is shallow: `git fetch --unshallow` completes it"
-_PARTIAL = "this clone is partial: `git fetch --refetch --no-filter` completes it"
 _NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
 _DAMAGED = "`git fsck` lists what is missing or damaged"
 #: Prefixes of git's error messages.
@@ -168,9 +163,9 @@ def _completing(top: Path) -> str:
     """Return the hint that completes a shallow or partial clone; empty for any other clone."""
     with suppress(GitError):
         if _git(top, ["rev-parse", "--is-shallow-repository"]).strip() == b"true":
-            return _SHALLOW
+            return "this clone is shallow: `git fetch --unshallow` completes it"
         _git(top, ["config", "--get-regexp", r"^remote\..*\.promisor$", "^true$"])
-        return _PARTIAL
+        return "this clone is partial: `git fetch --refetch --no-filter` completes it"
     return ""
 
 
@@ -282,7 +277,13 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
     """Write a commit's interface files, package.xml files and links; return all its entries."""
     listed = _git(top, ["ls-tree", "-r", "-z", "--full-tree", commit])
     *lines, rest = listed.split(b"\0")
-    entries = [_entry(line) for line in lines]
+    entries = []
+    for line in lines:
+        match = _ENTRY.fullmatch(line)
+        if match is None:
+            raise GitError("git's list of files is damaged")
+        path = match[3].decode("utf-8", "surrogateescape")
+        entries.append(_Entry(match[1], match[2], path))
     selected = [entry for entry in entries if _is_wanted(entry)]
     names = list(dict.fromkeys(entry.identity for entry in selected))
     contents = dict(zip(names, _contents(top, names), strict=True))
@@ -335,14 +336,6 @@ class _Entry(NamedTuple):
     mode: bytes
     identity: bytes
     path: str
-
-
-def _entry(line: bytes) -> _Entry:
-    """Return an entry of a tree."""
-    match = _ENTRY.fullmatch(line)
-    if match is None:
-        raise GitError("git's list of files is damaged")
-    return _Entry(match[1], match[2], match[3].decode("utf-8", "surrogateescape"))
 
 
 def _contents(top: Path, names: Sequence[bytes]) -> Iterator[bytes]:

@@ -156,25 +156,19 @@ class Inputs(msgspec.Struct, frozen=True):
 
 
 def load(
-    package: str,
-    files: Iterable[InterfaceFile],
-    home: Path,
-    root: Root,
-    report: Report,
+    package: str, files: Iterable[InterfaceFile], home: Path, root: Root, report: Report
 ) -> Inputs:
     """Read a package's files; report IDL609 for each duplicate."""
     loaded: dict[str, Input] = {}
     for file in files:
         first = loaded.get(file.key)
         if first is not None:
-            report.add(
-                codes.DUPLICATE_INTERFACE.of(
-                    file.shown,
-                    f"`{file.key}` is defined by `{first.file.shown}` as well",
-                    hint="a package can have only one interface of each kind and name; leave files "
-                    "out with --exclude, or `exclude` in [tool.idlc]",
-                )
+            message = f"`{file.key}` is defined by `{first.file.shown}` as well"
+            hint = (
+                "a package can have only one interface of each kind and name; leave files out "
+                "with --exclude, or `exclude` in [tool.idlc]"
             )
+            report.add(codes.DUPLICATE_INTERFACE.of(file.shown, message, hint=hint))
         elif (data := root.read_bytes(file.path, file.shown, report)) is not None:
             loaded[file.key] = Input(file, data)
     roots = dict.fromkeys(entry.file.root for entry in loaded.values())
@@ -216,13 +210,10 @@ def without_duplicates(
     for package_inputs in candidates:
         other = first.setdefault(package_inputs.package, package_inputs)
         if other is not package_inputs:
-            report.add(
-                codes.DUPLICATE_PACKAGE.of(
-                    root.shown(package_inputs.home),
-                    f"package `{package_inputs.package}` is in `{root.shown(other.home)}` as well",
-                    hint="remove one, or put a file COLCON_IGNORE into its folder",
-                )
-            )
+            home, elsewhere = root.shown(package_inputs.home), root.shown(other.home)
+            message = f"package `{package_inputs.package}` is in `{elsewhere}` as well"
+            hint = "remove one, or put a file COLCON_IGNORE into its folder"
+            report.add(codes.DUPLICATE_PACKAGE.of(home, message, hint=hint))
     return tuple(first.values())
 
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import closest, did_you_mean, including
 from idlc.model import catalog, derive, ir
@@ -36,12 +36,8 @@ class Folder:
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
-        direct = [
-            root
-            for root in (self._path / package, self._path / "share" / package)
-            if _has_interfaces(root)
-        ]
-        yield from direct or self._packages.get(package, [])
+        candidates = (self._path / package, self._path / "share" / package)
+        yield from list(filter(_has_interfaces, candidates)) or self._packages.get(package, [])
 
     def packages(self) -> Iterable[str]:
         """Return the names of the packages found in it."""
@@ -113,12 +109,9 @@ class Library:
     ) -> None:
         self.distro = distro
         self.texts = texts
-        places = [Folder(path, root) for path in folders]
         self._missing = [path for path in folders if not is_folder(Path(root.path(path)))]
-        self._places: tuple[Folder | Prefix, ...] = (
-            *places,
-            *(Prefix(path, distro) for path in prefixes.ament_prefixes()),
-        )
+        self._places: list[Folder | Prefix] = [Folder(path, root) for path in folders]
+        self._places += [Prefix(path, distro) for path in prefixes.ament_prefixes()]
         self._own = own or {}
         self._exclude = exclude
         self._root = root
@@ -136,12 +129,10 @@ class Library:
 
     def _roots(self, package: str) -> list[Path]:
         """Return the folders that may hold a package's interfaces, in order of precedence."""
-        roots = self._known.get(package)
-        if roots is None:
+        if package not in self._known:
             candidates = (root for place in self._places for root in place.roots(package))
-            roots = [*self._own.get(package, ()), *(root for root in candidates if is_folder(root))]
-            self._known[package] = roots
-        return roots
+            self._known[package] = [*self._own.get(package, ()), *filter(is_folder, candidates)]
+        return self._known[package]
 
     def path(self, name: ir.TypeName) -> Path | None:
         """Return the file of an interface on disk, or `None`."""
@@ -163,28 +154,21 @@ class Library:
         if name in self.texts:
             return self.texts[name]
         if name not in self._sources:
-            self._sources[name] = self._read(name)
+            problems = Report()
+            if path := self.path(name):
+                source = self._root.read_source(path, self._root.shown(path), problems)
+            else:
+                # generated code is the same for all: it has events where ROS 2 has none, too
+                of = DEFAULT if name == derive.SERVICE_EVENT_INFO else self.distro
+                source = catalog.source(name, of)
+            self._sources[name] = source, problems
         source, problems = self._sources[name]
         self._report.extend(problems)
         return source
 
-    def _read(self, name: ir.TypeName) -> tuple[Source | None, Report]:
-        problems = Report()
-        path = self.path(name)
-        if path is None:
-            return self._built_in(name), problems
-        return self._root.read_source(path, self._root.shown(path), problems), problems
-
-    def _built_in(self, name: ir.TypeName) -> Source | None:
-        # generated code is the same for all: it has events where ROS 2 has none, too
-        of = DEFAULT if name == derive.SERVICE_EVENT_INFO else self.distro
-        return catalog.source(name, of)
-
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
-        in_texts = [
-            name.name for name in self.texts if (name.package, name.kind) == (package, "msg")
-        ]
+        in_texts = [name for of, kind, name in self.texts if (of, kind) == (package, "msg")]
         on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
         return [*in_texts, *(on_disk or catalog.names(package, self.distro))]
 
@@ -201,19 +185,15 @@ class Library:
         """
         if not _NAME.fullmatch(package):
             return []
-        interfaces = self._listed.get(package)
-        if interfaces is None:
-            interfaces = self._listed[package] = self._list(package)
-        return interfaces
-
-    def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
-        exclude = self._excluded(package)
-        folders = self._own.get(package, ())
-        own = {interface for root in folders for interface in self._interfaces(root, exclude)}
-        if own:
-            return sorted(own)
-        roots = (self._interfaces(root, exclude) for root in self._roots(package))
-        return next(filter(None, roots), [])
+        if package not in self._listed:
+            exclude = self._excluded(package)
+            folders = self._own.get(package, ())
+            own = {interface for root in folders for interface in self._interfaces(root, exclude)}
+            self._listed[package] = sorted(own)
+            if not own:
+                others = (self._interfaces(root, exclude) for root in self._roots(package))
+                self._listed[package] = next(filter(None, others), [])
+        return self._listed[package]
 
     def home(self, package: str) -> Path | None:
         """Return the folder that a package's interfaces lie in; `None` if they are built in."""
@@ -239,18 +219,15 @@ class Library:
 
     def _interfaces(self, root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each interface file of a folder and of its folders for kinds."""
-        return sorted(
-            {
+        interfaces: set[tuple[ir.Kind, str]] = set()
+        for folder in (root, *(root / kind for kind in KIND_FOLDERS)):
+            new = (path for path in self._root.unsaved_below(folder) if path.parent == folder)
+            interfaces |= {
                 (KINDS[path.suffix], path.stem)
-                for folder in (root, *(root / kind for kind in KIND_FOLDERS))
-                for path in self._files(folder)
+                for path in (*new, *filter(is_file, entries(folder)))
                 if path.suffix in KINDS and not exclude.has(path)
             }
-        )
-
-    def _files(self, folder: Path) -> list[Path]:
-        new = [path for path in self._root.unsaved_below(folder) if path.parent == folder]
-        return new + [path for path in entries(folder) if is_file(path)]
+        return sorted(interfaces)
 
 
 _DIVIDER = re.compile(r"/|\.|::")
@@ -274,18 +251,17 @@ class ResolvedType(NamedTuple):
 
 def packages(scope: Scope, report: Report) -> list[Package]:
     """Return all packages in reach, including the packages below the base."""
-    library = _full_library(scope, report)
-    return [_package(name, library, scope.root) for name in library.packages()]
-
-
-def _package(name: str, library: Library, root: Root) -> Package:
-    home = library.home(name)
-    return Package(name, len(library.interfaces(name)), root.shown(home) if home else None)
+    library = _library(scope, report)
+    homes = ((name, library.home(name)) for name in library.packages())
+    return [
+        Package(name, len(library.interfaces(name)), scope.root.shown(home) if home else None)
+        for name, home in homes
+    ]
 
 
 def interfaces(requested: Sequence[str], scope: Scope, report: Report) -> list[str]:
     """Return the names of all interfaces of packages; reports IDL618."""
-    library = _full_library(scope, report)
+    library = _library(scope, report)
     listed = []
     for package in requested:
         names = [str(interface) for interface in library.interfaces(package)]
@@ -297,18 +273,10 @@ def interfaces(requested: Sequence[str], scope: Scope, report: Report) -> list[s
     return listed
 
 
-def _nearby_library(scope: Scope, report: Report) -> Library:
-    return Library(
-        scope.include,
-        scope.root,
-        report,
-        own=inputs.nearby_packages(scope.root),
-        distro=scope.distro,
-    )
-
-
-def _full_library(scope: Scope, report: Report) -> Library:
-    own = {**inputs.packages_below(scope.root), **inputs.nearby_packages(scope.root)}
+def _library(scope: Scope, report: Report, *, is_whole: bool = True) -> Library:
+    """Return the library of the packages nearby, and of all below the base if `is_whole`."""
+    below = inputs.packages_below(scope.root) if is_whole else {}
+    own = {**below, **inputs.nearby_packages(scope.root)}
     return Library(scope.include, scope.root, report, own=own, distro=scope.distro)
 
 
@@ -318,14 +286,23 @@ def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Res
     `package/kind/Name`, `package/Name` and `Name` mean one type, also with dots or `::`, and
     `package` means all of its interfaces. Folders below the base are searched last.
     """
-    library = _nearby_library(scope, report)
+    library = _library(scope, report, is_whole=False)
     types = _candidates(text, library)
     if not types:
-        library = _full_library(scope, Report())
+        library = _library(scope, Report())
         types = _candidates(text, library)
     if len(types) == 1 or text in library.packages():
         return library, types
-    report.add(_ambiguous(text, types) if types else _unknown_type(text, library, scope.root))
+    if types:
+        names = first_few((f"`{type_.name}`" for type_ in types), _LISTED)
+        message, hint = f"`{text}` may be {len(types)} types", f"name one of {names}"
+    else:
+        message = f"no such type: `{text}`"
+        if not _DIVIDER.search(text):
+            message = f"`{text}` is no file or folder, and no type or package that is known here"
+        similar = _similar(_DIVIDER.split(text), library, scope.root)
+        hint = similar or "`idlc list` shows what is known here"
+    report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
     return library, ()
 
 
@@ -362,40 +339,19 @@ def _resolved(name: ir.TypeName, library: Library) -> ResolvedType | None:
     return ResolvedType(name, interface)
 
 
-def _ambiguous(text: str, types: Sequence[ResolvedType]) -> Diagnostic:
-    names = first_few((f"`{type_.name}`" for type_ in types), _LISTED)
-    message = f"`{text}` may be {len(types)} types"
-    return codes.NO_SUCH_TYPE.of("", message, hint=f"name one of {names}")
-
-
-def _unknown_type(text: str, library: Library, root: Root) -> Diagnostic:
-    if not _DIVIDER.search(text):
-        message = f"`{text}` is no file or folder, and no type or package that is known here"
-    else:
-        message = f"no such type: `{text}`"
-    hint = _similar(_DIVIDER.split(text), library, root) or "`idlc list` shows what is known here"
-    return codes.NO_SUCH_TYPE.of("", message, hint=hint)
-
-
 def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
     """Return the hint with the closest name to a type's or package's."""
     if len(parts) == 1:
-        named = {interface.name: str(interface) for interface in _all(library)}
+        every = (name for package in library.packages() for name in library.interfaces(package))
+        named = {interface.name: str(interface) for interface in every}
         files = (path.name for path in entries(root.base))
         near = closest(parts[0], [*files, *named, *library.packages()])
         return f"did you mean `{named.get(near, near)}`?" if near else None
     package = closest(parts[0], library.packages()) or ""
     named = {interface.name: str(interface) for interface in library.interfaces(package)}
     if package == parts[0]:
-        near = closest(parts[-1], named)
-        return (
-            f"did you mean `{named[near]}`?" if near else f"`idlc list {package}` names its types"
-        )
-    if parts[-1] in named:
-        return f"did you mean `{named[parts[-1]]}`?"
-    return f"package `{parts[0]}` is not known: point -I to it, or source its workspace"
-
-
-def _all(library: Library) -> Iterator[ir.TypeName]:
-    for package in library.packages():
-        yield from library.interfaces(package)
+        near, hint = closest(parts[-1], named), f"`idlc list {package}` names its types"
+    else:
+        near = parts[-1] if parts[-1] in named else None
+        hint = f"package `{parts[0]}` is not known: point -I to it, or source its workspace"
+    return f"did you mean `{named[near]}`?" if near else hint

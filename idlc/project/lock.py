@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple, TypeAlias, TypeVar
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.model.ir import TypeName
 from idlc.model.names import is_package_name
@@ -81,21 +81,18 @@ class Tree:
 
     def _folder(self, path: str) -> Obstacle | bool:
         """Return whether a folder exists, or the obstacle in its place or above it."""
-        status = self._folders.get(path)
-        if status is None:
-            above = self._folder(path.rpartition("/")[0])
-            status = self._look(path) if above is True else above
+        if path not in self._folders:
+            status = self._folder(path.rpartition("/")[0])
+            if status is True:
+                try:
+                    mode = os.lstat(f"{self._root}/{path}").st_mode
+                    status = stat.S_ISDIR(mode) or Obstacle(_is(path, mode))
+                except FileNotFoundError:
+                    status = False
+                except OSError as error:
+                    status = Obstacle(f"`{path}` cannot be read: {reason(error)}")
             self._folders[path] = status
-        return status
-
-    def _look(self, path: str) -> Obstacle | bool:
-        try:
-            mode = os.lstat(f"{self._root}/{path}").st_mode
-        except FileNotFoundError:
-            return False
-        except OSError as error:
-            return Obstacle(f"`{path}` cannot be read: {reason(error)}")
-        return True if stat.S_ISDIR(mode) else Obstacle(_is(path, mode))
+        return self._folders[path]
 
 
 def _is(path: str, mode: int) -> str:
@@ -227,7 +224,14 @@ def load_lock(out: Path, name: str, report: Report) -> Lock | None:
     try:
         return decode(data)
     except ValueError as error:
-        report.add(_bad(shown, str(error)))
+        why = one_line(str(error))
+        hint = "upgrade idlc"
+        if "newer" not in why:
+            hint = (
+                "restore it from version control, or run again with --force, which keeps a copy "
+                "of every file that it replaces"
+            )
+        report.add(codes.BAD_LOCK.of(shown, f"`{shown}` cannot be used: {why}", hint=hint))
         return None
 
 
@@ -262,15 +266,3 @@ def decode(data: bytes) -> Lock:
         if not is_package_name(TypeName.parse(name).package):
             raise ValueError(f"it names what cannot be a package: {name}")
     return lock
-
-
-def _bad(shown: str, why: str) -> Diagnostic:
-    newer = "newer" in why
-    return codes.BAD_LOCK.of(
-        shown,
-        f"`{shown}` cannot be used: {one_line(why)}",
-        hint="upgrade idlc"
-        if newer
-        else "restore it from version control, or run again with --force, which keeps a copy "
-        "of every file that it replaces",
-    )

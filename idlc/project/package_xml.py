@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -114,13 +114,8 @@ DEPENDENCIES = (
 RANK = {tag: at for at, tag in enumerate((*HEAD, *DEPENDENCIES))}
 
 
-class NotXmlError(ValueError):
-    """The text is not XML; `line`, from 1, and `column`, from 0, are known unless `line` is 0."""
-
-    def __init__(self, message: str, line: int = 0, column: int = 0) -> None:
-        super().__init__(message)
-        self.line = line
-        self.column = column
+#: The errors of a text that is no XML, or in an unknown encoding.
+_NOT_XML = (expat.ExpatError, ValueError, LookupError)
 
 
 class Element(NamedTuple):
@@ -151,83 +146,63 @@ class Manifest(NamedTuple):
 
 
 def read(data: bytes, encoding: str | None = None) -> Manifest:
-    """Parse the bytes of a package.xml; raises NotXmlError.
+    """Parse the bytes of a package.xml; raises one of `_NOT_XML`.
 
     `encoding` overrides the file's own declaration.
     """
-    reader = _Reader(data, encoding)
-    try:
-        reader.parser.Parse(data, True)
-    except expat.ExpatError as error:
-        raise NotXmlError(str(error).partition(":")[0], error.lineno, error.offset) from error
-    except (ValueError, LookupError) as error:  # an unknown encoding
-        raise NotXmlError(str(error).partition(":")[0]) from error
-    return Manifest(
-        reader.format, tuple(sorted(reader.elements, key=lambda element: element.start))
-    )
+    format_ = ""
+    elements: list[Element] = []
+    tags: list[str] = []  # of the open elements
+    # start, attributes and texts of those among them that are at one of the depths to collect
+    begun: list[tuple[int, dict[str, str], list[str]]] = []
+    parser = expat.ParserCreate(encoding)
+    parser.buffer_text = True
 
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal format_
+        if not tags and tag == "package":
+            format_ = attributes.get("format", "1")
+        tags.append(tag)
+        if len(tags) in _DEPTHS:
+            begun.append((parser.CurrentByteIndex, attributes, []))
 
-class _Reader:
-    """Collects elements while expat reads.
-
-    `open` are the tags of the open elements, `begun` start, attributes and texts of those elements
-    among them that are at one of the depths to collect.
-    """
-
-    def __init__(self, data: bytes, encoding: str | None) -> None:
-        self.data = data
-        self.format = ""
-        self.elements: list[Element] = []
-        self.open: list[str] = []
-        self.begun: list[tuple[int, dict[str, str], list[str]]] = []
-        self.parser = expat.ParserCreate(encoding)
-        self.parser.buffer_text = True
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._text
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        if not self.open and tag == "package":
-            self.format = attributes.get("format", "1")
-        self.open.append(tag)
-        if len(self.open) in _DEPTHS:
-            self.begun.append((self.parser.CurrentByteIndex, attributes, []))
-
-    def _end(self, tag: str) -> None:
-        depth = len(self.open)
-        self.open.pop()
+    def end(tag: str) -> None:
+        depth = len(tags)
+        tags.pop()
         if depth in _DEPTHS:
-            start, attributes, texts = self.begun.pop()
-            if (parents := tuple(self.open)) in _PARENTS:
-                end = self.data.find(b">", self.parser.CurrentByteIndex) + 1
+            first, attributes, texts = begun.pop()
+            if (parents := tuple(tags)) in _PARENTS:
+                last = data.find(b">", parser.CurrentByteIndex) + 1
                 text = "".join(texts).strip()
-                self.elements.append(Element(parents, tag, text, start, end, attributes))
+                elements.append(Element(parents, tag, text, first, last, attributes))
 
-    def _text(self, text: str) -> None:
-        for _, _, texts in self.begun:
+    def add(text: str) -> None:
+        for _, _, texts in begun:
             texts.append(text)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = add
+    parser.Parse(data, True)
+    return Manifest(format_, tuple(sorted(elements, key=lambda element: element.start)))
 
 
 def statements(source: Source) -> tuple[Statement, ...]:
     """Return the statements of a package.xml, in order; empty if it is not XML."""
     data = source.text.encode("utf-8")
     try:
-        manifest = read(data, "utf-8")
-    except NotXmlError:
+        elements = read(data, "utf-8").elements
+    except _NOT_XML:
         return ()
-    return tuple(_placed(manifest.elements, source, data))
-
-
-def _placed(elements: Iterable[Element], source: Source, data: bytes) -> Iterator[Statement]:
     offsets = sorted({at for element in elements for at in (element.start, element.end)})
     characters = {0: 0}
     for before, at in zip([0, *offsets], offsets, strict=False):
         characters[at] = characters[before] + len(data[before:at].decode("utf-8"))
-    for element in elements:
-        start = characters[element.start]
-        span = Span(source, start, start + len(element.tag) + 2)
-        end = characters[element.end]
-        yield Statement(element.tag, element.text, span, end, element.attributes)
+    placed = []
+    for _, tag, text, first, end, attributes in elements:
+        start = characters[first]
+        span = Span(source, start, start + len(tag) + 2)
+        placed.append(Statement(tag, text, span, characters[end], attributes))
+    return tuple(placed)
 
 
 def declared_name(path: Path, root: Root, report: Report) -> str | None:
@@ -238,19 +213,14 @@ def declared_name(path: Path, root: Root, report: Report) -> str | None:
         return None
     try:
         declared = next(iter(read(data).texts("name")), "")
-    except NotXmlError as error:
+    except _NOT_XML as error:
         report.add(_broken(data, name, error))
         return None
     if not declared:
-        report.add(
-            codes.BAD_PACKAGE_XML.of(
-                name,
-                "no package name in this file",
-                hint="add `<name>my_package</name>` within `<package>`, or give --package NAME",
-            )
-        )
-        return None
-    return declared
+        message = "no package name in this file"
+        hint = "add `<name>my_package</name>` within `<package>`, or give --package NAME"
+        report.add(codes.BAD_PACKAGE_XML.of(name, message, hint=hint))
+    return declared or None
 
 
 def declared_version(path: Path) -> str:
@@ -260,19 +230,19 @@ def declared_version(path: Path) -> str:
 
 @lru_cache(maxsize=64)
 def _version(data: bytes) -> str:
-    with contextlib.suppress(NotXmlError):
+    with contextlib.suppress(*_NOT_XML):
         return next(iter(read(data).texts("version")), "")
     return ""
 
 
-def _broken(data: bytes, name: str, error: NotXmlError) -> Diagnostic:
-    message = f"not well-formed XML: {error}"
+def _broken(data: bytes, name: str, error: Exception) -> Diagnostic:
+    message = f"not well-formed XML: {str(error).partition(':')[0]}"
     hint = "fix the file, or give --package NAME"
-    if not error.line:
+    if not (isinstance(error, expat.ExpatError) and error.lineno):
         return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
     source = Source(name, data.decode("utf-8", errors="replace"))
-    line = min(error.line, len(source.line_starts))
-    start = min(source.line_starts[line - 1] + error.column, len(source.text))
+    line = min(error.lineno, len(source.line_starts))
+    start = min(source.line_starts[line - 1] + error.offset, len(source.text))
     return codes.BAD_PACKAGE_XML.at(Span(source, start, start + 1), message, hint=hint)
 
 
@@ -304,7 +274,7 @@ def add_dependencies(
     """
     try:
         manifest = read(text.encode("utf-8"), "utf-8")
-    except NotXmlError:
+    except _NOT_XML:
         manifest = Manifest("", ())
     own = set(manifest.texts("name"))
     if not own:

@@ -104,13 +104,10 @@ def distribution(prefixes: Iterable[Path] | None = None) -> Distribution:
     distributions = list(filter(None, map(installed, places)))
     requested = os.environ.get("ROS_DISTRO", "")
     if not distributions and requested:
-        return Distribution(
-            requested if requested in _BY_VERSION.values() else "", f"ROS_DISTRO={requested}"
-        )
-    chosen = [
-        candidate for candidate in distributions if candidate.name == requested
-    ] or distributions
-    return chosen[0] if chosen else Distribution(DEFAULT, "no ROS 2 is installed here")
+        name = requested if requested in _BY_VERSION.values() else ""
+        return Distribution(name, f"ROS_DISTRO={requested}")
+    first = next(iter(distributions), Distribution(DEFAULT, "no ROS 2 is installed here"))
+    return next((each for each in distributions if each.name == requested), first)
 
 
 def installed(prefix: Path) -> Distribution | None:

@@ -115,7 +115,8 @@ class Root:
     def locks(self, folder: Path) -> tuple[lock.Lock, ...]:
         """Return the locks of the generated packages in an absolute folder."""
         if folder not in self._locks:
-            self._locks[folder] = tuple(_locks(folder))
+            records = (lock.load_lock(place, "", Report()) for place in files.entries(folder))
+            self._locks[folder] = tuple(record for record in records if record is not None)
         return self._locks[folder]
 
 
@@ -127,9 +128,3 @@ def _nearest_manifest(folder: Path) -> Path | None:
         if os.path.exists(os.path.join(directory, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
             break
     return None
-
-
-def _locks(folder: Path) -> Iterator[lock.Lock]:
-    for package in files.entries(folder):
-        if (record := lock.load_lock(package, "", Report())) is not None:
-            yield record

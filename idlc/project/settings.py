@@ -9,15 +9,7 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import (
-    Annotated,
-    Any,
-    Literal,
-    NamedTuple,
-    TypeVar,
-    get_args,
-)
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
 
 import msgspec
 from msgspec import Meta
@@ -147,24 +139,14 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     check: Table = {}
 
 
-class Config(msgspec.Struct, frozen=True):
+class Config(Settings, frozen=True, kw_only=True):
     """The settings for the base of `root`, to which paths are relative; absent ones are empty.
 
-    `tables` holds the tables of single commands; `source` is the file, `folder` the file's folder,
-    to which `exclude` is relative.
+    `source` is the file, `folder` the file's folder, to which `exclude` is relative.
     """
 
     root: Root
-    paths: tuple[str, ...] = ()
-    out: str | None = None
-    package: str | None = None
-    include: tuple[str, ...] = ()
-    exclude: tuple[str, ...] = ()
-    runtime: Runtime | None = None
-    vendor_deps: bool | Literal["beside"] = False
     distro: tuple[str, ...] = ()
-    templates: str | None = None
-    tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
 
@@ -182,7 +164,7 @@ def load_settings(root: Root, report: Report) -> Config:
         path = folder / SETTINGS_FILE
         if root.is_file(path):
             return _read(path, root, report)
-    return Config(root)
+    return Config(root=root)
 
 
 def settings_here() -> tuple[Config, Report]:
@@ -194,19 +176,40 @@ def settings_here() -> tuple[Config, Report]:
 def _read(path: Path, root: Root, report: Report) -> Config:
     name = root.shown(path)
     data = root.read_bytes(path, name, report)
-    if data is None or b"idlc" not in data:
-        return Config(root)
-    source = decode(data, name, report)
+    source = decode(data, name, report) if data is not None and b"idlc" in data else None
     if source is None:
-        return Config(root)
+        return Config(root=root)
     try:
         document = toml(source.text)
     except ValueError as error:
         report.add(_broken(source, str(error)))
-        return Config(root)
+        return Config(root=root)
     tool = document.get("tool", {})
     table = tool.get("idlc", {}) if isinstance(tool, dict) else {}
-    return _checked(table, source, path.parent, root, report)
+    place = TableLocation(source, "tool.idlc", "[tool.idlc]")
+    if not isinstance(table, dict):
+        place.wrong("idlc", "`tool.idlc` must be a table", report)
+        return Config(root=root)
+    settings = read_table(table, Settings, place, report)
+    assert settings is not None
+    for url in settings.paths:
+        place.no_url("paths", url, report)
+    wanted = settings.distro
+    distros = split_names(wanted) if isinstance(wanted, str) else wanted
+    for name in distros:
+        if name and name not in BY_NAME:
+            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
+            place.wrong("distro", message, report, unknown_distro(name))
+    folder = path.parent
+    values = {
+        **msgspec.structs.asdict(settings),
+        "paths": tuple(_typed(folder, each, root) for each in settings.paths),
+        "out": settings.out and _typed(folder, settings.out, root),
+        "include": tuple(_typed(folder, each, root) for each in settings.include),
+        "distro": tuple(name for name in distros if name in BY_NAME),
+        "templates": settings.templates and _typed(folder, settings.templates, root),
+    }
+    return Config(root=root, source=source, folder=folder, **values)
 
 
 def toml(text: str) -> dict[str, Any]:
@@ -230,50 +233,11 @@ def _broken(source: Source, message: str) -> Diagnostic:
     if not place:
         return codes.BAD_CONFIG.at(Span(source, 0, len(source.text)), message)
     numbers = [int(number) for number in re.findall(r"\d+", place)]
+    start = len(source.text)
     if len(numbers) == 2 and numbers[0] <= len(source.line_starts):
         start = source.line_starts[numbers[0] - 1] + numbers[1] - 1
-    else:
-        start = len(source.text)
-    return codes.BAD_CONFIG.at(
-        Span(source, start, start + 1), f"not valid TOML: {text[:1].lower()}{text[1:]}"
-    )
-
-
-def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
-    """Return the settings in a table; report unknown ones and wrong types."""
-    place = TableLocation(source, "tool.idlc", "[tool.idlc]")
-    if not isinstance(table, dict):
-        place.wrong("idlc", "`tool.idlc` must be a table", report)
-        return Config(root)
-    settings = read_table(table, Settings, place, report)
-    assert settings is not None
-    for path in settings.paths:
-        place.no_url("paths", path, report)
-    return Config(
-        root,
-        paths=tuple(_typed(folder, path, root) for path in settings.paths),
-        out=_typed(folder, settings.out, root) if settings.out else None,
-        package=settings.package or None,
-        include=tuple(_typed(folder, path, root) for path in settings.include),
-        exclude=settings.exclude,
-        runtime=settings.runtime,
-        vendor_deps=settings.vendor_deps,
-        distro=_distros(settings.distro, place, report),
-        templates=_typed(folder, settings.templates, root) if settings.templates else None,
-        tables={"breaking": settings.breaking, "check": settings.check},
-        source=source,
-        folder=folder,
-    )
-
-
-def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:
-    """Return the names of distributions; report unknown ones."""
-    names = split_names(value) if isinstance(value, str) else value
-    for name in names:
-        if name and name not in BY_NAME:
-            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
-            place.wrong("distro", message, report, unknown_distro(name))
-    return tuple(name for name in names if name in BY_NAME)
+    span = Span(source, start, start + 1)
+    return codes.BAD_CONFIG.at(span, f"not valid TOML: {text[:1].lower()}{text[1:]}")
 
 
 def _typed(folder: Path, path: str, root: Root) -> str:
@@ -286,13 +250,13 @@ def _typed(folder: Path, path: str, root: Root) -> str:
 
 
 def command_table(
-    config: Config, name: str, shape: type[_Shape], report: Report
+    config: Config, name: Literal["breaking", "check"], shape: type[_Shape], report: Report
 ) -> tuple[_Shape, TableLocation | None]:
     """Return the table of a command and its place, without one where there is no file."""
     if config.source is None:
         return shape(), None
     place = TableLocation(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
-    table = read_table(config.tables.get(name, {}), shape, place, report)
+    table = read_table(getattr(config, name), shape, place, report)
     assert table is not None
     return table, place
 
@@ -316,7 +280,7 @@ class Scope(msgspec.Struct, frozen=True):
     @property
     def distro(self) -> Distro:
         """The distribution that files are read for where that is one."""
-        return self.distros[0] if self.distros else _installed()
+        return self.distros[0] if self.distros else BY_NAME.get(distribution().name, DEFAULT)
 
 
 def scope(
@@ -327,16 +291,16 @@ def scope(
     distro: str | None = None,
 ) -> Scope:
     """Combine options of the command line with settings; `distro` is a list with commas."""
-    left_out = [exclusion(exclude, settings.root.base)] if exclude else []
+    left_out = exclusion(exclude, settings.root.base).parts if exclude else ()
     if settings.exclude and settings.folder is not None:
-        left_out.append(exclusion(settings.exclude, settings.folder))
+        left_out += exclusion(settings.exclude, settings.folder).parts
     return Scope(
         settings.root,
-        package or settings.package,
+        package or settings.package or None,
         (*include, *settings.include),
-        Exclusions(tuple(left_out)),
+        Exclusions(left_out),
         settings.paths,
-        settings.out,
+        settings.out or None,
         _distros_named(split_names(distro) if distro else settings.distro),
     )
 
@@ -344,8 +308,3 @@ def scope(
 def _distros_named(names: Sequence[str]) -> tuple[Distro, ...]:
     """Return the distributions with these names, each once."""
     return tuple(dict.fromkeys(BY_NAME[name] for name in names))
-
-
-def _installed() -> Distro:
-    """Return the distribution that is installed here, or the default for an unknown one."""
-    return BY_NAME.get(distribution().name, DEFAULT)

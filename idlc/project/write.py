@@ -143,11 +143,9 @@ def plan(
 
 
 def _in_the_way(shown_path: str, obstacle: Obstacle) -> Diagnostic:
-    return codes.FOREIGN_FILE.of(
-        shown_path,
-        f"cannot write `{shown_path}`: {obstacle.what}",
-        hint="move it away, or write to another folder",
-    )
+    message = f"cannot write `{shown_path}`: {obstacle.what}"
+    hint = "move it away, or write to another folder"
+    return codes.FOREIGN_FILE.of(shown_path, message, hint=hint)
 
 
 def _refusal(path: str, change: Change, force: bool | None, *, in_full: bool) -> Diagnostic:
@@ -171,16 +169,11 @@ def difference(old: bytes, new: bytes) -> Iterator[str]:
     """Yield a unified diff from the file on disk to idlc's, cut when long."""
     import difflib
 
-    lines = list(
-        difflib.unified_diff(_lines(old), _lines(new), "on disk", "from idlc", lineterm="", n=1)
-    )
+    before, after = (data.decode("utf-8", errors="replace").splitlines() for data in (old, new))
+    lines = [*difflib.unified_diff(before, after, "on disk", "from idlc", lineterm="", n=1)]
     yield from lines[:DIFF_LINES]
     if len(lines) > DIFF_LINES:
         yield f"… and {len(lines) - DIFF_LINES} more lines"
-
-
-def _lines(data: bytes) -> list[str]:
-    return data.decode("utf-8", errors="replace").splitlines()
 
 
 def owned_files(outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
@@ -193,10 +186,6 @@ def owned_files(outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
         for path, digests in outputs.items()
         if may_be_own(path) and isinstance(digests, str)
     }
-
-
-def _stages(folder: Path) -> list[Path]:
-    return [path for path in entries(folder) if path.name.startswith(STAGE.removesuffix("new"))]
 
 
 def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -> bool:
@@ -242,16 +231,16 @@ def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]
             if old is not None and ownership is Ownership.OWN:
                 digests[path] = f"{digests.get(path, '')} {digest(old)}".lstrip()
         first = render(digests)
-    records = ((plan.recorded, first), (first, final))
-    before, after = ([Change(plan.record, *each)] if each[0] != each[1] else [] for each in records)
-    return [*before, *changes, *after]
+    before, after = Change(plan.record, plan.recorded, first), Change(plan.record, first, final)
+    return [each for each in (before, *changes, after) if each.old != each.new]
 
 
 def sweep(folder: Path) -> None:
     """Remove the drafts that killed runs left in a folder, if no other run can be at work."""
     with exclusive(folder) as is_locked:
-        for stage in _stages(folder) if is_locked else ():
-            _remove(stage)
+        for path in entries(folder) if is_locked else ():
+            if path.name.startswith(STAGE.removesuffix("new")):
+                _remove(path)
 
 
 def _remove(stage: Path) -> None:
@@ -277,7 +266,15 @@ class _Transaction:
     def run(self, changes: list[Change], name: str, report: Report) -> bool:
         """Make all changes, in order, or none; report IDL612."""
         try:
-            self._write_drafts(changes)
+            make_folder(self._stage.parent, self._created)
+            self._stage.mkdir()
+            self._created.append(self._stage)
+            for number, change in enumerate(changes):
+                if change.new is not None:
+                    self._current = change.path
+                    # only the record must be on the disk when the others move
+                    is_record = change.path == self._record
+                    create(f"{self._stage}/{number}", change.new, sync=is_record)
             with uninterrupted():
                 for number, change in enumerate(changes):
                     self._current = change.path
@@ -297,16 +294,6 @@ class _Transaction:
             return False
         self._tidy(changes)
         return True
-
-    def _write_drafts(self, changes: list[Change]) -> None:
-        make_folder(self._stage.parent, self._created)
-        self._stage.mkdir()
-        self._created.append(self._stage)
-        for number, change in enumerate(changes):
-            if change.new is not None:
-                self._current = change.path
-                # only the record must be on the disk when the others move
-                create(f"{self._stage}/{number}", change.new, sync=change.path == self._record)
 
     def _make(self, change: Change, draft: str) -> None:
         path, old, new, ownership = change

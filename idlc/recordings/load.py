@@ -212,7 +212,7 @@ def _models_of(
     what: str, include: tuple[str, ...], distro: str | None, report: Report
 ) -> tuple[Models, Iterable[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
-    where = scope(Config(Root.here()), None, include, distro=distro)
+    where = scope(Config(root=Root.here()), None, include, distro=distro)
     if is_recording(what, where.root):
         groups = versions(topics_of([what], (), where.root, report) or ())
         check_versions(groups, report)

@@ -185,7 +185,7 @@ class Project:
 def templates(settings: Settings, report: Report) -> Templates:
     """Return idlc's templates, where templates in the user's folder replace them."""
     folder = settings.templates or load_settings(settings.root, report).templates
-    if folder is None:
+    if not folder:
         return Templates()
     user_templates = Templates(read(folder, settings.root, report))
     user_templates.check(report)

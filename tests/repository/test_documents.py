@@ -133,7 +133,7 @@ def test_these_are_the_settings(name, complaints):
 
 def test_the_defaults_of_settings():
     for key, (_, default) in table("tool.idlc").items():
-        value = getattr(Config(Root.here()), key.replace("-", "_"))
+        value = getattr(Config(root=Root.here()), key.replace("-", "_"))
         assert default == ("false" if value is False else "none")
         assert not value
     (listed,) = re.findall(r"Only if it is selected idlc gives (.*?)\.\n", SETTINGS, re.DOTALL)
