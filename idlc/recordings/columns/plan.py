@@ -158,10 +158,7 @@ Wanted = dict[str, Any] | None
 NOTHING: dict[str, Any] = {}
 
 #: Times that can become numpy's: by their type, what numpy calls the result.
-INSTANTS = {
-    "builtin_interfaces/msg/Time": "M8[ns]",
-    "builtin_interfaces/msg/Duration": "m8[ns]",
-}
+INSTANTS = {"builtin_interfaces/msg/Time": "M8[ns]", "builtin_interfaces/msg/Duration": "m8[ns]"}
 
 
 @lru_cache(maxsize=64)
