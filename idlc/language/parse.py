@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: The characters that end a line, as `str.splitlines` has it (language 1.1).
 LINE_ENDS = "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
+#: Types of at most so many characters are parsed once: most files share a few.
+COMMON = 200
 
 
 @lru_cache(maxsize=1)
@@ -72,20 +74,21 @@ def parse_any(source: Source) -> tree.File | idl.IdlFile:
 
 def parse_definition(text: str) -> tree.Body:
     """Return the definition on one line; `text` is a `Line.definition` and not empty."""
-    type_, space, rest = text.partition(" ")
-    if text[0].isspace() or not space or not _type_pattern().fullmatch(type_):
-        return _fault(text, type_)
+    word, space, rest = text.partition(" ")
+    type_ = (_type if len(word) > COMMON else _common_type)(word) if space else None
+    if type_ is None:
+        return _fault(text, word)
     rest = rest.lstrip()
     at = len(text) - len(rest)
     name, equals, value = rest.partition("=")
     if equals:
         value = value.lstrip()
         pieces = tree.Piece(name.rstrip(), at), tree.Piece(value, len(text) - len(value))
-        return tree.Constant(_type(type_), *pieces)
+        return tree.Constant(type_, *pieces)
     name, _, value = rest.partition(" ")
     value = value.lstrip()
     default = tree.Piece(value, len(text) - len(value)) if value else None
-    return tree.Field(_type(type_), tree.Piece(name, at), default)
+    return tree.Field(type_, tree.Piece(name, at), default)
 
 
 @lru_cache(maxsize=1)
@@ -94,7 +97,9 @@ def _type_pattern() -> re.Pattern[str]:
     return re.compile(rf"{name}(?:<={size})?(?:\[(?:(?:<=)?{size})?\])?")
 
 
-def _type(text: str) -> tree.Type:
+def _type(text: str) -> tree.Type | None:
+    if not _type_pattern().fullmatch(text):
+        return None
     element, _, size = text.partition("[")
     name, _, bound = element.partition("<=")
     at_most = size.startswith("<=")
@@ -108,6 +113,9 @@ def _type(text: str) -> tree.Type:
         at_most,
         tree.Piece(size, len(text) - 1 - len(size)) if size else None,
     )
+
+
+_common_type = lru_cache(maxsize=512)(_type)
 
 
 def _fault(text: str, type_: str) -> tree.Fault:

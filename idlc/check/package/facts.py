@@ -42,7 +42,9 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
     records = {file: load_lock(file.parent, "", Report()) for file in files if file.name == FILE}
     locks = {file: record for file, record in records.items() if record}
     interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
-    checked = {entry.file.path.resolve() for entry in package.files}
+    checked = {root.absolute(entry.file.path) for entry in package.files}
+    if others := {file.resolve() for file in interfaces if file not in checked}:
+        others -= {file.resolve() for file in checked}
     generated = {at.parent / path for at, record in locks.items() for path in record.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
     commands = calls(cmake) if cmake else ()
@@ -66,7 +68,7 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         # other interfaces are for tests of the package's own
         generates=any("SKIP_INSTALL" not in command.words for command in generating),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=bool(checked) and checked.issuperset(file.resolve() for file in interfaces),
+        whole=bool(checked) and not others,
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
             GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
