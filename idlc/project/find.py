@@ -271,8 +271,8 @@ def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
     """Return whether `walk` would not reach a folder within another."""
     for name in inside:
         folder /= name
-        is_closing = any(is_file(folder / marker) for marker in CLOSING)
-        if is_closing or name.startswith(".") or name in SKIPPED:
+        is_skipped = name.startswith(".") or name in SKIPPED
+        if is_skipped or any(is_file(folder / marker) for marker in CLOSING):
             return True
     return False
 
