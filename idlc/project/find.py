@@ -64,6 +64,8 @@ def _fits(pattern: tuple[str, ...], names: Iterable[str]) -> bool:
     """Return whether a pattern fits a file or a folder above it, from any folder on."""
     reached = _with_none(pattern, {0})
     for name in names:
+        if len(pattern) in reached:
+            break
         after = {0}
         for place in reached:
             if pattern[place] == "**":
@@ -71,9 +73,7 @@ def _fits(pattern: tuple[str, ...], names: Iterable[str]) -> bool:
             elif fnmatchcase(name, pattern[place]):
                 after.add(place + 1)
         reached = _with_none(pattern, after)
-        if len(pattern) in reached:
-            return True
-    return False
+    return len(pattern) in reached
 
 
 def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
@@ -271,8 +271,8 @@ def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
     """Return whether `walk` would not reach a folder within another."""
     for name in inside:
         folder /= name
-        is_closing = any(is_file(folder / marker) for marker in CLOSING)
-        if is_closing or name.startswith(".") or name in SKIPPED:
+        is_skipped = name.startswith(".") or name in SKIPPED
+        if is_skipped or any(is_file(folder / marker) for marker in CLOSING):
             return True
     return False
 

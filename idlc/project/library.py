@@ -189,10 +189,9 @@ class Library:
             exclude = self._excluded(package)
             folders = self._own.get(package, ())
             own = {interface for root in folders for interface in self._interfaces(root, exclude)}
-            self._listed[package] = sorted(own)
-            if not own:
-                others = (self._interfaces(root, exclude) for root in self._roots(package))
-                self._listed[package] = next(filter(None, others), [])
+            roots = () if own else self._roots(package)
+            others = (self._interfaces(root, exclude) for root in roots)
+            self._listed[package] = sorted(own) or next(filter(None, others), [])
         return self._listed[package]
 
     def home(self, package: str) -> Path | None:

@@ -83,13 +83,14 @@ def node_entry(
     )
     edits: dict[str, Outcome] = {path: outcome, MANIFEST: manifest}
     # files that nodes need beside them
-    added = {f"{node.package}/__init__.py": ""}
-    added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja", templates)
-    added = {path: text for path, text in added.items() if path not in texts}
+    added = {} if f"{node.package}/__init__.py" in texts else {f"{node.package}/__init__.py": ""}
+    if CONFTEST not in texts:
+        added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja", templates)
     if not launch:
         return Entry(added, edits)
     file = next((name for name in texts if name.startswith("launch/")), "")
-    old = texts.get(file) or rendered_for(node.package, "package/launch.py.jinja", templates)
+    template = "package/launch.py.jinja"
+    old = texts[file] if file else rendered_for(node.package, template, templates)
     started = launch_py.add_node(old, launch_py.Started(node.package, node.name, node.lifecycle))
     path = file or f"launch/{node.package}_launch.py"
     if isinstance(started, Refused):

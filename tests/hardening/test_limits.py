@@ -367,6 +367,14 @@ def test_a_package_xml_of_many_tags_is_read_soon(text, here):
         assert status == 0, f"{words}: {out[:300]}"
 
 
+def test_a_cmake_file_of_many_lists_is_read_soon(here):
+    lists = numbered("set(v@ std_msgs)\nlist(APPEND w@ std_msgs)", 60_000)
+    words = numbered("${v@}", 60_000)
+    text = f"{lists}rosidl_generate_interfaces(p {A} DEPENDENCIES {words})"
+    make(here / "pkg", {**xml(1, ""), A: "int8 x\n", "CMakeLists.txt": text})
+    limited([["check", "pkg"]])
+
+
 LARGE = {
     "100 MB": (None, "IDL604", "larger than 16 MiB"),
     "lines": ("\n" * 600_000, "IDL604", "more than 500,000 lines"),

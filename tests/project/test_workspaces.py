@@ -227,6 +227,7 @@ def test_what_is_excluded_cannot_be_used():
         ("msg/*.msg", "msg/A.msg", True),
         ("msg/*.msg", "msg/ros1/A.msg", False),
         ("**/ros1/*", "msg/ros1/A.msg", True),
+        ("**", "msg/A.msg", True),
         ("a/**/A.msg", "a/A.msg", True),
         ("a/**/A.msg", "a/b/c/A.msg", True),
         ("a/**/A.msg", "b/A.msg", False),

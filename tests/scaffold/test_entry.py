@@ -2,6 +2,7 @@
 
 import pytest
 
+from idlc.diagnostics.source import Source
 from idlc.project.edits import Edited, Refused
 from idlc.scaffold import new_node, spec
 from idlc.scaffold.roles import ROLES
@@ -63,6 +64,21 @@ def test_what_cannot_be_edited_is_refused_but_for_the_launch_file():
     ((path, note),) = entry.notes
     assert path == "launch/some.launch.py"
     assert "Node(package='demo', executable='heart', output='screen')" in note
+
+
+def test_an_empty_launch_file_stays_as_the_user_left_it():
+    entry = entered({**TEXTS, "launch/demo_launch.py": ""})
+    assert "launch/demo_launch.py" not in {**entry.added, **entry.edits}
+    ((path, note),) = entry.notes
+    assert path == "launch/demo_launch.py"
+    assert "is not edited" in note
+
+
+def test_no_template_is_rendered_for_a_file_that_is_there():
+    broken = Source("conftest.py.jinja", "{{ package.nothing }}")
+    templates = Templates({"package/conftest.py.jinja": broken})
+    texts = {**TEXTS, "test/conftest.py": "# mine\n"}
+    assert "test/conftest.py" not in new_node.node_entry(heart(), texts, templates).added
 
 
 @pytest.mark.parametrize(

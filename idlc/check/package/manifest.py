@@ -218,7 +218,7 @@ def listed_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     (call,) = generating
     sets = [command for command in commands if command.name == "set" and command.words]
     lists = {command.words[0]: command for command in sets}
-    grown = [command.words[1:2] for command in commands if command.name == "list"]
+    grown = {command.words[1:2] for command in commands if command.name == "list"}
     count = len(call.words)
     first = call.words.index(_KEYWORD) + 1 if _KEYWORD in call.words else count
     end = next((at for at in range(first, count) if call.words[at] in _OPTIONS), count)
