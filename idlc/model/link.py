@@ -367,9 +367,14 @@ class _UnknownTypes:
         self._library = library
         self._hints = SUGGESTIONS
         self._messages: dict[str, set[str]] = {}
-        for name in interfaces:
+        #: By package and name in lower case, the first file whose name is not that of a message.
+        self._misnamed: dict[tuple[str, str], str] = {}
+        for name in sorted(interfaces):
             mine = self._messages.setdefault(name.package, set())
-            mine |= {name.name} if name.kind == "msg" else set()
+            if name.kind == "msg" and names.is_message_name(name.name):
+                mine.add(name.name)
+            elif name.kind == "msg":
+                self._misnamed.setdefault((name.package, name.name.lower()), name.name)
 
     def problem(self, target: ir.TypeName, span: Span) -> Diagnostic:
         """Return the problem with a reference to `target`."""
@@ -397,16 +402,15 @@ class _UnknownTypes:
         name, package, distro = target.name, target.package, self._library.distro
         if not qualified and (hint := self._in_other_package(name)):
             return hint
-        own = self._messages.get(package, set())
-        for other_name in sorted(own):
-            if other_name.lower() == name.lower() and not names.is_message_name(other_name):
-                return f"rename `{other_name}.msg` to `{name}.msg`"
+        if misnamed := self._misnamed.get((package, name.lower())):
+            return f"rename `{misnamed}.msg` to `{name}.msg`"
         if hint := _of_others(target):
             return hint
         messages = set(self._library.names(package))
-        candidates = {*filter(names.is_message_name, own), *messages, *_PRIMITIVES}
-        if self._hints >= 0 and (hint := did_you_mean(name, candidates)):
-            return hint
+        if self._hints >= 0:
+            candidates = {*self._messages.get(package, ()), *messages, *_PRIMITIVES}
+            if hint := did_you_mean(name, candidates):
+                return hint
         if messages and messages == set(catalog.names(package, distro)):
             return (
                 f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`;"

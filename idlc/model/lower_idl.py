@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import msgspec
-from lark import Token, Transformer, v_args
+from lark import Token, Transformer, Tree, v_args
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
@@ -33,12 +33,17 @@ _DUMMY = (ir.DUMMY_FIELD, ir.Primitive("uint8"))
 
 
 class _Value(NamedTuple):
-    """A number, `TRUE` or `FALSE` as written; or texts in quotes, joined."""
+    """A number, `TRUE` or `FALSE` as written; or texts in quotes, one after the other."""
 
-    words: str
+    texts: tuple[str, ...]
     is_text: bool
     start: int
     end: int
+
+    @property
+    def words(self) -> str:
+        """The texts as one."""
+        return "".join(self.texts)
 
 
 class _Type(NamedTuple):
@@ -63,7 +68,12 @@ def _parameter(annotations: Iterable[_Annotation], name: str, key: str) -> _Valu
 
 def _comment(annotations: Iterable[_Annotation]) -> tuple[str, ...]:
     value = _parameter(annotations, "verbatim", "text")
-    return tuple(value.words.split("\n")) if value else ()
+    if value is None:
+        return ()
+    # a text for each line, which may spell a line end by an escape, and line ends between them
+    if len(value.texts) % 2 and {*value.texts[1::2]} <= {"\n"}:
+        return value.texts[::2]
+    return tuple(value.words.split("\n"))
 
 
 def _inside(literal: str) -> str:
@@ -74,7 +84,7 @@ def _inside(literal: str) -> str:
 
 
 def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
-    """Return the value of `@default` or of a constant; a fault's offsets count from its start."""
+    """Return the value of `@default` or of a constant, or its fault, which is all of it."""
     words = value.words
     if not value.is_text and isinstance(type_, ir.Primitive):
         return lower_values.default(type_, words)
@@ -88,7 +98,7 @@ def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
             wrong = lower_values.wrong_length(type_, len(values), words)
             return wrong or ir.Default(values, words)
     message = f"this is no value of type `{ir.spell(type_)}`"
-    return Fault(codes.BAD_VALUE, message, 0, value.end - value.start)
+    return Fault(codes.BAD_VALUE, message, 0, 0)
 
 
 def _fits(type_: ir.Element, value: object) -> bool:
@@ -111,11 +121,16 @@ def lower_idl(file: IdlFile, names: Sequence[ir.TypeName], report: Report) -> li
     """Return the structures of these names from a file, which must hold no others."""
     lowering = _Lowering(file.source, names, report)
     if file.broken is None:
-        lowering.transform(file.tree)
+        # a definition of a type may come after its uses
+        parts = sorted(file.tree.children, key=lambda part: getattr(part, "data", "") != "typedef")
+        lowering.transform(Tree("file", parts))
     else:
         word = f"`{file.broken.text}`" if file.broken.text else "this end of the text"
         lowering.foreign(file.broken, word)
-    return [*lowering.messages.values()]
+    return [
+        msgspec.structs.replace(message, constants=tuple(lowering.constants_of[name]))
+        for name, message in lowering.messages.items()
+    ]
 
 
 @v_args(inline=True)
@@ -125,6 +140,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
     def __init__(self, source: Source, names: Sequence[ir.TypeName], report: Report) -> None:
         super().__init__()
         self.messages = {name.name: ir.Message(name=name, source=source) for name in names}
+        self.constants_of: dict[str, list[ir.Constant]] = {name.name: [] for name in names}
         self._source = source
         self._top = names[0]
         self._report = report
@@ -136,6 +152,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         package, kind = (piece(part) for part in parts if isinstance(part, Token))
         for name, written in ((package, self._top.package), (kind, self._top.kind)):
             if name.text != written:
+                self._strange = True
                 self.foreign(name, f"module `{name.text}` for `{self._top}`")
         for missing in () if self._strange else self._missing:
             self.foreign(kind, f"a module without `{missing}`")
@@ -148,7 +165,9 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
                 type_ = ir.Unknown()
             else:
                 type_ = ir.Array(type_, length)
-        self._typedefs[str(name)] = _Type(type_, target.piece)
+        if self._typedefs.get(str(name), target._replace(type=type_)).type != type_:
+            self.foreign(piece(name), f"a second `{name}`")
+        self._typedefs[str(name)] = target._replace(type=type_)
 
     def sequence(self, element: _Type, bound: Token | None = None) -> _Type:
         if isinstance(element.type, (ir.Array, ir.Sequence)):
@@ -183,8 +202,8 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
 
     def value(self, *tokens: Token) -> _Value:
         is_text = tokens[0].type == "STRING"
-        words = "".join(map(_inside, tokens)) if is_text else str(tokens[0])
-        return _Value(words, is_text, piece(tokens[0]).start, piece(tokens[-1]).end)
+        texts = tuple(map(_inside if is_text else str, tokens))
+        return _Value(texts, is_text, piece(tokens[0]).start, piece(tokens[-1]).end)
 
     def struct(self, *parts: Any) -> None:
         at = next(i for i, part in enumerate(parts) if isinstance(part, Token))
@@ -202,9 +221,8 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
 
     def constants(self, token: Token, *constants: ir.Constant | None) -> None:
         name = token.removesuffix(_CONSTANTS)
-        if message := self._message(token, name):
-            every = (*message.constants, *filter(None, constants))
-            self.messages[name] = msgspec.structs.replace(message, constants=every)
+        if self._message(token, name):
+            self.constants_of[name] += filter(None, constants)
 
     def member(self, *parts: Any) -> ir.Field:
         *annotations, (type_, at), token = parts
@@ -240,8 +258,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
             name_span=self._span(name),
         )
 
-    def foreign(self, part: Piece, subject: str) -> None:
-        self._strange = True
+    def foreign(self, part: Piece | _Value, subject: str) -> None:
         message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
         hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
         self._report.add(codes.FOREIGN_IDL.at(self._span(part), message, hint=hint))
@@ -250,11 +267,12 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         span = Span(self._source, fault.start, fault.end)
         self._report.add(fault.code.at(span, fault.message, hint=fault.hint))
 
-    def _span(self, part: Piece) -> Span:
+    def _span(self, part: Piece | _Value) -> Span:
         return Span(self._source, part.start, part.end)
 
     def _message(self, token: Token, name: str) -> ir.Message | None:
         if name not in self.messages:
+            self._strange = True
             self.foreign(piece(token), f"`{token}` among the parts of `{self._top}`")
         return self.messages.get(name)
 
@@ -283,11 +301,11 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
     def _default(self, type_: ir.FieldType, value: _Value) -> ir.Default | None:
         element = ir.element_of(type_)
         if isinstance(element, ir.Ref):
-            self.foreign(Piece(value.words, value.start), "a default for a message")
+            self.foreign(value, "a default for a message")
         if isinstance(element, (ir.Ref, ir.Unknown)):
             return None
         lowered = _default(type_, value)
         if isinstance(lowered, Fault):
-            self._fault(lowered.moved(value.start))
+            self._fault(msgspec.structs.replace(lowered, start=value.start, end=value.end))
             return None
         return lowered

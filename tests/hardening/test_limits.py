@@ -77,6 +77,7 @@ def xml(count, text):
 MANY_PROBLEMS = {
     "duplicates": lambda n: {A: "int32 x\n" * n},
     "unknown types": lambda n: {A: numbered("Foo@ f@", n)},
+    "unknown types, many files": lambda n: {**numbered_files(n), A: numbered("Foo@ f@", 20 * n)},
     "unknown packages": lambda n: {A: numbered("foo@_msgs/Foo f@", n)},
     "unknown names": lambda n: {A: numbered("foo@ f@", n)},
     "broken lines": lambda n: {A: numbered("f[@ a", n)},

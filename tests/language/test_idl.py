@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from time import process_time
 
 import pytest
 from hypothesis import given
@@ -99,7 +100,12 @@ def test_other_idl_is_refused_at_its_first_place(inside, guilty):
         ('struct Example { @default (value="(1, 2)") sequence<bool> a; };', ("IDL114", "bool")),
         ('struct Example { @default (value="(1, 2)") sequence<boolean> a; };', ("IDL304", None)),
         ('struct Example { @default (value="(1, 2") sequence<int8> a; };', ("IDL304", None)),
-        ('struct Example { @default (value="(1, 2)") sequence<int8, 1> a; };', ("IDL309", None)),
+        (
+            'struct Example { @default (value="(1, 2)") sequence<int8, 1> a; };',
+            ("IDL309", '"(1, 2)"'),
+        ),
+        ('struct Example { @default (value="a" "b") string<1> a; };', ("IDL304", '"a" "b"')),
+        ('struct Example { @default (value="x") b_msgs::msg::A a; };', ("IDL114", '"x"')),
         ('struct Example { @default (value="f()") sequence<int8> a; };', ("IDL304", None)),
         ('struct Example { @default (value="abc") string<2> a; };', ("IDL304", None)),
         ("struct Example { @default (value=1) other_msgs::msg::A a; };", ("IDL114", "1")),
@@ -117,6 +123,46 @@ def test_the_text_must_define_what_it_is_said_to():
     text = HEAD.replace("demo", "other") + "struct Example { int32 a; };" + TAIL
     lower(parse_any(Source("x.idl", text)), NAME, report)
     assert [(one.code, one.span.text) for one in report] == [("IDL114", "other")]
+
+
+def test_a_name_of_a_type_may_be_defined_after_its_uses():
+    found, problems = read("struct Example { a__2 b; }; typedef int32 a__2[2];")
+    assert problems == []
+    assert found.fields[0].type == ir.Array(ir.Primitive("int32"), 2)
+
+
+def test_definitions_of_one_name_agree():
+    same, other = "typedef int32 a__2[2]; ", "typedef string a__2[2]; "
+    structure = "struct Example { a__2 b; };"
+    assert read(same + same + structure)[1] == []
+    assert read(same + other + structure)[1] == [("IDL114", "a__2")]
+
+
+def test_a_missing_part_is_reported_with_wrong_types_of_another_one():
+    report = Report()
+    text = "module demo { module srv { struct A_Request { Thing a; }; }; };"
+    lower(parse_any(Source("x.idl", text)), ir.TypeName("demo", "srv", "A"), report)
+    messages = [one.message for one in report]
+    assert any("the type `Thing`" in message for message in messages)
+    assert any("a module without `A_Response`" in message for message in messages)
+
+
+def test_an_escaped_line_end_is_no_end_of_a_comment_line():
+    literals = '"one \\n two" "\\n" "three"'
+    comment = f'@verbatim (language="comment", text={literals})'
+    found, problems = read(f"{comment} struct Example {{ int8 a; }};")
+    assert problems == []
+    assert found.comment == ("one \n two", "three")
+
+
+@pytest.mark.long
+def test_many_modules_of_constants_take_less_time_than_their_syntax():
+    modules = "module Example_Constants { const int8 A = 1; };\n" * 40_000
+    start = process_time()
+    file = parse_any(Source("x.idl", HEAD + modules + "struct Example { int8 a; };" + TAIL))
+    parsed = process_time()
+    assert len(lower(file, NAME, Report()).constants) == 40_000
+    assert process_time() - parsed < parsed - start
 
 
 def test_words_of_idl_may_be_names():
