@@ -27,7 +27,7 @@ from idlc.recordings.containers.file import UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
-from idlc.wire.layout import ContentSizes, oversized
+from idlc.wire.layout import oversized
 
 if TYPE_CHECKING:
     from idlc.project.root import Root
@@ -270,9 +270,7 @@ class RecordedTypes:
         every = Report()
         self.models = compiler.models(self.interfaces, every)
         if not every.had_errors:
-            extents: ContentSizes = {}
-            for model in self.models.values():
-                every.extend(oversized(model, extents))
+            every.extend(oversized(*self.models.values()))
         self.errors = Report()
         self.errors.extend(every.errors)
         faulty = {diagnostic.where[0] for diagnostic in self.errors}
