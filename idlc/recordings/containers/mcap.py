@@ -21,7 +21,6 @@ from idlc.recordings.containers import records
 from idlc.recordings.containers.compression import Room, decompress
 from idlc.recordings.containers.file import (
     START,
-    File,
     Schema,
     Topic,
     check_count,
@@ -325,7 +324,7 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
     return walk.facts
 
 
-class McapFile(File):
+class McapFile:
     """An MCAP file, whose channels are topics; without `read`, nothing is read of them."""
 
     def __init__(
@@ -338,7 +337,7 @@ class McapFile(File):
         with of_file(self.name):
             self.facts = read_facts(self.source, index, check) if read else Facts()
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
-        self.topics = []
+        self.topics: list[tuple[Topic, int]] = []
         for number, channel in self.facts.channels.items():
             schema, count = self.facts.schemas.get(channel.schema), self.facts.counts.get(number, 0)
             kind, recorded = (schema.name, recorded_schema(schema)) if schema else ("", None)
@@ -426,11 +425,11 @@ class McapFile(File):
         self, topics: Collection[int], window: Window, size: int
     ) -> Iterator[tuple[Chunk, ...]]:
         """Yield neighbours of about `size` bytes."""
-        for part in records.grouped(self.pieces(topics, window), lambda chunk: chunk.size, size):
-            yield tuple(part)
+        pieces = self.pieces(topics, window)
+        return map(tuple, records.grouped(pieces, lambda chunk: chunk.size, size))
 
     def messages(
-        self, topics: Collection[int], pieces: Iterable[Chunk], window: Window
+        self, topics: Collection[int], pieces: Iterable[Any], window: Window
     ) -> Iterator[Messages]:
         """Yield the messages of some channels in some chunks, adjacent ones together."""
         from idlc.recordings.containers.mcap_messages import in_chunks
