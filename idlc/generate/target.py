@@ -313,9 +313,10 @@ class Target:
     ) -> bool:
         """Return whether compiling the inputs would change nothing.
 
-        `inputs` are the digests of the input files by name within the package.
+        `inputs` are the digests of the input files by name within the package. In a prefix they
+        do not show it: libraries depend on the installed distribution, too.
         """
-        lock = self.lock
+        lock = None if self.home else self.lock
         is_unchanged = (
             lock is not None
             and (lock.idlc, lock.package) == (__version__, self.package)

@@ -26,20 +26,14 @@ class ConstantView(msgspec.Struct, frozen=True):
 
 
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
-    """A message class.
-
-    `receiver`, `options` and `builtins` are what its methods call `self`, further keywords and the
-    module of builtins, which fields may hide. `usual` is the class of the first field's values.
-    """
+    """A message class; `usual` is the class of the first field's values."""
 
     name: Code
     docstring: Docstring
     constants: tuple[ConstantView, ...]
     fields: tuple[FieldView, ...]
     usual: Code
-    receiver: Code
-    options: Code
-    builtins: Code
+    naming: Naming
 
 
 class GroupView(msgspec.Struct, frozen=True):
@@ -68,9 +62,7 @@ def message(
             for field in structure.fields
         ),
         usual=usual[0] if usual else Code(""),
-        receiver=naming.receiver,
-        options=naming.options,
-        builtins=naming.builtins,
+        naming=naming,
     )
 
 

@@ -220,11 +220,6 @@ class _Encoder(Builder):
         else:
             self.store_position("at")
 
-    def note(self, value: str, target: str) -> None:
-        """Note a position; dropped later unless it is read."""
-        assert target == "at"
-        self.body.append(Note(value, self.position.reads))
-
     # Values of variable or large size are parts of their own.
 
     def pad(self, align: int, unless_empty: str = "") -> None:

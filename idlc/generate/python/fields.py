@@ -117,7 +117,7 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Naming(msgspec.Struct, frozen=True):
-    """The names in a class of what its fields could hide: `self` and builtins."""
+    """The names in a class of what its fields could hide: `self`, keywords and builtins' module."""
 
     receiver: Code
     options: Code
