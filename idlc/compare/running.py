@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import chain
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
+from typing import Any, NamedTuple, TypeAlias, get_args
 
 from idlc.check.compiler import Compiler, stage
 from idlc.compare.breaking import BreakingOptions, error_free_models, judge
@@ -35,6 +35,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
+from idlc.model.describe import DescriptionDict
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -42,9 +43,6 @@ from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.wire.layout import oversized
-
-if TYPE_CHECKING:
-    from idlc.model.describe import DescriptionDict
 
 #: A graph that never comes to rest is watched for this many times the patience.
 RESTLESS = 10

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
@@ -21,6 +21,7 @@ from idlc.model.link import Model
 from idlc.model.lower import lower
 from idlc.project import inputs
 from idlc.project.library import Library
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.file import UnreadTopic
@@ -28,10 +29,6 @@ from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import oversized
-
-if TYPE_CHECKING:
-    from idlc.project.root import Root
-
 
 #: The number of versions that a topic is compared with.
 TRIED = 16

@@ -104,14 +104,9 @@ class Numbers(msgspec.Struct, frozen=True):
         return ir.PRIMITIVES[self.primitive].size
 
     @property
-    def numpy(self) -> str:
-        """Numpy's name of an element's type."""
-        return ir.PRIMITIVES[self.primitive].dtype
-
-    @property
-    def code(self) -> str:
-        """The array type code."""
-        return ir.PRIMITIVES[self.primitive].code
+    def info(self) -> ir.PrimitiveInfo:
+        """The facts of an element's type."""
+        return ir.PRIMITIVES[self.primitive]
 
 
 class Bytes(msgspec.Struct, frozen=True):

@@ -273,10 +273,10 @@ class _Decoder(Builder):
     def numbers(self, step: plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
         raw = self.buffer(self.count(step.bound, step.place.path), step.unit, step.unit, "view")
-        name, reading = step.numpy, "reading"
+        name, reading = step.info.dtype, "reading"
         if foreign := self.foreign.get(step.place.type):  # the class that holds it
             name, reading = f"{name}_of_{snake_case(foreign)}", f"reading.of({foreign})"
-        function = call("sequence_reader", "order", f'"{step.code}"', reading)
+        function = call("sequence_reader", "order", f'"{step.info.code}"', reading)
         reader = self.tables.function(f"sequence_of_{name}", function)
         self.line(call(reader, raw), step.place.text)
 

@@ -139,21 +139,17 @@ def shadows(structure: ir.Message) -> bool:
     return any(python_names.field(field.name) in BUILTINS for field in structure.fields)
 
 
-def support(type_: ir.FieldType) -> str:
-    """Return what a field needs of the runtime: "sequence", "array" or nothing."""
-    if (
-        isinstance(type_, (ir.Sequence, ir.Array))
-        and isinstance(type_.element, ir.Primitive)
-        and type_.element.name not in LIST_PRIMITIVES
-    ):
-        return "sequence" if isinstance(type_, ir.Sequence) else "array"
-    return ""
+def numbers(type_: ir.FieldType) -> ir.PrimitiveInfo | None:
+    """Return the facts of the elements of a numeric array; `None` for any other type."""
+    match type_:
+        case ir.Sequence(ir.Primitive(name)) | ir.Array(ir.Primitive(name)):
+            return None if name in LIST_PRIMITIVES else ir.PRIMITIVES[name]
+    return None
 
 
-def numeric_class(type_: ir.Sequence | ir.Array) -> str:
+def numeric_class(type_: ir.FieldType, info: ir.PrimitiveInfo) -> str:
     """Return the descriptor class of a numeric array."""
-    assert isinstance(type_.element, ir.Primitive)
-    name = type_.element.info.dtype
+    name = info.dtype
     stem = name.replace("uint", "UInt") if name.startswith("u") else name.capitalize()
     return f"_idlc.{stem}Sequence" if isinstance(type_, ir.Sequence) else f"_arrays.{stem}Array"
 
@@ -179,7 +175,7 @@ def view(
         parameter=Code(parameter),
         fresh=Code(fresh),
         docstring=attribute(field, file),
-        numbers=bool(support(field.type)),
+        numbers=numbers(field.type) is not None,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
         is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
     )
@@ -187,7 +183,7 @@ def view(
 
 def usual_class(field: ir.Field, references: References, naming: Naming) -> Code:
     """Return the class of what is usually assigned to a field; empty if it takes any values."""
-    if support(field.type):
+    if numbers(field.type):
         return Code("")
     if isinstance(field.type, (ir.Array, ir.Sequence)):
         return Code(f"{naming.builtins}list")
@@ -206,8 +202,8 @@ def _shape(
         return element, f"{element} = {default}", ""
     if isinstance(field.type, ir.Ref):
         return element, f"{element} | None = None", f"{element}()"
-    if support(field.type):
-        annotation, values, fresh = _numbers(field.type)
+    if info := numbers(field.type):
+        annotation, values, fresh = _numbers(field.type, info)
     elif converts:
         inside = getattr(ir.element_of(field.type), "name", "")
         read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
@@ -260,11 +256,9 @@ def _fresh_list(field: ir.Field, references: References) -> str:
     return "[]"
 
 
-def _numbers(type_: ir.FieldType) -> tuple[str, str, str]:
+def _numbers(type_: ir.FieldType, info: ir.PrimitiveInfo) -> tuple[str, str, str]:
     """Return the annotation of an array of numbers, what it takes, and its fresh default."""
-    assert isinstance(type_, (ir.Sequence, ir.Array))
-    assert isinstance(type_.element, ir.Primitive)
-    descriptor, info = numeric_class(type_), type_.element.info
+    descriptor = numeric_class(type_, info)
     if isinstance(type_, ir.Array):
         fresh = f"_arrays.zeros({type_.size}, _arrays.{info.dtype.upper()})"
         return f"{descriptor} = {descriptor}({type_.size})", "_arrays.Values", fresh
@@ -286,7 +280,6 @@ def default(field: ir.Field) -> tuple[Code, tuple[Code, ...]]:
         assert isinstance(field.default.value, tuple)
         element = ir.element_of(field.type)
         values = tuple(Code(literals.scalar(element, value)) for value in field.default.value)
-    if support(field.type):
-        assert isinstance(field.type, (ir.Sequence, ir.Array))
-        return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type)}.of"), *values)
+    if info := numbers(field.type):
+        return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type, info)}.of"), *values)
     return Code("_idlc.FreshList" if values else "_idlc.FreshList()"), values

@@ -210,15 +210,15 @@ def module_views(
 
 def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
     every = [field for message in structures for field in message.fields]
-    used = {fields.support(field.type) for field in every}
+    numeric = [field for field in every if fields.numbers(field.type)]
     standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
-    if any(fields.support(field.type) == "sequence" and not field.default for field in every):
+    if any(isinstance(field.type, ir.Sequence) and not field.default for field in numeric):
         standard.append("from array import array as _array")
     inside, outside = references.imports(references.direct)
     yield from (*standard, "") if standard else ()
     runtime = references.surroundings.runtime
     yield f"from {runtime} import _idlc"
-    if "array" in used:
+    if any(isinstance(field.type, ir.Array) for field in numeric):
         yield f"from {runtime}_idlc import arrays as _arrays"
     yield from inside
     if outside:
