@@ -67,7 +67,7 @@ def package_of(
             *render_package(model, VENDORING if copies else ALONE, runtime),
             *vendored_files(model.package, copies),
         )
-        modules = {file.path: file.text for file in rendered}
+        modules = {file.path: file.text.encode() for file in rendered}
         files = target.placed(model, modules)
     plan = target.plan(files, check=check)
     if plan is None:

@@ -157,7 +157,7 @@ class Overlay(Target):
             return ""
         return "it is for another distribution of ROS 2"
 
-    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+    def placed(self, model: Model, modules: Mapping[str, bytes]) -> dict[str, bytes]:
         """Return the files of a package by their paths in the prefix.
 
         They are in the order in which to write them: files come after those that they refer to.

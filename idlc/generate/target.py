@@ -353,19 +353,15 @@ class Target:
         needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
         return prefixes.runs_nodes() or any(map(prefixes.python_folders, needed))
 
-    def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
+    def plan(self, files: Mapping[str, bytes], *, check: bool = False) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not.
 
         With `check` the changes are only compared, and edited files are among them.
         """
-        content = {
-            path: text.encode("utf-8") if isinstance(text, str) else text
-            for path, text in files.items()
-        }
         outputs = self.lock.outputs if self.lock else {}
         owned = write.owned_files(outputs)
         force, record = check or self._output.force, self.home + FILE
-        return plan(self.path, self.name, content, owned, self.report, record=record, force=force)
+        return plan(self.path, self.name, files, owned, self.report, record=record, force=force)
 
     def apply(self, changes: Plan, record: Lock) -> bool:
         """Make planned changes and write the lock; report IDL612 and return `False` otherwise."""
@@ -415,7 +411,7 @@ class Target:
             path = f"{self.name}/{self.home}{FILE}"
             self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}", hint=hint))
 
-    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+    def placed(self, model: Model, modules: Mapping[str, bytes]) -> dict[str, bytes]:
         """Return the files to write for a model: its modules."""
         del model
         return {**modules}

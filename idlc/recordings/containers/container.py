@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
 
@@ -43,7 +43,7 @@ class Channel(NamedTuple):
     topic: Topic
 
 
-class Container:
+class Container(AbstractContextManager["Container"]):
     """An open recording: its topics, and the files that they are in."""
 
     def __init__(self, name: str, files: list[File], notes: Iterable[str]) -> None:
@@ -94,9 +94,6 @@ class Container:
         """Close all files."""
         for file in self.files:
             file.close()
-
-    def __enter__(self) -> Container:  # noqa: PYI034 # Self came with Python 3.11
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
