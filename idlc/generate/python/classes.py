@@ -44,23 +44,15 @@ class GroupView(msgspec.Struct, frozen=True):
     stem: Code
 
 
-def message(
-    structure: ir.Message, references: References, purpose: str, file: str, *, converts: bool
-) -> MessageView:
-    """Return the view of a structure's class.
-
-    `purpose` is its docstring without a comment, `file` the one that defines it.
-    """
+def message(structure: ir.Message, references: References, purpose: str) -> MessageView:
+    """Return the view of a structure's class; `purpose` is its docstring without a comment."""
     naming = Naming.of(structure)
     usual = [fields.usual_class(field, references, naming) for field in structure.fields[:1]]
     return MessageView(
         name=Code(references.name(structure.name)),
-        docstring=fields.message(structure, purpose, file),
-        constants=tuple(_constants(structure, file)),
-        fields=tuple(
-            fields.view(field, references, naming, file, converts=converts)
-            for field in structure.fields
-        ),
+        docstring=fields.message(structure, purpose, references.file),
+        constants=tuple(_constants(structure, references.file)),
+        fields=tuple(fields.view(field, references, naming) for field in structure.fields),
         usual=usual[0] if usual else Code(""),
         naming=naming,
     )

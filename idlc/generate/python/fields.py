@@ -154,15 +154,13 @@ def numeric_class(type_: ir.FieldType, info: ir.PrimitiveInfo) -> str:
     return f"_idlc.{stem}Sequence" if isinstance(type_, ir.Sequence) else f"_arrays.{stem}Array"
 
 
-def view(
-    field: ir.Field, references: References, naming: Naming, file: str, *, converts: bool
-) -> FieldView:
-    """Return the view of a field; `file` is the one that defines it.
+def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
+    """Return the view of a field.
 
-    With `converts`, `None` is the default of any field, and a list is made of any iterable.
+    If the class converts values, `None` is the default, and a list is made of any iterable.
     """
     name = python_names.field(field.name)
-    annotation, parameter, fresh = _shape(field, references, naming, converts=converts)
+    annotation, parameter, fresh = _shape(field, references, naming)
     # type checkers take a field of a method's name for a mistake
     ignored = "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
     is_list = isinstance(field.type, (ir.Array, ir.Sequence))
@@ -174,7 +172,7 @@ def view(
         annotation=Code(annotation + ignored),
         parameter=Code(parameter),
         fresh=Code(fresh),
-        docstring=attribute(field, file),
+        docstring=attribute(field, references.file),
         numbers=numbers(field.type) is not None,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
         is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
@@ -190,21 +188,19 @@ def usual_class(field: ir.Field, references: References, naming: Naming) -> Code
     return Code(_builtin(_element(field.type, references), naming))
 
 
-def _shape(
-    field: ir.Field, references: References, naming: Naming, *, converts: bool
-) -> tuple[str, str, str]:
+def _shape(field: ir.Field, references: References, naming: Naming) -> tuple[str, str, str]:
     """Return a field's annotation, its parameter and its fresh default."""
     element = _builtin(_element(ir.element_of(field.type), references), naming)
     if isinstance(field.type, (ir.Primitive, ir.String)):
         default = _scalar_default(field)
-        if converts:
+        if references.converts:
             return element, f"{element} | None = None", default
         return element, f"{element} = {default}", ""
     if isinstance(field.type, ir.Ref):
         return element, f"{element} | None = None", f"{element}()"
     if info := numbers(field.type):
         annotation, values, fresh = _numbers(field.type, info)
-    elif converts:
+    elif references.converts:
         inside = getattr(ir.element_of(field.type), "name", "")
         read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
         annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({read})"

@@ -175,7 +175,7 @@ def module_views(
     With `converts`, classes convert values as Lyrical's do.
     """
     name, home, written = interface.name, names[interface.name], derive.sections(interface)
-    references = References(interface, written, messages, names, surroundings)
+    references = References(interface, written, messages, names, surroundings, converts=converts)
     every = [field for structure in written for field in structure.fields]
     is_foreign = references.others and not surroundings.vendors
     is_hiding = any(python_names.hides_method(field.name) for field in every)
@@ -187,8 +187,7 @@ def module_views(
         runtime=Code(surroundings.runtime),
         imports=_code(_imports(references, written)),
         messages=tuple(
-            classes.message(structure, references, purpose, name.file, converts=converts)
-            for structure, purpose in purposes
+            classes.message(structure, references, purpose) for structure, purpose in purposes
         ),
         group=None if isinstance(interface, ir.Message) else classes.group(interface),
         converts=converts,
