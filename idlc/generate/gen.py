@@ -147,7 +147,7 @@ def _targets(
     """Return the folder that each package is written to."""
     scope = options.scope
     distros = tuple(distro.name for distro in scope.distros)
-    output = Output(scope.root, report, options.force, options.runtime, distros)
+    output = Output(scope.root, report, options.force, options.runtime, distros, options.check)
     if not options.ament:
         return folder_targets(packages, options.out, output)
     from idlc.generate.prefix import Overlay  # imported only where one is written
@@ -211,9 +211,7 @@ def _compile_and_write(
         return _compile_and_write(dict(zip(requested, more, strict=True)), texts, options, report)
     packages = []
     if not report.had_errors:
-        packages = planned(
-            models, requested, compiler, check=options.check, vendoring=options.vendoring
-        )
+        packages = planned(models, requested, compiler, options.vendoring)
     if options.check:
         for package in packages:
             package.target.drift(package.plan, package.lock, options.again)

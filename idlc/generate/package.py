@@ -40,7 +40,6 @@ def package_of(
     digests: dict[str, str],
     library: Library,
     *,
-    check: bool,
     vendoring: lock.Vendoring = "",
     copies: Sequence[Model] = (),
     beside: Sequence[str] = (),
@@ -69,7 +68,7 @@ def package_of(
         )
         modules = {file.path: file.text.encode() for file in rendered}
         files = target.placed(model, modules)
-    plan = target.plan(files, check=check)
+    plan = target.plan(files)
     if plan is None:
         return None
     own = {

@@ -256,7 +256,8 @@ def _newest_maker() -> int:
 class Output(NamedTuple):
     """The manner in which packages are written: with `force` over files that were edited.
 
-    Without `runtime`, each package keeps its own. `distros` are those that were chosen.
+    With `check` they are only compared, and edited files are among the changes. Without `runtime`,
+    each package keeps its own. `distros` are those that were chosen.
     """
 
     root: Root
@@ -264,6 +265,7 @@ class Output(NamedTuple):
     force: bool = False
     runtime: Runtime | None = None
     distros: tuple[str, ...] = ()
+    check: bool = False
 
 
 class Target:
@@ -353,14 +355,11 @@ class Target:
         needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
         return prefixes.runs_nodes() or any(map(prefixes.python_folders, needed))
 
-    def plan(self, files: Mapping[str, bytes], *, check: bool = False) -> Plan | None:
-        """Return the changes that make the folder hold `files`; `None` if it must not.
-
-        With `check` the changes are only compared, and edited files are among them.
-        """
+    def plan(self, files: Mapping[str, bytes]) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not."""
         outputs = self.lock.outputs if self.lock else {}
         owned = write.owned_files(outputs)
-        force, record = check or self._output.force, self.home + FILE
+        force, record = self._output.check or self._output.force, self.home + FILE
         return plan(self.path, self.name, files, owned, self.report, record=record, force=force)
 
     def apply(self, changes: Plan, record: Lock) -> bool:
