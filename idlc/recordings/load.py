@@ -163,10 +163,7 @@ class LoadedPackages(ModuleType):
 
     def __init__(self, models: Models, names: Iterable[ir.TypeName]) -> None:
         super().__init__(_home_of(models), "What `idlc.load` compiled.")
-        self._packages = {
-            package: sorted({own.name.kind for own in model.own})
-            for package, model in sorted(models.items())
-        }
+        self._packages = {package: model.kinds for package, model in sorted(models.items())}
         self._interfaces = {str(class_(name)): name for name in names}
 
     def __getattr__(self, name: str) -> Any:

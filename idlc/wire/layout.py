@@ -173,12 +173,10 @@ def oversized(*models: Model) -> Iterator[Diagnostic]:
     """
     sizes: dict[ir.TypeName, _ContentSize] = {}
     for model in models:
-        own = {message.name: message for each in model.own for message in derive.messages(each)}
-        waiting = list(own)
+        waiting = [message.name for own in model.own for message in derive.messages(own)]
         while waiting:  # each structure after its parts; with a stack, so depth is no limit
             name = waiting[-1]
-            structure = own[name] if name in own else model.interfaces[name]
-            assert isinstance(structure, ir.Message)
+            structure = model.messages[name]
             held = structure.references
             if missing := [reference for reference in held if reference not in sizes]:
                 waiting += missing

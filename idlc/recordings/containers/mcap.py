@@ -336,6 +336,7 @@ class McapFile:
         self.name = self.source.name
         with of_file(self.name):
             self.facts = read_facts(self.source, index, check) if read else Facts()
+        self.start = self.facts.start
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
         self.topics: list[tuple[Topic, int]] = []
         for number, channel in self.facts.channels.items():
@@ -344,11 +345,6 @@ class McapFile:
             digest = channel.metadata.get("topic_type_hash") or None
             topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded)
             self.topics.append((topic, number))
-
-    @property
-    def start(self) -> int | None:
-        """The time of the first message."""
-        return self.facts.start
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
         """Yield channels with the start of their first messages; no chunk is opened twice."""
