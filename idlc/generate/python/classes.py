@@ -64,8 +64,9 @@ def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
         docstring = fields.attribute(constant, file)
         yield ConstantView(Code(constant.name), value, docstring=docstring)
     for field in structure.fields:
-        if field.default:
-            yield ConstantView(Code(fields.default_name(field)), *fields.default(field))
+        if default := field.default:
+            name = Code(fields.default_name(field))
+            yield ConstantView(name, *fields.default(field.type, default.value))
 
 
 def group(interface: ir.Service | ir.Action) -> GroupView:

@@ -192,10 +192,11 @@ def _shape(field: ir.Field, references: References, naming: Naming) -> tuple[str
     """Return a field's annotation, its parameter and its fresh default."""
     element = _builtin(_element(ir.element_of(field.type), references), naming)
     if isinstance(field.type, (ir.Primitive, ir.String)):
-        default = _scalar_default(field)
+        declared = field.default and default(field.type, field.default.value)[0]
+        value = declared or zero(field.type)
         if references.converts:
-            return element, f"{element} | None = None", default
-        return element, f"{element} = {default}", ""
+            return element, f"{element} | None = None", value
+        return element, f"{element} = {value}", ""
     if isinstance(field.type, ir.Ref):
         return element, f"{element} | None = None", f"{element}()"
     if info := numbers(field.type):
@@ -229,13 +230,6 @@ def _element(element: ir.Element, references: References) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def _scalar_default(field: ir.Field) -> str:
-    assert isinstance(field.type, (ir.Primitive, ir.String))
-    if field.default is not None and not isinstance(field.default.value, tuple):
-        return literals.scalar(field.type, field.default.value)
-    return zero(field.type)
-
-
 def zero(element: ir.Element) -> str:
     """Return the literal of the value without a declared default."""
     if isinstance(element, ir.Primitive):
@@ -267,15 +261,12 @@ def default_name(field: ir.Field) -> str:
     return f"{field.name.upper()}__DEFAULT"
 
 
-def default(field: ir.Field) -> tuple[Code, tuple[Code, ...]]:
-    """Return the value of a field's declared default: an expression, or a function's arguments."""
-    if isinstance(field.type, (ir.Primitive, ir.String)):
-        return Code(_scalar_default(field)), ()
-    values: tuple[Code, ...] = ()
-    if field.default is not None:
-        assert isinstance(field.default.value, tuple)
-        element = ir.element_of(field.type)
-        values = tuple(Code(literals.scalar(element, value)) for value in field.default.value)
-    if info := numbers(field.type):
-        return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type, info)}.of"), *values)
+def default(type_: ir.FieldType, value: ir.Value) -> tuple[Code, tuple[Code, ...]]:
+    """Return a declared default of a type: an expression, or a function and its arguments."""
+    element = ir.element_of(type_)
+    if not isinstance(value, tuple):
+        return Code(literals.scalar(element, value)), ()
+    values = tuple(Code(literals.scalar(element, item)) for item in value)
+    if info := numbers(type_):
+        return Code("_idlc.Fresh"), (Code(f"{numeric_class(type_, info)}.of"), *values)
     return Code("_idlc.FreshList" if values else "_idlc.FreshList()"), values
