@@ -37,7 +37,7 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
         is_later = "\n---" in f"\n{source.text[:start]}"
         place = file if is_later else f"{file}:{source.position(start)[0]}"
     comment = _lines(structure.comment)
-    names = [field.name for field in structure.fields if python_names.hides_method(field.name)]
+    names = [field.name for field in structure.fields if field.name in python_names.METHODS]
     if not comment and not names and place:
         purpose, place = f"{purpose.removesuffix('.')}, defined in {place}.", ""
     line, *more = comment or [purpose]
@@ -162,7 +162,7 @@ def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
     name = python_names.field(field.name)
     annotation, parameter, fresh = _shape(field, references, naming)
     # type checkers take a field of a method's name for a mistake
-    ignored = "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
+    ignored = "  # type: ignore[assignment]" if name in python_names.METHODS else ""
     is_list = isinstance(field.type, (ir.Array, ir.Sequence))
     return FieldView(
         name=Code(name),

@@ -178,7 +178,7 @@ def module_views(
     references = References(interface, written, messages, names, surroundings, converts=converts)
     every = [field for structure in written for field in structure.fields]
     is_foreign = references.others and not surroundings.vendors
-    is_hiding = any(python_names.hides_method(field.name) for field in every)
+    is_hiding = any(field.name in python_names.METHODS for field in every)
     purposes = zip(written, fields.purposes(interface), strict=True)
     view = ModuleView(
         origin=Text(f"{name}.{name.kind}"),
