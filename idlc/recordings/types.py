@@ -20,7 +20,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lower import lower
 from idlc.project import inputs
-from idlc.project.library import Library
+from idlc.project.library import Library, Texts
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
@@ -139,9 +139,7 @@ class Contents:
     def __init__(self) -> None:
         self._contents: dict[tuple[ir.TypeName, str, bool], Hashable] = {}
 
-    def agree(
-        self, some: Mapping[ir.TypeName, Source], others: Mapping[ir.TypeName, Source]
-    ) -> bool:
+    def agree(self, some: Texts, others: Texts) -> bool:
         """Return whether no name has different definitions in both."""
         return all(
             self.same(name, source, others[name]) for name, source in some.items() if name in others
