@@ -153,9 +153,8 @@ def _against(options: BreakingOptions, packages: Packages, report: Report) -> Co
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], options.scope.root, report) as revision:
             comparison = revision and _compare(options, packages, revision, report)
-        return comparison and comparison.placed(
-            lambda path: path.removeprefix(f"{options.against}:")
-        )
+        prefix = f"{options.against}:"
+        return comparison and comparison.placed(lambda path: path.removeprefix(prefix))
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
