@@ -32,6 +32,7 @@ from idlc.recordings.containers.records import (
     HEAD,
     INDEX_OFFSET,
     MAGIC,
+    MESSAGE_HEAD,
     MESSAGE_OP,
     Chunk,
     ChunkHead,
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
 
 END_OF_TIME = (1 << 64) - 1
-#: Bytes of a Message record before the message itself.
-MESSAGE_HEAD = 22
 #: The start of a message: its channel and time, with its sequence number between them.
 CHANNEL_AND_TIME = Struct("<HIQ")
 
@@ -119,7 +118,7 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> Facts
 
 def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
     """Yield the start of each message of a chunk, or of a stretch outside of any."""
-    most = MESSAGE_HEAD + START
+    most = MESSAGE_HEAD.size + START
     if chunk.compression is None:
         for op, at, size in heads(source, chunk.at, chunk.at + chunk.size):
             if op == MESSAGE_OP:
@@ -359,7 +358,7 @@ class McapFile:
             for data, _ in zip(starts, room.records(), strict=False):
                 number = int.from_bytes(data[:2], "little")
                 if number in mine:
-                    yield number, bytes(data[MESSAGE_HEAD:])
+                    yield number, bytes(data[MESSAGE_HEAD.size :])
                     mine.remove(number)
                     waiting.discard(number)
                     if not mine:
