@@ -5,7 +5,7 @@ The passes are imported where they are used, so that a run with nothing to do co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from itertools import groupby
@@ -17,7 +17,7 @@ from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.model import derive, ir
 from idlc.project import inputs
-from idlc.project.library import Library
+from idlc.project.library import Library, Texts
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
@@ -146,11 +146,12 @@ def library_for(
     packages: Sequence[inputs.Inputs],
     scope: Scope,
     report: Report,
-    texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
+    texts: Texts = MappingProxyType({}),
+    kind: Callable[..., Library] = Library,
 ) -> Library:
-    """Return the library in which compiled packages look up their references."""
+    """Return the library, of a `kind`, in which compiled packages look up their references."""
     own = {package.package: package.folders for package in packages}
-    return Library(
+    return kind(
         scope.include,
         scope.root,
         report,

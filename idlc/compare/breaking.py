@@ -37,7 +37,7 @@ from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope
-from idlc.wire.layout import ContentSizes, oversized
+from idlc.wire.layout import oversized
 
 GIT = "git:"
 #: The inputs of packages.
@@ -153,7 +153,8 @@ def _against(options: BreakingOptions, packages: Packages, report: Report) -> Co
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], options.scope.root, report) as revision:
             comparison = revision and _compare(options, packages, revision, report)
-        return comparison and comparison.placed(f"{options.against}:")
+        prefix = f"{options.against}:"
+        return comparison and comparison.placed(lambda path: path.removeprefix(prefix))
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
@@ -282,9 +283,7 @@ def _side(
     # a type that is defined twice is ambiguous
     also = {shown: compiled[name] for shown, name in every.items() if name in compiled}
     pairs = list(models_of(packages, scope, report))
-    extents: ContentSizes = {}
-    for model in without_errors(pairs, report, also):
-        report.extend(oversized(model, extents))
+    report.extend(oversized(*without_errors(pairs, report, also)))
     models = list(without_errors(pairs, report, also))
     names = {*compiled, *every.values()}
     sound = {own.name for model in models for own in model.own}
@@ -300,9 +299,7 @@ def error_free_models(packages: Packages, scope: Scope, report: Report) -> dict[
     problems = Report()
     models = {model.package: model for _, model in models_of(packages, scope, problems)}
     if not problems.had_errors:
-        extents: ContentSizes = {}
-        for model in models.values():
-            problems.extend(oversized(model, extents))
+        problems.extend(oversized(*models.values()))
     report.extend(problems.errors)
     return models
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from itertools import groupby
+from typing import Any
 
 from idlc.check.compiler import Compiler, compile_package, library_for, stage
 from idlc.compare.packages import Comparison, combine, compare
@@ -40,9 +42,12 @@ def compare_with_distro(
         return None
     other = BY_NAME[name]
     library = library_for(packages, scope, report)
-    other_library = _LayeredLibrary(packages, scope, other, other_first=True)
+    other_library, both = (
+        library_for(packages, scope, Report(), kind=partial(_LayeredLibrary, other, other_first))
+        for other_first in (True, False)
+    )
     own = [package for package in packages if not catalog.is_standard(package.package)]
-    after = _models(own, _LayeredLibrary(packages, scope, other), report)
+    after = _models(own, both, report)
     before = _models(own, other_library, Report())
     if report.had_errors:
         return None
@@ -50,7 +55,7 @@ def compare_with_distro(
         standard = (package.names for package in packages if package not in own)
         used = set[ir.TypeName]().union(*map(_used, after), *standard)
         names = used if packages else _all(library, other)
-        of_packages = _of_packages(names, library, other_library)
+        of_packages = _of_packages(names, library, other_library, other)
         return combine([*map(compare, before, after), *of_packages])
 
 
@@ -61,24 +66,14 @@ class _LayeredLibrary(Library):
     two lacks therefore does not hide the messages that hold it.
     """
 
-    def __init__(
-        self,
-        packages: Sequence[inputs.Inputs],
-        scope: Scope,
-        other: Distro,
-        *,
-        other_first: bool = False,
-    ) -> None:
-        own = {package.package: package.folders for package in packages}
-        super().__init__(
-            scope.include, scope.root, Report(), own=own, exclude=scope.exclude, distro=scope.distro
-        )
-        self.other = other
+    def __init__(self, other: Distro, other_first: bool, *place: Any, **options: Any) -> None:
+        super().__init__(*place, **options)
+        self._other = other
         self._other_first = other_first
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface, or `None` if neither has it."""
-        others = catalog.source(name, self.other)
+        others = catalog.source(name, self._other)
         return others if others and self._other_first else super().source(name) or others
 
 
@@ -110,11 +105,11 @@ def _all(library: Library, other: Distro) -> set[ir.TypeName]:
 
 
 def _of_packages(
-    names: Iterable[ir.TypeName], library: Library, other_library: _LayeredLibrary
+    names: Iterable[ir.TypeName], library: Library, other_library: Library, other: Distro
 ) -> Iterator[Comparison]:
     """Yield the differences in standard interfaces, package by package."""
     for package, group in groupby(sorted(names), lambda name: name.package):
-        mine, other = list(group), other_library.other
+        mine = list(group)
         old = [(name, source) for name in mine if (source := catalog.source(name, other))]
         new = [(name, source) for name in mine if (source := library.source(name))]
         comparison = compare(

@@ -179,17 +179,15 @@ def activities(endpoints: Iterable[Endpoint]) -> Iterator[str]:
         yield f"  {first_few(sorted(set(actors)), 5)} {activity}"
 
 
-#: Models by a structure's full name and type hash.
+#: Models, and why there is none, by a structure's full name and type hash.
 Models: TypeAlias = Mapping[tuple[str, str], Model]
+Problems: TypeAlias = Mapping[tuple[str, str], str]
 #: Structures of two versions, by name and both hashes.
 Reported: TypeAlias = set[tuple[str, str, str]]
 
 
 def version_changes(
-    versions: Sequence[Version],
-    models: Models,
-    problems: Mapping[tuple[str, str], str],
-    seen: Reported,
+    versions: Sequence[Version], models: Models, problems: Problems, seen: Reported
 ) -> Iterator[Change]:
     """Yield a change for a type with several versions, and the differences between them.
 
@@ -231,9 +229,7 @@ def version_changes(
                 yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
 
 
-def _version(
-    version: Version, models: Models, problems: Mapping[tuple[str, str], str]
-) -> Iterator[str]:
+def _version(version: Version, models: Models, problems: Problems) -> Iterator[str]:
     where = f", that of {version.local.label}" if version.local else ""
     yield f"{version.hash}{where}:"
     yield from activities(version.endpoints) if version.endpoints else ["  no node"]

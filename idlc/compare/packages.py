@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -37,10 +37,10 @@ class Comparison(NamedTuple):
     differs: bool = False
     left_out: tuple[str, ...] = ()
 
-    def placed(self, prefix: str) -> Comparison:
-        """Return it with removed elements placed in the files whose names follow a prefix."""
+    def placed(self, place: Callable[[str], str]) -> Comparison:
+        """Return it with removed elements in the files that `place` makes of their paths."""
         changes = (
-            change if change.span else change._replace(place=change.path.removeprefix(prefix))
+            change if change.span else change._replace(place=place(change.path))
             for change in self.changes
         )
         return self._replace(changes=tuple(changes))

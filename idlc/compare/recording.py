@@ -8,7 +8,7 @@ from typing import NamedTuple
 from idlc.check.compiler import stage
 from idlc.compare.breaking import BreakingOptions, error_free_models, judge
 from idlc.compare.changes import Change
-from idlc.compare.packages import compare
+from idlc.compare.packages import Comparison, compare
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
@@ -57,7 +57,7 @@ def compare_with_recordings(
         for old, new in local.pairs(models, types.texts):
             seen |= {interface.name for interface in old.own}
             with stage("compare", old.package):
-                new_ones = local.placed(compare(old, new).changes, old.package)
+                new_ones = local.compared(old, new).changes
             changes = {
                 **{(change.subject, change.message): change for change in new_ones},
                 **changes,
@@ -104,16 +104,13 @@ class _LocalVersions:
                 continue
             yield old.only(_names(new)), new.only(_names(old))
 
-    def placed(self, changes: Iterable[Change], package: str) -> list[Change]:
-        """Return changes, with the path of the missing file for removed interfaces."""
-        compared = self._packages.get(package)
-        home = self._root.shown(compared.home) if compared else ""
-        return [
-            change._replace(place=f"{home}/{change.path.rpartition(f'{package}/')[2]}")
-            if compared and not change.span
-            else change
-            for change in changes
-        ]
+    def compared(self, old: Model, new: Model) -> Comparison:
+        """Return the changes, with the path of the missing file for removed interfaces."""
+        comparison, package = compare(old, new), self._packages.get(old.package)
+        if package is None:
+            return comparison
+        home = self._root.shown(package.home)
+        return comparison.placed(lambda path: f"{home}/{path.rpartition(f'{old.package}/')[2]}")
 
 
 def _names(model: Model) -> set[ir.TypeName]:

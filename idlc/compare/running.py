@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import chain
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
+from typing import Any, NamedTuple, TypeAlias, get_args
 
 from idlc.check.compiler import Compiler, stage
 from idlc.compare.breaking import BreakingOptions, error_free_models, judge
@@ -35,6 +35,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
+from idlc.model.describe import DescriptionDict
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -42,9 +43,6 @@ from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.wire.layout import oversized
-
-if TYPE_CHECKING:
-    from idlc.model.describe import DescriptionDict
 
 #: A graph that never comes to rest is watched for this many times the patience.
 RESTLESS = 10
@@ -144,26 +142,22 @@ class Graph:
         return tuple(sorted(endpoints))
 
     def _endpoints(self, topic: str, name: str, entity: Entity, roles: Roles) -> Iterator[Endpoint]:
-        """Yield the ends of a topic, of which the first of `roles` sends and the other reads."""
-        owner, is_action, _ = name.partition(_ACTION)
-        for role, sends in zip(roles, (True, False), strict=True):
-            for node, type_, hash_ in self._ends(topic, sends, no_mangle=entity == "service"):
-                kind: Entity = "action" if is_action else entity
-                yield Endpoint(node, kind, owner, role, sends, type_, hash_)
-
-    def _ends(self, topic: str, sends: bool, *, no_mangle: bool) -> Iterator[tuple[str, str, str]]:
-        """Yield node, type and hash of each end of a topic, except idlc's own."""
+        """Yield the ends of a topic but idlc's own; the first of `roles` sends, the other reads."""
         node = self._node
-        look = node.get_publishers_info_by_topic if sends else node.get_subscriptions_info_by_topic
         own = f"{node.get_namespace().rstrip('/')}/{node.get_name()}"
-        for info in look(topic, no_mangle=no_mangle):
-            owner = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-            if owner != own:
-                mangled = _TYPE.fullmatch(info.topic_type)
-                type_ = "/".join(mangled.groups()) if mangled else info.topic_type
-                type_hash = _HASH.fullmatch(str(getattr(info, "topic_type_hash", "")))
-                has_name = _UNKNOWN not in owner
-                yield owner if has_name else "", type_, type_hash[0] if type_hash else ""
+        looks = node.get_publishers_info_by_topic, node.get_subscriptions_info_by_topic
+        place, is_action, _ = name.partition(_ACTION)
+        kind: Entity = "action" if is_action else entity
+        for role, look in zip(roles, looks, strict=True):
+            for info in look(topic, no_mangle=entity == "service"):
+                owner = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+                if owner != own:
+                    mangled = _TYPE.fullmatch(info.topic_type)
+                    type_ = "/".join(mangled.groups()) if mangled else info.topic_type
+                    type_hash = _HASH.fullmatch(str(getattr(info, "topic_type_hash", "")))
+                    hash_ = type_hash[0] if type_hash else ""
+                    owner = "" if _UNKNOWN in owner else owner
+                    yield Endpoint(owner, kind, place, role, role == roles[0], type_, hash_)
 
     def ask(self, questions: Iterable[Question], patience: float) -> dict[Question, Answer]:
         """Return the nodes' answers within `patience` seconds; each question has one."""

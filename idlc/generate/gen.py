@@ -11,7 +11,6 @@ import msgspec
 from idlc.check.compiler import Compiler, library_for
 from idlc.check.package.facts import home_of
 from idlc.diagnostics.report import Report, first_few
-from idlc.diagnostics.source import Source
 from idlc.generate.package import Generated, generated, up_to_date, with_needs
 from idlc.generate.target import (
     Output,
@@ -29,7 +28,7 @@ from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
-from idlc.project.library import Library, resolve
+from idlc.project.library import Library, Texts, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
@@ -110,7 +109,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     paths = [word for word in others if not is_name(word, root)]
     words = [word for word in others if is_name(word, root)]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
-    texts: Mapping[ir.TypeName, Source] = {}
+    texts: Texts = {}
     if recordings and not report.had_errors:
         from idlc.recordings.packages import recorded_packages
 
@@ -147,7 +146,7 @@ def _targets(
     """Return the folder that each package is written to."""
     scope = options.scope
     distros = tuple(distro.name for distro in scope.distros)
-    output = Output(scope.root, report, options.force, options.runtime, distros)
+    output = Output(scope.root, report, options.force, options.runtime, distros, options.check)
     if not options.ament:
         return folder_targets(packages, options.out, output)
     from idlc.generate.prefix import Overlay  # imported only where one is written
@@ -186,10 +185,7 @@ def named_packages(
 
 
 def _compile_and_write(
-    requested: Mapping[Target, inputs.Inputs],
-    texts: Mapping[ir.TypeName, Source],
-    options: GenOptions,
-    report: Report,
+    requested: Mapping[Target, inputs.Inputs], texts: Texts, options: GenOptions, report: Report
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(requested.values()), options.scope, report, texts)
     # files that another distribution accepts may have errors for this one
@@ -211,9 +207,7 @@ def _compile_and_write(
         return _compile_and_write(dict(zip(requested, more, strict=True)), texts, options, report)
     packages = []
     if not report.had_errors:
-        packages = planned(
-            models, requested, compiler, check=options.check, vendoring=options.vendoring
-        )
+        packages = planned(models, requested, compiler, options.vendoring)
     if options.check:
         for package in packages:
             package.target.drift(package.plan, package.lock, options.again)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
-from idlc.model.ir import spell
+from idlc.model.ir import spell, spell_value
 
 #: Characters that would end a text or begin a comment are written as escapes (language 1.5).
 _SPECIAL = re.compile(r"[\x00-\x1f\x7f-\x9f\"'#\\]")
@@ -59,9 +59,9 @@ def _value(value: ir.Value) -> str:
 
 
 def _scalar(value: ir.Scalar) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return f'"{_SPECIAL.sub(_escaped, value)}"' if isinstance(value, str) else repr(value)
+    if isinstance(value, str):
+        return f'"{_SPECIAL.sub(_escaped, value)}"'
+    return spell_value(value)
 
 
 def _escaped(match: re.Match[str]) -> str:

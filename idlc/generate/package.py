@@ -40,7 +40,6 @@ def package_of(
     digests: dict[str, str],
     library: Library,
     *,
-    check: bool,
     vendoring: lock.Vendoring = "",
     copies: Sequence[Model] = (),
     beside: Sequence[str] = (),
@@ -67,9 +66,9 @@ def package_of(
             *render_package(model, VENDORING if copies else ALONE, runtime),
             *vendored_files(model.package, copies),
         )
-        modules = {file.path: file.text for file in rendered}
+        modules = {file.path: file.text.encode() for file in rendered}
         files = target.placed(model, modules)
-    plan = target.plan(files, check=check)
+    plan = target.plan(files)
     if plan is None:
         return None
     own = {

@@ -6,23 +6,22 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from idlc.check.compiler import stage
 from idlc.diagnostics.report import Report
 from idlc.generate.idl import file_text, idl
+from idlc.generate.native.elf import Machine
 from idlc.generate.native.inspect import inspect
+from idlc.generate.native.layouts import LAYOUTS, Layout
+from idlc.generate.native.library import MACHINES, libraries
 from idlc.generate.target import Output, Target
+from idlc.model.link import Model
 from idlc.project import prefixes, write
 from idlc.project.library import Library
-from idlc.project.lock import Tree, Vendoring
+from idlc.project.lock import Tree
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
 from idlc.project.write import Change, Plan
-
-if TYPE_CHECKING:
-    from idlc.generate.native.elf import Machine
-    from idlc.generate.native.layouts import Layout
-    from idlc.model.link import Model
 
 
 class Libraries(NamedTuple):
@@ -43,8 +42,6 @@ def libraries_of(model: Model, distro: Distribution | None = None) -> Libraries:
 
     Write them elsewhere and move them into place: programs may have the old ones open.
     """
-    from idlc.generate.native.library import libraries
-
     distro = distro or distribution()
     target = target_of(distro)
     if not model.own or isinstance(target, str):
@@ -64,9 +61,6 @@ def build_tag(model: Model, *libraries: str) -> str:
 
 def target_of(distro: Distribution) -> tuple[Machine, Layout] | str:
     """Return the processor and layout of libraries on this machine, or why there are none."""
-    from idlc.generate.native.layouts import LAYOUTS
-    from idlc.generate.native.library import MACHINES
-
     machine = MACHINES.get(prefixes.machine())
     layout = LAYOUTS.get(distro.name)
     if machine is None:
@@ -156,16 +150,6 @@ class Overlay(Target):
         home = Library((), self._output.root, Report()).home(package)
         return Overlay(self.name, package, home, self._output._replace(runtime=self.runtime))
 
-    def unchanged(
-        self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
-    ) -> bool:
-        """Return `False`: interfaces alone do not show whether a run would change nothing.
-
-        Libraries depend on the installed distribution, too.
-        """
-        del inputs, library, vendoring
-        return False
-
     def cause(self, change: Change) -> str:
         """Say why a library differs, if another distribution is the reason."""
         old, new = (inspect(data or b"") for data in (change.old, change.new))
@@ -173,7 +157,7 @@ class Overlay(Target):
             return ""
         return "it is for another distribution of ROS 2"
 
-    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+    def placed(self, model: Model, modules: Mapping[str, bytes]) -> dict[str, bytes]:
         """Return the files of a package by their paths in the prefix.
 
         They are in the order in which to write them: files come after those that they refer to.

@@ -256,7 +256,8 @@ def _newest_maker() -> int:
 class Output(NamedTuple):
     """The manner in which packages are written: with `force` over files that were edited.
 
-    Without `runtime`, each package keeps its own. `distros` are those that were chosen.
+    With `check` they are only compared, and edited files are among the changes. Without `runtime`,
+    each package keeps its own. `distros` are those that were chosen.
     """
 
     root: Root
@@ -264,6 +265,7 @@ class Output(NamedTuple):
     force: bool = False
     runtime: Runtime | None = None
     distros: tuple[str, ...] = ()
+    check: bool = False
 
 
 class Target:
@@ -313,9 +315,10 @@ class Target:
     ) -> bool:
         """Return whether compiling the inputs would change nothing.
 
-        `inputs` are the digests of the input files by name within the package.
+        `inputs` are the digests of the input files by name within the package. In a prefix they
+        do not show it: libraries depend on the installed distribution, too.
         """
-        lock = self.lock
+        lock = None if self.home else self.lock
         is_unchanged = (
             lock is not None
             and (lock.idlc, lock.package) == (__version__, self.package)
@@ -352,19 +355,12 @@ class Target:
         needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
         return prefixes.runs_nodes() or any(map(prefixes.python_folders, needed))
 
-    def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
-        """Return the changes that make the folder hold `files`; `None` if it must not.
-
-        With `check` the changes are only compared, and edited files are among them.
-        """
-        content = {
-            path: text.encode("utf-8") if isinstance(text, str) else text
-            for path, text in files.items()
-        }
+    def plan(self, files: Mapping[str, bytes]) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not."""
         outputs = self.lock.outputs if self.lock else {}
         owned = write.owned_files(outputs)
-        force, record = check or self._output.force, self.home + FILE
-        return plan(self.path, self.name, content, owned, self.report, record=record, force=force)
+        force, record = self._output.check or self._output.force, self.home + FILE
+        return plan(self.path, self.name, files, owned, self.report, record=record, force=force)
 
     def apply(self, changes: Plan, record: Lock) -> bool:
         """Make planned changes and write the lock; report IDL612 and return `False` otherwise."""
@@ -414,7 +410,7 @@ class Target:
             path = f"{self.name}/{self.home}{FILE}"
             self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}", hint=hint))
 
-    def placed(self, model: Model, modules: Mapping[str, str]) -> dict[str, str | bytes]:
+    def placed(self, model: Model, modules: Mapping[str, bytes]) -> dict[str, bytes]:
         """Return the files to write for a model: its modules."""
         del model
         return {**modules}

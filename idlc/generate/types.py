@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import Any
 
 from idlc.generate.idl import file_text
 from idlc.model import derive, link
 from idlc.model.describe import IndividualDict
 
 
-class TypesDict(TypedDict):
-    """Descriptions and hashes by full name, and the package's own files by interface name.
+def content(model: link.Model) -> dict[str, Any]:
+    """Return a package's name, and all of its types with everything that they refer to.
 
-    Other packages' files are left out: their text differs between an installation and the
-    catalogue, and the same input must give the same output.
+    Descriptions and hashes are by full name, the package's own files by interface name. Other
+    packages' files are left out: their text differs between an installation and the catalogue,
+    and the same input must give the same output.
     """
-
-    package: str
-    descriptions: dict[str, IndividualDict]
-    hashes: dict[str, str]
-    sources: dict[str, str]
-
-
-def content(model: link.Model) -> TypesDict:
-    """Return the descriptions of a package's types and of everything that they refer to."""
     describer = model.describer
     descriptions: dict[str, IndividualDict] = {}
     for interface in model.own:

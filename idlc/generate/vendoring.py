@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 
 from idlc.check.compiler import Compiler
 from idlc.diagnostics.report import Report
@@ -20,8 +21,6 @@ def planned(
     models: Sequence[Model],
     requested: Mapping[Target, inputs.Inputs],
     compiler: Compiler,
-    *,
-    check: bool,
     vendoring: Vendoring,
 ) -> list[Package]:
     """Return sound models, and packages to vendor, ready to be written; empty after an error."""
@@ -31,39 +30,35 @@ def planned(
     others: dict[str, Package | None] = {}
     needed: dict[str, set[str]] = {}
 
-    def beside(model: Model, target: Target) -> list[str]:
-        """Add the packages that a model depends on, whole, to `others`, and return their names."""
-        names: set[str] = set()
-        waiting = _needed(model) - own
-        while waiting:
-            package = waiting.pop()
-            names.add(package)
-            if package not in others:
-                interfaces, report = library.interfaces(package), Report()
-                sources = [(name, text) for name in interfaces if (text := library.source(name))]
-                whole = compiler.model(package, compiler.add(sources, report), report)
-                target.report.extend(report.errors)
-                needed[package] = _needed(whole)
-                others[package] = None
-                is_accepted = accept_name(package, "what is depended on", target.report)
-                if is_accepted and not report.had_errors:
-                    place, digests = target.beside(package), as_inputs(interfaces, library)
-                    others[package] = package_of(whole, place, digests, library, check=check)
-            waiting |= needed[package] - own - names
-        return sorted(names)
+    def needed_by(target: Target, package: str) -> set[str]:
+        """Add a whole package to `others`, and return the names of those that it depends on."""
+        if package not in others:
+            interfaces, report = library.interfaces(package), Report()
+            sources = [(name, text) for name in interfaces if (text := library.source(name))]
+            whole = compiler.model(package, compiler.add(sources, report), report)
+            target.report.extend(report.errors)
+            needed[package] = _needed(whole) - own
+            others[package] = None
+            is_accepted = accept_name(package, "what is depended on", target.report)
+            if is_accepted and not report.had_errors:
+                place, digests = target.beside(package), as_inputs(interfaces, library)
+                others[package] = package_of(whole, place, digests, library)
+        return needed[package]
 
     packages: list[Package | None] = []
     for model, (target, package) in zip(models, requested.items(), strict=True):
+        beside = set[str]()
+        if vendoring == "beside":
+            beside = derive.closure(_needed(model) - own, partial(needed_by, target))
         packages.append(
             package_of(
                 model,
                 target,
                 package.digests,
                 library,
-                check=check,
                 vendoring=vendoring,
                 copies=_copies(model, compiler, target.report) if vendoring == "private" else (),
-                beside=beside(model, target) if vendoring == "beside" else (),
+                beside=sorted(beside),
             )
         )
     packages += [others[name] for name in sorted(others)]

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from bisect import bisect
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import takewhile
+from itertools import groupby, takewhile
 from typing import TypeAlias
 
 from idlc.language import tree
@@ -178,10 +178,8 @@ def _place(words: _Column) -> None:
     """Close the stray gaps before the words of one kind in a section."""
     columns = _columns(words)
     usual = _common_gap(words)
-    blocks: dict[int, _Column] = defaultdict(list)
-    for row, word in words:
-        blocks[row.block].append((row, word))
-    for block in blocks.values():
+    for _, group in groupby(words, lambda pair: pair[0].block):
+        block = list(group)
         gaps = {word.gap for row, word in block if not row.is_comment}
         alone = len(block) == 1 and block[0][1].kind != "comment"
         if len(gaps) == 1 and "" not in gaps and not alone:

@@ -21,6 +21,7 @@ from idlc.model.describe import (
     FieldDict,
     IndividualDict,
     TypeDict,
+    individual,
 )
 from idlc.model.distros import NEWEST
 from idlc.model.ir import spell
@@ -32,11 +33,6 @@ _PRIMITIVES = {
     info.type_id: ir.Primitive(name) for name, info in ir.PRIMITIVES.items() if name != "char"
 }
 _STRINGS = {type_id: kind for kind, type_id in STRING_TYPE_IDS.items()}
-_DUMMY: FieldDict = {
-    "name": ir.DUMMY_FIELD,
-    "type": {"type_id": 3, "capacity": 0, "string_capacity": 0, "nested_type_name": ""},
-    "default_value": "",
-}
 
 
 class DescriptionError(ValueError):
@@ -74,7 +70,7 @@ def model_of_description(
 def _message(part: IndividualDict, program: str) -> ir.Message:
     name = _type_name(part["type_name"])
     bare: list[FieldDict] = [{**field, "default_value": ""} for field in part["fields"]]
-    written = part["fields"] if bare != [_DUMMY] else []
+    written = part["fields"] if bare != individual(ir.Message(name=name))["fields"] else []
     types: dict[str, ir.FieldType] = {}
     for field in written:
         if not _NAME.fullmatch(field["name"]) or field["name"] in types:

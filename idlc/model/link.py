@@ -144,14 +144,14 @@ class Pool:
     def graph(self, names: Iterable[ir.TypeName]) -> Graph:
         """Return interfaces and all that they refer to, `None` for missing ones."""
         graph: Graph = {}
-        waiting = list(names)
-        while waiting:
-            name = waiting.pop()
-            if name not in graph:
-                entry = self.get(name)
-                targets = tuple(target for _, target in entry.references) if entry else ()
-                graph[name] = (entry.interface if entry else None, targets)
-                waiting += targets
+
+        def targets(name: ir.TypeName) -> Iterable[ir.TypeName]:
+            entry = self.get(name)
+            references = tuple(target for _, target in entry.references) if entry else ()
+            graph[name] = (entry.interface if entry else None, references)
+            return references
+
+        derive.closure(names, targets)
         return graph
 
     def errors(self, name: ir.TypeName) -> list[Diagnostic]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import takewhile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
 
@@ -25,13 +25,8 @@ if TYPE_CHECKING:
     from idlc.language import idl
 
 
-class _Element(msgspec.Struct, frozen=True):
-    """A definition with the lines whose comments belong to it."""
-
-    line: tree.Line
-    body: tree.Field | tree.Constant
-    comments: list[tree.Line]
-    optional: bool
+#: A definition on its line, the lines whose comments belong to it, and whether it is `@optional`.
+_Element: TypeAlias = tuple[tree.Line, tree.Field | tree.Constant, list[tree.Line], bool]
 
 
 class _Section(msgspec.Struct):
@@ -50,14 +45,13 @@ class _Section(msgspec.Struct):
         comment = self._condense(texts, head, has_unit=False)
         fields: list[ir.Field] = []
         constants: list[ir.Constant] = []
-        for element in self._elements(len(head)):
-            body, lines = element.body, element.comments
+        for line, body, lines, optional in self._elements(len(head)):
             # only the comments at the head of a section keep their trailing whitespace
             texts = [line.comment.replace("\t", " ").rstrip().lstrip("#") for line in lines]
             about = self._condense(texts, lines, has_unit=isinstance(body, tree.Field))
             if isinstance(body, tree.Field):
-                fields.append(self._field(element.line, body, about, optional=element.optional))
-            elif constant := self._constant(element.line, body, about):
+                fields.append(self._field(line, body, about, optional=optional))
+            elif constant := self._constant(line, body, about):
                 constants.append(constant)
         return ir.Message(
             name=self.name,
@@ -71,12 +65,12 @@ class _Section(msgspec.Struct):
     def _elements(self, first: int) -> list[_Element]:
         """Return the sound definitions with their comments; report the broken ones."""
         elements: list[_Element] = []
+        latest: list[tree.Line] = []  # the comments of the last definition
         pending: list[tree.Line] = []
         optional = False
         for line in self.lines[first:]:
             if line.is_indented_comment:
-                if elements:
-                    elements[-1].comments.append(line)
+                latest.append(line)
                 continue
             if line.comment:
                 pending.append(line)
@@ -96,7 +90,8 @@ class _Section(msgspec.Struct):
                 self._add(line, 0, body, self._edits(line, body))
             else:
                 self._warn_hash(line, text)
-                elements.append(_Element(line, body, pending, optional))
+                elements.append((line, body, pending, optional))
+                latest = pending
             pending = []
             optional = False
         return elements

@@ -69,11 +69,6 @@ def field(name: str) -> FieldName:
     return FieldName(public_name(name))
 
 
-def hides_method(name: str) -> bool:
-    """Return whether a message class offers a method of a field's name."""
-    return name in METHODS
-
-
 def slot(name: str) -> SlotName:
     """Return the slot of a field."""
     return SlotName(slot_name(name))

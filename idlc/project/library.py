@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
@@ -23,6 +23,9 @@ from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import installed
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+
+#: The texts of interfaces by name.
+Texts: TypeAlias = Mapping[ir.TypeName, Source]
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -105,7 +108,7 @@ class Library:
         own: Mapping[str, Sequence[Path]] | None = None,
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
-        texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
+        texts: Texts = MappingProxyType({}),
     ) -> None:
         self.distro = distro
         self.texts = texts

@@ -6,14 +6,10 @@ from collections.abc import Iterable, Iterator
 from struct import Struct
 from typing import Any
 
+from idlc.recordings.containers.records import HEAD, MESSAGE_HEAD, MESSAGE_OP
+
 #: What precedes each message in a length-delimited stream.
 LENGTH = Struct("<I")
-
-#: What precedes each record of an MCAP chunk: opcode and length.
-MCAP_RECORD = Struct("<BQ")
-MCAP_MESSAGE = 5
-#: What precedes the data of an MCAP message: channel, sequence, log and publish time.
-MCAP_HEAD = Struct("<HIQQ")
 
 
 class Batch:
@@ -64,12 +60,12 @@ def split_mcap_chunk(records: Any, channel: int) -> Iterator[memoryview]:
     view = memoryview(records).cast("B")
     at = 0
     while at < len(view):
-        start = at + MCAP_RECORD.size
-        code, size = MCAP_RECORD.unpack_from(view, at) if start <= len(view) else (0, 0)
+        start = at + HEAD.size
+        code, size = HEAD.unpack_from(view, at) if start <= len(view) else (0, 0)
         end = start + size
-        data = start + MCAP_HEAD.size
-        if start > len(view) or end > len(view) or (code == MCAP_MESSAGE and data > end):
+        data = start + MESSAGE_HEAD.size
+        if start > len(view) or end > len(view) or (code == MESSAGE_OP and data > end):
             raise ValueError(f"the chunk ends within a record at byte {at}")
-        if code == MCAP_MESSAGE and MCAP_HEAD.unpack_from(view, start)[0] == channel:
+        if code == MESSAGE_OP and MESSAGE_HEAD.unpack_from(view, start)[0] == channel:
             yield view[data:end]
         at = end

@@ -14,7 +14,7 @@ from importlib import import_module
 from importlib.abc import ExecutionLoader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from idlc import runtime
 from idlc.check.compiler import Compiler, library_for, sources_of
@@ -22,11 +22,14 @@ from idlc.diagnostics.report import Report
 from idlc.generate.target import requested_packages
 from idlc.generate.types import content
 from idlc.model import ir
+from idlc.model.distros import Distro
+from idlc.model.link import Model
 from idlc.model.python_names import class_
 from idlc.project.find import is_path
 from idlc.project.library import resolve
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
+from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
@@ -36,12 +39,7 @@ from idlc.runtime.message import SHOWN, InterfaceMeta
 from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import Structure, Types, structure_of
 
-if TYPE_CHECKING:
-    from idlc.model.distros import Distro
-    from idlc.model.link import Model
-    from idlc.recordings.containers.container import Topic
-
-Models = dict[str, "Model"]
+Models = dict[str, Model]
 
 
 # packages in memory
@@ -165,10 +163,7 @@ class LoadedPackages(ModuleType):
 
     def __init__(self, models: Models, names: Iterable[ir.TypeName]) -> None:
         super().__init__(_home_of(models), "What `idlc.load` compiled.")
-        self._packages = {
-            package: sorted({own.name.kind for own in model.own})
-            for package, model in sorted(models.items())
-        }
+        self._packages = {package: model.kinds for package, model in sorted(models.items())}
         self._interfaces = {str(class_(name)): name for name in names}
 
     def __getattr__(self, name: str) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -10,11 +10,12 @@ import msgspec
 from idlc.check.compiler import derived_names
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report, Severity, first_few
-from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.generate.target import borrowed
 from idlc.model import ir
 from idlc.project import inputs, prefixes
+from idlc.project.library import Texts
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
 
@@ -79,7 +80,7 @@ def recorded_models(
 
 def recorded_packages(
     paths: Sequence[str], topics_wanted: Sequence[str], scope: Scope, report: Report, *, whole: bool
-) -> tuple[list[inputs.Inputs], Mapping[ir.TypeName, Source]]:
+) -> tuple[list[inputs.Inputs], Texts]:
     """Return the packages of recorded types with all that these need, and their definitions.
 
     `whole` packages are for a prefix, where they hide those of the same name in others.

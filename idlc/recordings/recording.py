@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from datetime import datetime, timedelta, timezone
 from fractions import Fraction
 from functools import cached_property
@@ -341,7 +341,7 @@ class Part(Selection):
 PART = 1 << 25
 
 
-class Recording(Mapping[str, "RecordedTopic"]):
+class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording"]):
     """An open recording: a mapping from names of topics to their messages.
 
     `path` is an .mcap or .db3 file, the folder of a bag, a list of these which are then one
@@ -397,9 +397,6 @@ class Recording(Mapping[str, "RecordedTopic"]):
     def close(self) -> None:
         """Close the files. Columns and messages that were made stay as they are."""
         self._container.close()
-
-    def __enter__(self) -> Recording:  # noqa: PYI034 # Self came with Python 3.11
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

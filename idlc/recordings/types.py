@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
@@ -20,18 +20,15 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lower import lower
 from idlc.project import inputs
-from idlc.project.library import Library
+from idlc.project.library import Library, Texts
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.file import UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
-from idlc.wire.layout import ContentSizes, oversized
-
-if TYPE_CHECKING:
-    from idlc.project.root import Root
-
+from idlc.wire.layout import oversized
 
 #: The number of versions that a topic is compared with.
 TRIED = 16
@@ -142,9 +139,7 @@ class Contents:
     def __init__(self) -> None:
         self._contents: dict[tuple[ir.TypeName, str, bool], Hashable] = {}
 
-    def agree(
-        self, some: Mapping[ir.TypeName, Source], others: Mapping[ir.TypeName, Source]
-    ) -> bool:
+    def agree(self, some: Texts, others: Texts) -> bool:
         """Return whether no name has different definitions in both."""
         return all(
             self.same(name, source, others[name]) for name, source in some.items() if name in others
@@ -270,9 +265,7 @@ class RecordedTypes:
         every = Report()
         self.models = compiler.models(self.interfaces, every)
         if not every.had_errors:
-            extents: ContentSizes = {}
-            for model in self.models.values():
-                every.extend(oversized(model, extents))
+            every.extend(oversized(*self.models.values()))
         self.errors = Report()
         self.errors.extend(every.errors)
         faulty = {diagnostic.where[0] for diagnostic in self.errors}

@@ -166,48 +166,43 @@ class _ContentSize(NamedTuple):
     depth: int
 
 
-ContentSizes: TypeAlias = dict[ir.TypeName, _ContentSize]
+def oversized(*models: Model) -> Iterator[Diagnostic]:
+    """Yield a problem for each own interface of models that is over a limit, or for all of a model.
 
-
-def oversized(model: Model, sizes: ContentSizes | None = None) -> Iterator[Diagnostic]:
-    """Yield a problem for each of the model's own interfaces that is over a limit, or for all.
-
-    Packages that were compiled together share `sizes`, so that each structure is measured once.
+    Models that were compiled together are measured together, each structure once.
     """
-    sizes = {} if sizes is None else sizes
-    own = {message.name: message for each in model.own for message in derive.messages(each)}
-    waiting = list(own)
-    while waiting:  # each structure after its parts; with a stack, so depth is no limit
-        name = waiting[-1]
-        structure = own[name] if name in own else model.interfaces[name]
-        assert isinstance(structure, ir.Message)
-        held = structure.references
-        if missing := [reference for reference in held if reference not in sizes]:
-            waiting += missing
-            continue
-        del waiting[-1]
-        sizes[name] = _ContentSize(
-            len(structure.wire_fields) + sum(sizes[reference].fields for reference in held),
-            1 + max((sizes[reference].depth for reference in held), default=0),
-        )
-    total, refused = 0, False
-    for interface in model.own:
-        parts = [sizes[message.name] for message in derive.messages(interface)]
-        fields, depth = max(part.fields for part in parts), max(part.depth for part in parts)
-        path = interface.source.path if interface.source else str(interface.name)
-        total += sum(part.fields for part in parts)
-        if fields > MAX_FIELDS:
-            number = f"{fields:,}" if fields < 10**12 else "more than 10^12"
-            message = f"`{interface.name}` has {number} fields, nested ones included"
-            hint = f"split it up; code is generated for at most {MAX_FIELDS:,}"
-        elif depth > MAX_DEPTH:
-            message = f"`{interface.name}` nests messages {depth} deep"
-            hint = f"flatten it; code is generated for a depth of at most {MAX_DEPTH}"
-        else:
-            continue
-        refused = True
-        yield codes.STRUCTURE_TOO_LARGE.of(path, message, hint=hint)
-    if total > MAX_PACKAGE_FIELDS and not refused:
-        message = f"`{model.package}` has {total:,} fields, nested ones included"
-        hint = f"split it into packages; code is generated for at most {MAX_PACKAGE_FIELDS:,}"
-        yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)
+    sizes: dict[ir.TypeName, _ContentSize] = {}
+    for model in models:
+        waiting = [message.name for own in model.own for message in derive.messages(own)]
+        while waiting:  # each structure after its parts; with a stack, so depth is no limit
+            name = waiting[-1]
+            structure = model.messages[name]
+            held = structure.references
+            if missing := [reference for reference in held if reference not in sizes]:
+                waiting += missing
+                continue
+            del waiting[-1]
+            sizes[name] = _ContentSize(
+                len(structure.wire_fields) + sum(sizes[reference].fields for reference in held),
+                1 + max((sizes[reference].depth for reference in held), default=0),
+            )
+        total, refused = 0, False
+        for interface in model.own:
+            parts = [sizes[message.name] for message in derive.messages(interface)]
+            fields, depth = max(part.fields for part in parts), max(part.depth for part in parts)
+            total += sum(part.fields for part in parts)
+            if fields > MAX_FIELDS:
+                number = f"{fields:,}" if fields < 10**12 else "more than 10^12"
+                message = f"`{interface.name}` has {number} fields, nested ones included"
+                hint = f"split it up; code is generated for at most {MAX_FIELDS:,}"
+            elif depth > MAX_DEPTH:
+                message = f"`{interface.name}` nests messages {depth} deep"
+                hint = f"flatten it; code is generated for a depth of at most {MAX_DEPTH}"
+            else:
+                continue
+            refused = True
+            yield codes.STRUCTURE_TOO_LARGE.of(ir.path_of(interface), message, hint=hint)
+        if total > MAX_PACKAGE_FIELDS and not refused:
+            message = f"`{model.package}` has {total:,} fields, nested ones included"
+            hint = f"split it into packages; code is generated for at most {MAX_PACKAGE_FIELDS:,}"
+            yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)

@@ -11,7 +11,8 @@ from typing import TypeAlias
 
 import msgspec
 
-from idlc.model import ir, python_names
+from idlc.model import ir
+from idlc.model.python_names import Locals, slot
 from idlc.wire.layout import Messages
 
 
@@ -104,14 +105,9 @@ class Numbers(msgspec.Struct, frozen=True):
         return ir.PRIMITIVES[self.primitive].size
 
     @property
-    def numpy(self) -> str:
-        """Numpy's name of an element's type."""
-        return ir.PRIMITIVES[self.primitive].dtype
-
-    @property
-    def code(self) -> str:
-        """The array type code."""
-        return ir.PRIMITIVES[self.primitive].code
+    def info(self) -> ir.PrimitiveInfo:
+        """The facts of an element's type."""
+        return ir.PRIMITIVES[self.primitive]
 
 
 class Bytes(msgspec.Struct, frozen=True):
@@ -165,11 +161,7 @@ FEW = 4
 
 
 def steps(
-    message: ir.Message,
-    messages: Messages,
-    names: python_names.Locals,
-    owner: str = "message",
-    path: str = "",
+    message: ir.Message, messages: Messages, names: Locals, owner: str = "message", path: str = ""
 ) -> tuple[Step, ...]:
     """Return the steps of a structure whose object is in the variable `owner`.
 
@@ -180,8 +172,7 @@ def steps(
     plan: list[Step] = []
     for field in message.fields:
         inner = f"{path}_{field.name}" if path else field.name
-        slot = python_names.slot(field.name)
-        place = Place(owner, slot, inner, names.field(inner), message.name)
+        place = Place(owner, slot(field.name), inner, names.field(inner), message.name)
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             plan.append(Enter(place, field.type.target, not nested.fields))
@@ -191,9 +182,7 @@ def steps(
     return tuple(plan)
 
 
-def _step(
-    type_: ir.FieldType, place: Place, messages: Messages, names: python_names.Locals
-) -> Step:
+def _step(type_: ir.FieldType, place: Place, messages: Messages, names: Locals) -> Step:
     match type_:
         case ir.Primitive(name):
             return Number(place, CODES.get(name, type_.info.code), type_.info.size)

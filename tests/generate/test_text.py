@@ -199,7 +199,7 @@ def views():
         for module in render.module_views(interface, model.messages, names):
             yield module.template, {"module": module.view}
     for kind in ("msg", "srv", "action"):
-        yield "package_init", {"package": imports.package(model, kind, names)}
+        yield "package_init", {"package": imports.package(model, kind, names, imports.ALONE)}
 
 
 def with_an_ordinary_string(view):

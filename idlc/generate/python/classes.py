@@ -26,20 +26,14 @@ class ConstantView(msgspec.Struct, frozen=True):
 
 
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
-    """A message class.
-
-    `receiver`, `options` and `builtins` are what its methods call `self`, further keywords and the
-    module of builtins, which fields may hide. `usual` is the class of the first field's values.
-    """
+    """A message class; `usual` is the class of the first field's values."""
 
     name: Code
     docstring: Docstring
     constants: tuple[ConstantView, ...]
     fields: tuple[FieldView, ...]
     usual: Code
-    receiver: Code
-    options: Code
-    builtins: Code
+    naming: Naming
 
 
 class GroupView(msgspec.Struct, frozen=True):
@@ -50,27 +44,17 @@ class GroupView(msgspec.Struct, frozen=True):
     stem: Code
 
 
-def message(
-    structure: ir.Message, references: References, purpose: str, file: str, *, converts: bool
-) -> MessageView:
-    """Return the view of a structure's class.
-
-    `purpose` is its docstring without a comment, `file` the one that defines it.
-    """
+def message(structure: ir.Message, references: References, purpose: str) -> MessageView:
+    """Return the view of a structure's class; `purpose` is its docstring without a comment."""
     naming = Naming.of(structure)
     usual = [fields.usual_class(field, references, naming) for field in structure.fields[:1]]
     return MessageView(
         name=Code(references.name(structure.name)),
-        docstring=fields.message(structure, purpose, file),
-        constants=tuple(_constants(structure, file)),
-        fields=tuple(
-            fields.view(field, references, naming, file, converts=converts)
-            for field in structure.fields
-        ),
+        docstring=fields.message(structure, purpose, references.file),
+        constants=tuple(_constants(structure, references.file)),
+        fields=tuple(fields.view(field, references, naming) for field in structure.fields),
         usual=usual[0] if usual else Code(""),
-        receiver=naming.receiver,
-        options=naming.options,
-        builtins=naming.builtins,
+        naming=naming,
     )
 
 
@@ -80,8 +64,9 @@ def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
         docstring = fields.attribute(constant, file)
         yield ConstantView(Code(constant.name), value, docstring=docstring)
     for field in structure.fields:
-        if field.default:
-            yield ConstantView(Code(fields.default_name(field)), *fields.default(field))
+        if default := field.default:
+            name = Code(fields.default_name(field))
+            yield ConstantView(name, *fields.default(field.type, default.value))
 
 
 def group(interface: ir.Service | ir.Action) -> GroupView:

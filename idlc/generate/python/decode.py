@@ -10,6 +10,7 @@ afterwards, by the runtime.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeAlias
 
 from idlc.generate.python.lines import Block, Comprehension, Group, Line, Statement, call
 from idlc.generate.python.positions import Builder, Cursor, Tables, ValueRun
@@ -17,6 +18,9 @@ from idlc.model import ir
 from idlc.model.names import snake_case
 from idlc.wire import plan
 from idlc.wire.layout import multiple_of
+
+#: Functions or classes by the types that they are of.
+Names: TypeAlias = Mapping[ir.TypeName, str]
 
 TOO_SHORT = (Line('raise ValueError("too short")'),)
 TOO_MANY = (Line('raise ValueError("too many elements")'),)
@@ -60,11 +64,7 @@ def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
 
 
 def decode(
-    steps: tuple[plan.Step, ...],
-    tables: Tables,
-    own: str,
-    makers: dict[ir.TypeName, str],
-    foreign: Mapping[ir.TypeName, str],
+    steps: tuple[plan.Step, ...], tables: Tables, own: str, makers: Names, foreign: Names
 ) -> tuple[Statement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
@@ -96,13 +96,7 @@ class _Decoder(Builder):
     sizes of strings are in `words` and their text in `chars`.
     """
 
-    def __init__(
-        self,
-        tables: Tables,
-        makers: dict[ir.TypeName, str],
-        foreign: Mapping[ir.TypeName, str],
-        source: str,
-    ) -> None:
+    def __init__(self, tables: Tables, makers: Names, foreign: Names, source: str) -> None:
         super().__init__(tables, Cursor("", 4, multiple_of(8)))
         self.makers = makers
         self.foreign = foreign
@@ -273,10 +267,10 @@ class _Decoder(Builder):
     def numbers(self, step: plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
         raw = self.buffer(self.count(step.bound, step.place.path), step.unit, step.unit, "view")
-        name, reading = step.numpy, "reading"
+        name, reading = step.info.dtype, "reading"
         if foreign := self.foreign.get(step.place.type):  # the class that holds it
             name, reading = f"{name}_of_{snake_case(foreign)}", f"reading.of({foreign})"
-        function = call("sequence_reader", "order", f'"{step.code}"', reading)
+        function = call("sequence_reader", "order", f'"{step.info.code}"', reading)
         reader = self.tables.function(f"sequence_of_{name}", function)
         self.line(call(reader, raw), step.place.text)
 

@@ -220,11 +220,6 @@ class _Encoder(Builder):
         else:
             self.store_position("at")
 
-    def note(self, value: str, target: str) -> None:
-        """Note a position; dropped later unless it is read."""
-        assert target == "at"
-        self.body.append(Note(value, self.position.reads))
-
     # Values of variable or large size are parts of their own.
 
     def pad(self, align: int, unless_empty: str = "") -> None:
@@ -282,14 +277,14 @@ class _Encoder(Builder):
         """Emit a numeric sequence."""
         local, value = step.place.local, step.place.text
         count = self.tables.local(f"{step.place.path}_count")
-        arguments = f'order, "{step.code}"'
+        dtype, arguments = step.info.dtype, f'order, "{step.info.code}"'
         if self.looping:
-            copier = self.tables.function(f"bytes_of_{step.numpy}", f"sequence_copier({arguments})")
+            copier = self.tables.function(f"bytes_of_{dtype}", f"sequence_copier({arguments})")
             self.line(call(copier, value), local)
             self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
         else:
             self.line(value, local)
-            writer = self.tables.function(f"array_of_{step.numpy}", f"sequence_writer({arguments})")
+            writer = self.tables.function(f"array_of_{dtype}", f"sequence_writer({arguments})")
             array = self.tables.function("array", "array_of(order)")
             converted = Line(call(writer, local), local)
             self.body.append(Block(f"if type({local}) is not {array}:", (converted,)))

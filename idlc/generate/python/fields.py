@@ -37,7 +37,7 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
         is_later = "\n---" in f"\n{source.text[:start]}"
         place = file if is_later else f"{file}:{source.position(start)[0]}"
     comment = _lines(structure.comment)
-    names = [field.name for field in structure.fields if python_names.hides_method(field.name)]
+    names = [field.name for field in structure.fields if field.name in python_names.METHODS]
     if not comment and not names and place:
         purpose, place = f"{purpose.removesuffix('.')}, defined in {place}.", ""
     line, *more = comment or [purpose]
@@ -117,7 +117,7 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Naming(msgspec.Struct, frozen=True):
-    """The names in a class of what its fields could hide: `self` and builtins."""
+    """The names in a class of what its fields could hide: `self`, keywords and builtins' module."""
 
     receiver: Code
     options: Code
@@ -139,36 +139,30 @@ def shadows(structure: ir.Message) -> bool:
     return any(python_names.field(field.name) in BUILTINS for field in structure.fields)
 
 
-def support(type_: ir.FieldType) -> str:
-    """Return what a field needs of the runtime: "sequence", "array" or nothing."""
-    if (
-        isinstance(type_, (ir.Sequence, ir.Array))
-        and isinstance(type_.element, ir.Primitive)
-        and type_.element.name not in LIST_PRIMITIVES
-    ):
-        return "sequence" if isinstance(type_, ir.Sequence) else "array"
-    return ""
+def numbers(type_: ir.FieldType) -> ir.PrimitiveInfo | None:
+    """Return the facts of the elements of a numeric array; `None` for any other type."""
+    match type_:
+        case ir.Sequence(ir.Primitive(name)) | ir.Array(ir.Primitive(name)):
+            return None if name in LIST_PRIMITIVES else ir.PRIMITIVES[name]
+    return None
 
 
-def numeric_class(type_: ir.Sequence | ir.Array) -> str:
+def numeric_class(type_: ir.FieldType, info: ir.PrimitiveInfo) -> str:
     """Return the descriptor class of a numeric array."""
-    assert isinstance(type_.element, ir.Primitive)
-    name = type_.element.info.dtype
+    name = info.dtype
     stem = name.replace("uint", "UInt") if name.startswith("u") else name.capitalize()
     return f"_idlc.{stem}Sequence" if isinstance(type_, ir.Sequence) else f"_arrays.{stem}Array"
 
 
-def view(
-    field: ir.Field, references: References, naming: Naming, file: str, *, converts: bool
-) -> FieldView:
-    """Return the view of a field; `file` is the one that defines it.
+def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
+    """Return the view of a field.
 
-    With `converts`, `None` is the default of any field, and a list is made of any iterable.
+    If the class converts values, `None` is the default, and a list is made of any iterable.
     """
     name = python_names.field(field.name)
-    annotation, parameter, fresh = _shape(field, references, naming, converts=converts)
+    annotation, parameter, fresh = _shape(field, references, naming)
     # type checkers take a field of a method's name for a mistake
-    ignored = "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
+    ignored = "  # type: ignore[assignment]" if name in python_names.METHODS else ""
     is_list = isinstance(field.type, (ir.Array, ir.Sequence))
     return FieldView(
         name=Code(name),
@@ -178,8 +172,8 @@ def view(
         annotation=Code(annotation + ignored),
         parameter=Code(parameter),
         fresh=Code(fresh),
-        docstring=attribute(field, file),
-        numbers=bool(support(field.type)),
+        docstring=attribute(field, references.file),
+        numbers=numbers(field.type) is not None,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
         is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
     )
@@ -187,28 +181,27 @@ def view(
 
 def usual_class(field: ir.Field, references: References, naming: Naming) -> Code:
     """Return the class of what is usually assigned to a field; empty if it takes any values."""
-    if support(field.type):
+    if numbers(field.type):
         return Code("")
     if isinstance(field.type, (ir.Array, ir.Sequence)):
         return Code(f"{naming.builtins}list")
     return Code(_builtin(_element(field.type, references), naming))
 
 
-def _shape(
-    field: ir.Field, references: References, naming: Naming, *, converts: bool
-) -> tuple[str, str, str]:
+def _shape(field: ir.Field, references: References, naming: Naming) -> tuple[str, str, str]:
     """Return a field's annotation, its parameter and its fresh default."""
     element = _builtin(_element(ir.element_of(field.type), references), naming)
     if isinstance(field.type, (ir.Primitive, ir.String)):
-        default = _scalar_default(field)
-        if converts:
-            return element, f"{element} | None = None", default
-        return element, f"{element} = {default}", ""
+        declared = field.default and default(field.type, field.default.value)[0]
+        value = declared or zero(field.type)
+        if references.converts:
+            return element, f"{element} | None = None", value
+        return element, f"{element} = {value}", ""
     if isinstance(field.type, ir.Ref):
         return element, f"{element} | None = None", f"{element}()"
-    if support(field.type):
-        annotation, values, fresh = _numbers(field.type)
-    elif converts:
+    if info := numbers(field.type):
+        annotation, values, fresh = _numbers(field.type, info)
+    elif references.converts:
         inside = getattr(ir.element_of(field.type), "name", "")
         read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
         annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({read})"
@@ -237,13 +230,6 @@ def _element(element: ir.Element, references: References) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def _scalar_default(field: ir.Field) -> str:
-    assert isinstance(field.type, (ir.Primitive, ir.String))
-    if field.default is not None and not isinstance(field.default.value, tuple):
-        return literals.scalar(field.type, field.default.value)
-    return zero(field.type)
-
-
 def zero(element: ir.Element) -> str:
     """Return the literal of the value without a declared default."""
     if isinstance(element, ir.Primitive):
@@ -260,11 +246,9 @@ def _fresh_list(field: ir.Field, references: References) -> str:
     return "[]"
 
 
-def _numbers(type_: ir.FieldType) -> tuple[str, str, str]:
+def _numbers(type_: ir.FieldType, info: ir.PrimitiveInfo) -> tuple[str, str, str]:
     """Return the annotation of an array of numbers, what it takes, and its fresh default."""
-    assert isinstance(type_, (ir.Sequence, ir.Array))
-    assert isinstance(type_.element, ir.Primitive)
-    descriptor, info = numeric_class(type_), type_.element.info
+    descriptor = numeric_class(type_, info)
     if isinstance(type_, ir.Array):
         fresh = f"_arrays.zeros({type_.size}, _arrays.{info.dtype.upper()})"
         return f"{descriptor} = {descriptor}({type_.size})", "_arrays.Values", fresh
@@ -277,16 +261,12 @@ def default_name(field: ir.Field) -> str:
     return f"{field.name.upper()}__DEFAULT"
 
 
-def default(field: ir.Field) -> tuple[Code, tuple[Code, ...]]:
-    """Return the value of a field's declared default: an expression, or a function's arguments."""
-    if isinstance(field.type, (ir.Primitive, ir.String)):
-        return Code(_scalar_default(field)), ()
-    values: tuple[Code, ...] = ()
-    if field.default is not None:
-        assert isinstance(field.default.value, tuple)
-        element = ir.element_of(field.type)
-        values = tuple(Code(literals.scalar(element, value)) for value in field.default.value)
-    if support(field.type):
-        assert isinstance(field.type, (ir.Sequence, ir.Array))
-        return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type)}.of"), *values)
+def default(type_: ir.FieldType, value: ir.Value) -> tuple[Code, tuple[Code, ...]]:
+    """Return a declared default of a type: an expression, or a function and its arguments."""
+    element = ir.element_of(type_)
+    if not isinstance(value, tuple):
+        return Code(literals.scalar(element, value)), ()
+    values = tuple(Code(literals.scalar(element, item)) for item in value)
+    if info := numbers(type_):
+        return Code("_idlc.Fresh"), (Code(f"{numeric_class(type_, info)}.of"), *values)
     return Code("_idlc.FreshList" if values else "_idlc.FreshList()"), values

@@ -74,8 +74,9 @@ VENDORED = Surroundings(runtime="....", others="...vendor.")
 
 
 class References:
-    """The names of all classes that a module mentions.
+    """The names of all classes that a module mentions, and what else its classes refer to.
 
+    `file` defines them, within the package; with `converts` they convert values as Lyrical's do.
     `own` are the structures that it defines or writes, `direct` those that their fields name,
     of which `others` are of other packages.
     """
@@ -87,6 +88,8 @@ class References:
         messages: Messages,
         modules: python_names.Modules,
         surroundings: Surroundings,
+        *,
+        converts: bool = False,
     ) -> None:
         self._modules = dict(modules)
         for message in derive.messages(interface):
@@ -94,6 +97,8 @@ class References:
         self.surroundings = surroundings
         self.package = interface.name.package
         self.kind = interface.name.kind
+        self.file = interface.name.file
+        self.converts = converts
         self.own = {message.name for message in structures}
         named = {name for message in structures for name in message.references}
         self.direct = named - self.own
@@ -195,10 +200,7 @@ def _parts(service: ir.Service, value: str) -> dict[ir.TypeName, str]:
 
 
 def package(
-    model: link.Model,
-    kind: ir.Kind,
-    modules: python_names.Modules,
-    surroundings: Surroundings = ALONE,
+    model: link.Model, kind: ir.Kind, modules: python_names.Modules, surroundings: Surroundings
 ) -> PackageView:
     """Return the view of one kind's package."""
     names: list[NameView] = []

@@ -44,10 +44,11 @@ class Put(msgspec.Struct, frozen=True):
 
 
 class Note(msgspec.Struct, frozen=True):
-    """An update of `at`, without other effect; `reads` tells that it depends on `at` before."""
+    """An update of a position, by default `at`; `reads` tells that it depends on `at` before."""
 
     value: str
     reads: bool
+    target: str = "at"
 
 
 class Block(msgspec.Struct, frozen=True):
@@ -114,8 +115,8 @@ def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
             case Line(value, target, operator):
                 *targets, last = layout_lines(target, indent)
                 lines += [*targets, *layout_lines(value, indent, f"{last.strip()} {operator} ")]
-            case Note(value):
-                lines += text_of((Line(value, "at"),), indent)
+            case Note(value, _, target):
+                lines += text_of((Line(value, target),), indent)
             case Put(part):
                 lines += layout_lines(Group("put", (part,)), indent)
             case Block(head, inner):

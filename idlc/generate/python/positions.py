@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import msgspec
 from msgspec.structs import replace
 
-from idlc.generate.python.lines import Block, Line, Node, Statement, call
+from idlc.generate.python.lines import Block, Line, Node, Note, Statement, call
 from idlc.model import ir, python_names
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
@@ -98,24 +97,12 @@ class Builder:
         """Emit a statement without effect on the position."""
         self.body.append(Line(value, target))
 
-    @contextmanager
-    def within(self, head: str) -> Iterator[None]:
-        """Put the statements emitted meanwhile into the body of a compound statement."""
-        outside, self.body = self.body, []
-        yield
-        outside.append(Block(head, tuple(self.body)))
-        self.body = outside
-
     def store_position(self, base: str, offset: int = 0) -> None:
         """Store the position in the variable `base`, as `base + offset`."""
         value = self.position.text(-offset)
         if value != base:
-            self.note(value, base)
+            self.body.append(Note(value, self.position.reads, base))
         self.position = self.position.at(base, offset)
-
-    def note(self, value: str, target: str) -> None:
-        """Emit the assignment of a position to a variable."""
-        self.line(value, target)
 
     def loop(self, head: str, emit: Callable[[], None]) -> None:
         """Emit a loop; `emit` emits its body, until the known alignment holds for each round.
@@ -123,23 +110,21 @@ class Builder:
         Between two rounds the position is in `at`, or in `end` if the body ends with a string.
         """
         entry, first = self.position, self.position.at("at")
-        looping, self.looping = self.looping, True
+        outside, looping, self.looping = self.body, self.looping, True
         while True:
             mark = self.tables.mark()
-            with self.within(head):
-                self.position = first
-                emit()
-                again = first.with_alignment(first.alignment.meet(self.position.alignment))
-                if first.base == "at" and self.position.base == "end":
-                    again = again.at("end", self.position.offset)
-                self.store_position(again.base, again.offset)
-            loop = self.body.pop()
+            self.body, self.position = [], first
+            emit()
+            again = first.with_alignment(first.alignment.meet(self.position.alignment))
+            if first.base == "at" and self.position.base == "end":
+                again = again.at("end", self.position.offset)
+            self.store_position(again.base, again.offset)
             if again == first:
                 break
             first = again
             self.tables.reset(mark)
-        self.looping = looping
-        self.position = entry
+        loop, self.body = Block(head, tuple(self.body)), outside
+        self.looping, self.position = looping, entry
         self.store_position(first.base, first.offset)
         self.body.append(loop)
         self.position = first

@@ -175,10 +175,10 @@ def module_views(
     With `converts`, classes convert values as Lyrical's do.
     """
     name, home, written = interface.name, names[interface.name], derive.sections(interface)
-    references = References(interface, written, messages, names, surroundings)
+    references = References(interface, written, messages, names, surroundings, converts=converts)
     every = [field for structure in written for field in structure.fields]
     is_foreign = references.others and not surroundings.vendors
-    is_hiding = any(python_names.hides_method(field.name) for field in every)
+    is_hiding = any(field.name in python_names.METHODS for field in every)
     purposes = zip(written, fields.purposes(interface), strict=True)
     view = ModuleView(
         origin=Text(f"{name}.{name.kind}"),
@@ -187,8 +187,7 @@ def module_views(
         runtime=Code(surroundings.runtime),
         imports=_code(_imports(references, written)),
         messages=tuple(
-            classes.message(structure, references, purpose, name.file, converts=converts)
-            for structure, purpose in purposes
+            classes.message(structure, references, purpose) for structure, purpose in purposes
         ),
         group=None if isinstance(interface, ir.Message) else classes.group(interface),
         converts=converts,
@@ -210,15 +209,15 @@ def module_views(
 
 def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
     every = [field for message in structures for field in message.fields]
-    used = {fields.support(field.type) for field in every}
+    numeric = [field for field in every if fields.numbers(field.type)]
     standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
-    if any(fields.support(field.type) == "sequence" and not field.default for field in every):
+    if any(isinstance(field.type, ir.Sequence) and not field.default for field in numeric):
         standard.append("from array import array as _array")
     inside, outside = references.imports(references.direct)
     yield from (*standard, "") if standard else ()
     runtime = references.surroundings.runtime
     yield f"from {runtime} import _idlc"
-    if "array" in used:
+    if any(isinstance(field.type, ir.Array) for field in numeric):
         yield f"from {runtime}_idlc import arrays as _arrays"
     yield from inside
     if outside:

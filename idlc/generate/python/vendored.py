@@ -12,19 +12,15 @@ from idlc.model import derive, link
 from idlc.project.templates import Code, RenderedFile
 
 
-class StructureView(msgspec.Struct, frozen=True):
-    """A structure by its kind and name, such as `msg/Header`, and its type hash."""
-
-    name: Code
-    hash: Code
-
-
 class CopyView(msgspec.Struct, frozen=True):
-    """The types of another package that come with a package."""
+    """The types of another package that come with a package.
+
+    `hashes` are of structures, each after its kind and name, such as `msg/Header`.
+    """
 
     name: Code
     kinds: tuple[Code, ...]
-    structures: tuple[StructureView, ...]
+    hashes: tuple[tuple[Code, Code], ...]
 
 
 def vendored_files(package: str, copies: Sequence[link.Model]) -> Iterator[RenderedFile]:
@@ -53,7 +49,7 @@ def _view(model: link.Model) -> CopyView:
         Code(model.package),
         tuple(map(Code, model.kinds)),
         tuple(
-            StructureView(Code(f"{name.kind}/{name.name}"), Code(model.describer.hash(str(name))))
+            (Code(f"{name.kind}/{name.name}"), Code(model.describer.hash(str(name))))
             for name in names
         ),
     )

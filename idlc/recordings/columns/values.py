@@ -19,25 +19,15 @@ class Column:
 
     __slots__ = ()
 
-    def __len__(self) -> int:
-        raise NotImplementedError
-
-    def __getitem__(self, place: Any) -> Any:
-        raise NotImplementedError
-
-    def __iter__(self) -> Iterator[Any]:
+    def __iter__(self: Any) -> Iterator[Any]:
         return map(self.__getitem__, range(len(self)))
 
-    def __repr__(self) -> str:
+    def __repr__(self: Any) -> str:
         more = ", ..." if len(self) > 3 else ""
         shown = ", ".join(map(repr, self[:3].to_list()))
         return f"<{type(self).__name__} of {len(self)}: {shown}{more}>"
 
-    def to_list(self) -> list[Any]:
-        """Return the elements as objects of Python, as `to_dict` of messages has them."""
-        raise NotImplementedError
-
-    def _index(self, place: Any) -> int:
+    def _index(self: Any, place: Any) -> int:
         """Return the index of one element, counted from the front."""
         index: int = range(len(self))[place]
         return index
@@ -100,7 +90,7 @@ class Ragged(_Sliced):
     __slots__ = ()
 
     def to_list(self) -> list[Any]:
-        """Return a list for each sequence."""
+        """Return a list for each sequence, of elements as `to_dict` of messages has them."""
         elements = column_list(self.values)
         return [elements[a:b] for a, b in pairwise(self.offsets.tolist())]
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
 
 from msgspec.structs import replace
 
@@ -14,7 +14,6 @@ from idlc.recordings.containers.compression import ZSTD_MAGIC
 from idlc.recordings.containers.db3 import Db3File
 from idlc.recordings.containers.file import (
     CDR,
-    File,
     Schema,
     Topic,
     UnreadTopic,
@@ -27,6 +26,10 @@ from idlc.recordings.containers.source import RecordingError, first_bytes, is_lo
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
 
+#: One file of a recording. Its `place` is what it was opened by. Its `topics` have with each topic
+#: the number by which messages name it; of several channels, each is a topic. Pieces of a file are
+#: chunks or rows, and `parts` are these divided, or together, where they take about some size.
+File: TypeAlias = McapFile | Db3File
 Opened = TypeVar("Opened", bound="File | Container")
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
@@ -40,7 +43,7 @@ class Channel(NamedTuple):
     topic: Topic
 
 
-class Container:
+class Container(AbstractContextManager["Container"]):
     """An open recording: its topics, and the files that they are in."""
 
     def __init__(self, name: str, files: list[File], notes: Iterable[str]) -> None:
@@ -91,9 +94,6 @@ class Container:
         """Close all files."""
         for file in self.files:
             file.close()
-
-    def __enter__(self) -> Container:  # noqa: PYI034 # Self came with Python 3.11
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
-from idlc.recordings.containers.file import START, File, Schema, Topic, full_name, recorded_schema
+from idlc.recordings.containers.file import START, Schema, Topic, full_name, recorded_schema
 from idlc.recordings.containers.source import RecordingError, first_bytes, of_file
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Rows(NamedTuple):
     last: int
 
 
-class Db3File(File):
+class Db3File:
     """An open .db3 file; without `read`, nothing is read of its topics."""
 
     def __init__(self, path: Path, read: bool = True) -> None:
@@ -52,7 +52,7 @@ class Db3File(File):
         log = first_bytes(path, 19)[18:] == bytes([WRITES_A_LOG])
         self._lone = log and not self._is_in_use()
         self._state = self._path.stat()
-        self.notes = []
+        self.notes: list[str] = []
         if self._lone:
             why = f"it was written by way of `{self._log.name}`, which is not there"
             missing = f"{why}: if that was left behind, the last messages are missing"
@@ -208,7 +208,7 @@ class Db3File(File):
                 yield (Rows(start, min(start + step - 1, last)),)
 
     def messages(
-        self, topics: Collection[int], pieces: Iterable[Rows], window: Window
+        self, topics: Collection[int], pieces: Iterable[Any], window: Window
     ) -> Iterator[Messages]:
         """Yield the messages of some topics in some rows."""
         import numpy as np

@@ -1,16 +1,12 @@
-"""The interface of a recording's files, which both formats implement, and their topics."""
+"""The topics of a recording's files, of both formats, and what cannot be read of them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import msgspec
 
 from idlc.recordings.containers.source import RecordingError
-
-if TYPE_CHECKING:
-    from idlc.recordings.containers.messages import Messages, Window
 
 #: How ROS 2 writes messages.
 CDR = "cdr"
@@ -44,42 +40,6 @@ class Topic(msgspec.Struct, frozen=True):
     hash: str | None
     encoding: str
     schema: Schema | None
-
-
-class File(Protocol):
-    """One file of a recording; `place` is what it was opened by.
-
-    `topics` has with each topic the number by which messages name it; of several channels, each is
-    a topic. Pieces of a file are chunks or rows.
-    """
-
-    name: str
-    place: Any
-    notes: list[str]
-    topics: list[tuple[Topic, int]]
-
-    @property
-    def start(self) -> int | None:
-        """The time of the first message."""
-
-    def first_messages(self) -> Iterator[tuple[int, bytes]]:
-        """Yield numbers of topics with how their first messages begin."""
-
-    def pieces(self, topics: Collection[int], window: Window) -> list[Any]:
-        """Return the pieces that may hold messages of some topics."""
-
-    def parts(
-        self, topics: Collection[int], window: Window, size: int
-    ) -> Iterator[tuple[Any, ...]]:
-        """Yield the same pieces, divided, together where they take about `size` bytes."""
-
-    def messages(
-        self, topics: Collection[int], pieces: Iterable[Any], window: Window
-    ) -> Iterator[Messages]:
-        """Yield the messages of some topics in some pieces, many at a time."""
-
-    def close(self) -> None:
-        """Release the file."""
 
 
 def full_name(name: str) -> str:

@@ -21,7 +21,6 @@ from idlc.recordings.containers import records
 from idlc.recordings.containers.compression import Room, decompress
 from idlc.recordings.containers.file import (
     START,
-    File,
     Schema,
     Topic,
     check_count,
@@ -33,6 +32,7 @@ from idlc.recordings.containers.records import (
     HEAD,
     INDEX_OFFSET,
     MAGIC,
+    MESSAGE_HEAD,
     MESSAGE_OP,
     Chunk,
     ChunkHead,
@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
 
 END_OF_TIME = (1 << 64) - 1
-#: Bytes of a Message record before the message itself.
-MESSAGE_HEAD = 22
 #: The start of a message: its channel and time, with its sequence number between them.
 CHANNEL_AND_TIME = Struct("<HIQ")
 
@@ -120,7 +118,7 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> Facts
 
 def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
     """Yield the start of each message of a chunk, or of a stretch outside of any."""
-    most = MESSAGE_HEAD + START
+    most = MESSAGE_HEAD.size + START
     if chunk.compression is None:
         for op, at, size in heads(source, chunk.at, chunk.at + chunk.size):
             if op == MESSAGE_OP:
@@ -325,7 +323,7 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
     return walk.facts
 
 
-class McapFile(File):
+class McapFile:
     """An MCAP file, whose channels are topics; without `read`, nothing is read of them."""
 
     def __init__(
@@ -337,19 +335,15 @@ class McapFile(File):
         self.name = self.source.name
         with of_file(self.name):
             self.facts = read_facts(self.source, index, check) if read else Facts()
+        self.start = self.facts.start
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
-        self.topics = []
+        self.topics: list[tuple[Topic, int]] = []
         for number, channel in self.facts.channels.items():
             schema, count = self.facts.schemas.get(channel.schema), self.facts.counts.get(number, 0)
             kind, recorded = (schema.name, recorded_schema(schema)) if schema else ("", None)
             digest = channel.metadata.get("topic_type_hash") or None
             topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded)
             self.topics.append((topic, number))
-
-    @property
-    def start(self) -> int | None:
-        """The time of the first message."""
-        return self.facts.start
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
         """Yield channels with the start of their first messages; no chunk is opened twice."""
@@ -364,7 +358,7 @@ class McapFile(File):
             for data, _ in zip(starts, room.records(), strict=False):
                 number = int.from_bytes(data[:2], "little")
                 if number in mine:
-                    yield number, bytes(data[MESSAGE_HEAD:])
+                    yield number, bytes(data[MESSAGE_HEAD.size :])
                     mine.remove(number)
                     waiting.discard(number)
                     if not mine:
@@ -426,11 +420,11 @@ class McapFile(File):
         self, topics: Collection[int], window: Window, size: int
     ) -> Iterator[tuple[Chunk, ...]]:
         """Yield neighbours of about `size` bytes."""
-        for part in records.grouped(self.pieces(topics, window), lambda chunk: chunk.size, size):
-            yield tuple(part)
+        pieces = self.pieces(topics, window)
+        return map(tuple, records.grouped(pieces, lambda chunk: chunk.size, size))
 
     def messages(
-        self, topics: Collection[int], pieces: Iterable[Chunk], window: Window
+        self, topics: Collection[int], pieces: Iterable[Any], window: Window
     ) -> Iterator[Messages]:
         """Yield the messages of some channels in some chunks, adjacent ones together."""
         from idlc.recordings.containers.mcap_messages import in_chunks

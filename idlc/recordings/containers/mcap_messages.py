@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection, Iterable, Iterator
 from struct import Struct
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -30,14 +30,12 @@ MESSAGE_HEAD = Struct("<BQH")
 LEAST = MESSAGE.itemsize - HEAD.size
 #: In uncompressed chunks, gaps between messages are read too if they are smaller.
 NEAR = 1 << 15
+#: A chunk and what its head says.
+Headed: TypeAlias = tuple[Chunk, ChunkHead]
 
 
 def in_chunks(
-    source: Source,
-    chunks: Iterable[Chunk],
-    channels: Collection[int],
-    window: Window,
-    check: bool = False,
+    source: Source, chunks: Iterable[Chunk], channels: Collection[int], window: Window, check: bool
 ) -> Iterator[Messages]:
     """Yield the messages of some channels in chunks, adjacent chunks together."""
     with of_file(source.name):
@@ -63,9 +61,7 @@ def in_chunks(
                 yield ranges
 
 
-def _heads(
-    source: Source, chunks: Iterable[Chunk], room: Room
-) -> Iterator[tuple[Chunk, ChunkHead]]:
+def _heads(source: Source, chunks: Iterable[Chunk], room: Room) -> Iterator[Headed]:
     """Yield each chunk with its head, if there is room for its records."""
     for chunk in chunks:
         if chunk.compression is None:
@@ -83,11 +79,7 @@ def _heads(
 
 
 def _read(
-    source: Source,
-    group: list[tuple[Chunk, ChunkHead]],
-    channels: Collection[int],
-    room: Room,
-    check: bool,
+    source: Source, group: list[Headed], channels: Collection[int], room: Room, check: bool
 ) -> Ranges:
     """Return the messages of some channels in adjacent chunks.
 

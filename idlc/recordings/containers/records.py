@@ -10,7 +10,10 @@ from idlc.recordings.containers.source import RecordingError, Source
 
 Item = TypeVar("Item")
 MAGIC = b"\x89MCAP0\r\n"
+#: What precedes the content of each record: opcode and length.
 HEAD = Struct("<BQ")
+#: What precedes the data of a message: channel, sequence, log and publish time.
+MESSAGE_HEAD = Struct("<HIQQ")
 #: At the end of a file: the record, and the magic bytes once more.
 FOOTER = Struct("<BQQQI")
 INDEX_OFFSET = Struct("<HQ")
