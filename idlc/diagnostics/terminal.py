@@ -76,9 +76,8 @@ def text(
 
 def _line(diagnostic: Diagnostic, paint: Paint) -> str:
     """Return a problem on one line."""
-    place = one_line(diagnostic.path)
-    if diagnostic.span:
-        place = _place(_mark(diagnostic.span, "", ""))
+    span = diagnostic.span
+    place = _place(_mark(span, "", "")) if span else one_line(diagnostic.path)
     code = paint(diagnostic.severity.name.lower(), diagnostic.code)
     only = f" ({diagnostic.holds_for})" if diagnostic.distros else ""
     return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}{only}"
