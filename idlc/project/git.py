@@ -86,12 +86,10 @@ class Revision(NamedTuple):
 
     def counterpart(self, path: str) -> str | None:
         """Return the path in the revision for one of the working tree; `None` outside of it."""
-        try:
-            return (
-                self.folder / self.root.absolute(path).resolve().relative_to(self.top)
-            ).as_posix()
-        except ValueError:
-            return None
+        with suppress(ValueError):
+            inside = self.root.absolute(path).resolve().relative_to(self.top)
+            return (self.folder / inside).as_posix()
+        return None
 
     def files(
         self, paths: Iterable[str], exclude: Exclusions, report: Report

@@ -96,10 +96,10 @@ def read_table(
         read = read_value(value, fields[key].type, key, place, report)
         if read is not None:
             values[fields[key].name] = read
-    missing = [key for key, field in fields.items() if field.required and key not in table]
-    for key in missing:
-        what = _meta(fields[key].type).description
-        place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
+    for key, field in fields.items():
+        if field.required and key not in table:
+            what = _meta(field.type).description
+            place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
     required = {field.name for field in fields.values() if field.required}
     return shape(**values) if required <= values.keys() else None
 

@@ -22,9 +22,7 @@ from idlc.project.package_xml import Facts
 _INDEX = "share/ament_index/resource_index"
 
 
-@lru_cache(maxsize=16)
-def _read(source: Source) -> Setup:
-    return Setup(source)
+_read = lru_cache(maxsize=16)(Setup)
 
 
 class _Package(NamedTuple):
