@@ -139,9 +139,7 @@ class _Command(click.Command):
     shell_complete=completion.topics,
     help="Of recordings, only the types of this topic. May be repeated.",
 )
-@options.package
-@options.include
-@options.exclude
+@options.packages
 @options.distro
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
 @click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
