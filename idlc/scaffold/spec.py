@@ -79,11 +79,6 @@ def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
     return Endpoint(role, *role.read(text), quality)
 
 
-def in_order(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
-    """Return endpoints in the order of the roles."""
-    return tuple(sorted(endpoints, key=lambda endpoint: ROLES.index(endpoint.role)))
-
-
 def parameter(text: str) -> Parameter:
     """Return the parameter that `NAME:TYPE=DEFAULT` means; `TYPE[]` for several values."""
     head, equals, default = text.partition("=")
