@@ -293,9 +293,8 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
             target.parent.mkdir(parents=True, exist_ok=True)
             if mode != _LINK:
                 target.write_bytes(contents[identity])
-        _link(
-            root, {path: contents[identity] for mode, identity, path in selected if mode == _LINK}
-        )
+        links = {path: contents[identity] for mode, identity, path in selected if mode == _LINK}
+        _link(root, links)
     except (OSError, ValueError) as error:
         raise GitError(f"its files cannot be written to `{root}`: {reason(error)}", "") from None
     return entries

@@ -281,9 +281,9 @@ def add_dependencies(
         return Refused(why, lines, "within `<package>`")
     running = own.union(manifest.texts(*AT_RUN_TIME))
     testing = own.union(manifest.texts(*AT_TEST_TIME))
-    tag = "run_depend" if manifest.format == "1" else "depend"
-    new = [(tag, name) for name in depends if name not in running]
-    execute = "run_depend" if manifest.format == "1" else "exec_depend"
+    old = ("run_depend", "run_depend")
+    depend, execute = old if manifest.format == "1" else ("depend", "exec_depend")
+    new = [(depend, name) for name in depends if name not in running]
     new += [(execute, name) for name in executes if name not in {*running, *depends}]
     testing.update(name for _, name in new)
     new += [("test_depend", name) for name in tests if name not in testing]
