@@ -158,7 +158,6 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     """Return the package's name and its `[project]` table; `None` after a problem."""
     from idlc.build import manifest
-    from idlc.build.manifest import complete_table
 
     config = load_settings(Root.here(), report)
     if not Path(MANIFEST).is_file():
@@ -168,7 +167,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     if report.had_errors:
         return None
     declared = manifest.project(config.runtime, report)
-    project = complete_table(declared, report) if declared else {}
+    project = manifest.complete_table(declared, report) if declared else {}
     if config.runtime == "installed" and not names_runtime(project.get("dependencies", ())):
         message = "the classes import `idlc_runtime`, which [project] does not require"
         hint = f'add "{RUNTIME}" to `dependencies`'

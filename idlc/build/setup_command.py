@@ -13,10 +13,9 @@ from pathlib import Path, PurePath
 from typing import Any, TypeAlias
 
 from idlc.project import prefixes
+from idlc.project.atomic import write_whole
 from idlc.project.files import is_file, reason
 
-#: The temporary suffix of a file while it is written.
-NEW = ".new"
 #: The commands of setup.py that pip runs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
 _BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
@@ -120,13 +119,7 @@ def _merged(
 def _write_files(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]]:
     """Write files below a folder; return the `data_files` of setup() that install them."""
     for path, content in files.items():
-        target = place / path
-        if not target.is_file() or target.read_bytes() != content:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            beside = target.with_name(f"{target.name}{NEW}")
-            beside.write_bytes(content)
-            beside.chmod(0o755 if path.startswith("lib/") else 0o644)
-            beside.replace(target)
+        write_whole(place / path, content, 0o755 if path.startswith("lib/") else 0o644)
     return [(os.path.dirname(path), [(place / path).as_posix()]) for path in files]  # noqa: PTH120
 
 
@@ -138,7 +131,7 @@ def _whole(copying: Any) -> type:
 
     def copy_file(self: Any, source: str, folder: str, *rest: Any, **named: Any) -> tuple[str, int]:
         target = Path(folder, Path(source).name)
-        beside = target.with_name(f"{target.name}{NEW}")
+        beside = target.with_name(f"{target.name}.new")
         beside.unlink(missing_ok=True)
         done: tuple[str, int] = copying.copy_file(self, source, str(beside), *rest, **named)
         if beside.exists():

@@ -29,17 +29,13 @@ if TYPE_CHECKING:
 class InternalError(Exception):
     """A failure that is idlc's own fault, with its stage and subject."""
 
-    def __init__(self, stage: str, subject: str) -> None:
-        super().__init__(stage, subject)
-        self.stage = stage
-        self.subject = subject
-
 
 def internal_error(error: Exception, subject: str, hint: str) -> Diagnostic:
     """Return an unexpected exception as a problem, of `subject` if it does not have one."""
     cause, where = error, ""
     if isinstance(error, InternalError):
-        where, subject = f" in stage `{error.stage}`", error.subject
+        name, subject = error.args
+        where = f" in stage `{name}`"
         cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
     message = f"idlc failed{where}: {type(cause).__name__}: {cause}"
     return codes.INTERNAL_ERROR.of(subject, message, hint=hint)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.check.compiler import models_of, stage
@@ -13,18 +14,9 @@ from idlc.generate.native import library as native
 from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS
 from idlc.model import derive
-from idlc.project import inputs
+from idlc.project import inputs, prefixes
+from idlc.project.files import is_file, read_bytes
 from idlc.project.find import list_files
-from idlc.project.prefixes import (
-    INDEX,
-    InstalledPackage,
-    ament_prefixes,
-    distribution,
-    inconsistencies,
-    installed_packages,
-    machine,
-    prefixes,
-)
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 
@@ -36,26 +28,28 @@ _AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES
 
 def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
     """Report each package in a prefix, or in the prefixes in a folder, that stops recorders."""
-    folders = prefixes(root.absolute(folder))
+    folders = prefixes.prefixes(root.absolute(folder))
     if not folders:
         message = f"no packages are installed in `{folder}`: there is no share/ament_index"
         hint = "name the folder that is in AMENT_PREFIX_PATH, or colcon's `install`"
         report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
     for prefix in folders:
-        for package, why in inconsistencies(prefix):
+        for package, why in prefixes.inconsistencies(prefix):
             message = f"`{package}`, which is in ROS 2's index, {why}"
-            place = root.shown(prefix / INDEX)
+            place = root.shown(prefix / prefixes.INDEX)
             report.add(codes.INCONSISTENT_INDEX.of(place, message, hint=_AGAIN))
     files = []
-    for owner in (owner for prefix in folders for owner in installed_packages(prefix, root)):
-        model = _model(owner)
+    for prefix, package in ((at, name) for at in folders for name in prefixes.with_interfaces(at)):
+        model = _model(prefix, package, root)
         for identifier in (native.OWN, native.FIELDS_CPP):
-            name = f"lib{owner.package}__{identifier}.so"
-            files.append(owner.library(name))
+            name = f"lib{package}__{identifier}.so"
+            path = prefix / "lib" / name
+            files.append(root.shown(path))
             with stage("check library", files[-1]):
-                why = next(_problems(owner, name, identifier, model), "")
+                data = read_bytes(path, files[-1], Report()) if is_file(path) else None
+                why = next(_problems(data, prefix, identifier, model), "")
             if why:
-                message = f"`{name}` {why}: C++ tools fail at the types of `{owner.package}`"
+                message = f"`{name}` {why}: C++ tools fail at the types of `{package}`"
                 report.add(codes.UNUSABLE_LIBRARY.of(files[-1], message, hint=_AGAIN))
     if folders and not files and not len(report):
         message = f"no package with interfaces is registered in `{folder}`"
@@ -64,23 +58,21 @@ def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
     return CheckResult(tuple(files), len(files))
 
 
-def _model(package: InstalledPackage) -> Model | None:
+def _model(prefix: Path, package: str, root: Root) -> Model | None:
     """Return the model of a package's installed interfaces; `None` after errors."""
     dropped = Report()
-    root = package.root
-    files = list_files((package.share,), root, dropped).files
-    home = package.prefix / "share" / package.package
-    package_inputs = inputs.load(package.package, files, home, root, dropped)
-    scope = Scope(root, include=(str(package.prefix),))
+    home = prefix / "share" / package
+    files = list_files((root.shown(home),), root, dropped).files
+    package_inputs = inputs.load(package, files, home, root, dropped)
+    scope = Scope(root, include=(str(prefix),))
     models = list(models_of((package_inputs,), scope, dropped))
     return None if dropped.had_errors or not files else models[0][1]
 
 
 def _problems(
-    package: InstalledPackage, name: str, identifier: str, model: Model | None
+    data: bytes | None, prefix: Path, identifier: str, model: Model | None
 ) -> Iterator[str]:
     """Yield the problems of a library, the gravest first, in words that follow its name."""
-    data = package.content(name)
     library = data and inspect(data)
     if data is None:
         if identifier == native.OWN:
@@ -89,9 +81,9 @@ def _problems(
     if not library:
         yield "is no shared library, or a part of one"
         return
-    own = native.MACHINES.get(machine())
+    own = native.MACHINES.get(prefixes.machine())
     if own is not None and library.machine != own.number:
-        yield f"is for another processor than {machine()}"
+        yield f"is for another processor than {prefixes.machine()}"
     if model is None:
         return
     messages = [message for own in model.own for message in derive.messages(own)]
@@ -110,7 +102,7 @@ def _problems(
     stale = [f"`{name}`" for name, hash_ in hashes.items() if native.hash_bytes(hash_) not in data]
     if stale:
         yield f"is out of date: {first_few(stale, 3)} changed since"
-    local = distribution((package.prefix, *ament_prefixes()))
+    local = prefixes.distribution((prefix, *prefixes.ament_prefixes()))
     layout = LAYOUTS.get(local.name)
     if layout is not None and library.stamp != native.identity_stamp(layout):
         yield f"is for another distribution of ROS 2 than {local.name} ({local.why})"

@@ -127,8 +127,7 @@ def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
     if diagnostic.code != codes.UNUSED_IGNORE.id or diagnostic.span is None:
         return False
     code = codes.find(diagnostic.span.text)
-    is_advice = code is not None and code.severity is not Severity.ERROR
-    return code is not None and is_advice and not selection.has(code)
+    return code is not None and code.severity is not Severity.ERROR and not selection.has(code)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:

@@ -170,14 +170,10 @@ def missing_units(model: Model) -> Iterator[Diagnostic]:
     """A number whose name is a physical quantity has a unit."""
     for field in _quantities(model):
         unit = expects_unit(field.name)
-        if unit and not unit_of(field) and not _names_unit(field.comment, unit):
+        words = re.sub(r"[()]", " ", "\n".join(field.comment)).split()
+        if unit and not unit_of(field) and unit not in words:
             hint = f"write it in brackets, as in `# [{unit}]`"
             yield codes.MISSING_UNIT.at(field.name_span, f"`{field.name}` has no unit", hint=hint)
-
-
-def _names_unit(comment: Iterable[str], unit: str) -> bool:
-    """Return whether a comment names a unit without the brackets."""
-    return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
 
 
 def unusual_units(model: Model) -> Iterator[Diagnostic]:

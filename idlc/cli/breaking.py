@@ -93,9 +93,7 @@ EPILOG += "\n" + options.example(
     help="Only report what breaks this. May be repeated; otherwise all, or against recordings what "
     "readers of them would notice.",
 )
-@options.package
-@options.include
-@options.exclude
+@options.packages
 @options.distro
 @options.report_style
 def command(

@@ -27,9 +27,7 @@ from idlc.cli import completion, options
     type=click.Path(),
     help="Look at what is installed in a folder instead: whether C++ tools can load it.",
 )
-@options.package
-@options.include
-@options.exclude
+@options.packages
 @options.distros
 @options.report_style
 def command(paths: tuple[str, ...], **arguments: Any) -> int:

@@ -61,15 +61,8 @@ def _line(package: Generated, check: bool) -> str:
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
 
-    done = []
-    if check:
-        done.append("up to date")
-    elif not package.written and not package.removed:
-        done.append("unchanged")
-    elif package.written < package.files or package.removed:
-        done += [f"{package.written} written"] if package.written else []
-        done += [f"{package.removed} removed"] if package.removed else []
-    note = f" ({', '.join(done)})" if done else ""
+    is_all = not check and package.written == package.files and not package.removed
+    note = "" if is_all else f" ({'up to date' if check else package.changes})"
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
         f"{package.package}: {counted(package.interfaces, 'interface')} → "
@@ -86,29 +79,20 @@ def run_again(request: GenOptions, style: str) -> int:
     from idlc.diagnostics.text import one_line
 
     try:
-        seen = _snapshot(request)
+        seen = now = _snapshot(request)
         once(request, style)
         sys.stderr.write(f"watching {one_line(', '.join(request.paths))}; Ctrl-C ends\n")
         while True:
             sys.stdout.flush()
             sys.stderr.flush()
             time.sleep(INTERVAL)
-            now = _snapshot(request)
-            if now == seen:
-                continue
-            while (later := _after(request)) != now:
-                now = later
-            seen = now
-            once(request, style)
+            before, now = now, _snapshot(request)
+            if before == now != seen:  # so that a burst of changes counts as one
+                seen = now
+                once(request, style)
     except KeyboardInterrupt:
         sys.stderr.write("\n")
         return 0
-
-
-def _after(request: GenOptions) -> dict[str, Stamp]:
-    """Return a snapshot from a moment later, so that a burst of changes counts as one."""
-    time.sleep(INTERVAL)
-    return _snapshot(request)
 
 
 def _snapshot(request: GenOptions) -> dict[str, Stamp]:
@@ -155,9 +139,7 @@ class _Command(click.Command):
     shell_complete=completion.topics,
     help="Of recordings, only the types of this topic. May be repeated.",
 )
-@options.package
-@options.include
-@options.exclude
+@options.packages
 @options.distro
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
 @click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")

@@ -73,6 +73,11 @@ exclude = click.option(
 )
 
 
+def packages(command: Command) -> Command:
+    """Add the options of a command that reads packages."""
+    return package(include(exclude(command)))
+
+
 def _single(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
     if value and "," in value:
         raise click.UsageError("--distro takes one name here; only `idlc check` takes several")

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from idlc.cli import options
 from idlc.cli.app import LazyGroup
-
-Command = TypeVar("Command", bound=Callable[..., Any])
+from idlc.cli.options import Command
 
 #: Each command with its line in the overview.
 COMMANDS = {

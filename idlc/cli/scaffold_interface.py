@@ -45,7 +45,6 @@ def command(
     report = Report()
     try:
         interface.check_interface_name(name)
-        interface.check_fields(fields)
         interface.interface_text(kind, fields, comment)
     except ValueError as error:
         raise click.UsageError(str(error)) from error

@@ -44,7 +44,8 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
         else:
             endpoints.append(_endpoint(roles[chosen], check_type))
     lifecycle = click.confirm("Make it a lifecycle node?", default=False, prompt_suffix=" ")
-    return spec.Node(name, "", spec.in_order(endpoints), tuple(parameters), lifecycle)
+    endpoints.sort(key=lambda endpoint: ROLES.index(endpoint.role))
+    return spec.Node(name, "", tuple(endpoints), tuple(parameters), lifecycle)
 
 
 def _answer(question: str, check: Callable[[str], object], default: str | None = None) -> str:

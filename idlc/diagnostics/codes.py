@@ -67,15 +67,8 @@ class Code(msgspec.Struct, frozen=True):
         self, path: str, message: str, *, hint: str | None = None, detail: str = "", place: str = ""
     ) -> Diagnostic:
         """Return a problem of this kind with a whole file or folder."""
-        return Diagnostic(
-            code=self.id,
-            severity=self.severity,
-            message=message,
-            path=path,
-            hint=hint,
-            detail=detail,
-            place=place,
-        )
+        problem = self.at(None, message, hint=hint)
+        return msgspec.structs.replace(problem, path=path, detail=detail, place=place)
 
 
 # syntax

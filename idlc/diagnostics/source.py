@@ -48,15 +48,11 @@ class Source:
 
     def line_starts_after(self, offset: int) -> int:
         """Return where the line after the one at `offset` starts; the text's end at the last."""
-        line = bisect_right(self.line_starts, offset)
-        return self.line_starts[line] if line < len(self.line_starts) else len(self.text)
+        return (*self.line_starts, len(self.text))[bisect_right(self.line_starts, offset)]
 
     def line_text(self, line: int) -> str:
         """Return line `line` (1-based) without its end; empty past the last line."""
-        if line > len(self.lines):
-            return ""
-        text = self.lines[line - 1]
-        return text.splitlines()[0] if text else ""
+        return self.lines[line - 1].splitlines()[0] if line <= len(self.lines) else ""
 
 
 class Span(NamedTuple):

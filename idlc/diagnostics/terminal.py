@@ -48,21 +48,19 @@ class _Mark(msgspec.Struct, frozen=True):
     text: str
 
 
-def text(
-    diagnostics: Iterable[Diagnostic], *, colour: bool = False, limit: int = LIMIT
-) -> Iterator[str]:
+def text(diagnostics: Iterable[Diagnostic], *, colour: bool = False) -> Iterator[str]:
     """Yield each problem as a block of lines, repeated warnings as a list of lines.
 
-    Ends with a count of those beyond `limit`.
+    Ends with a count of those beyond `LIMIT`.
     """
     paint: Paint = _coloured if colour else lambda _, text: text
     diagnostics = list(diagnostics)
-    if len(diagnostics) > limit:  # no error is left out for a warning
+    if len(diagnostics) > LIMIT:  # no error is left out for a warning
         diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
     repeats = REPEATS if len(diagnostics) > MANY else MANY
     shown: Counter[str] = Counter()
     repeated: list[str] = []
-    for diagnostic in diagnostics[:limit]:
+    for diagnostic in diagnostics[:LIMIT]:
         shown[diagnostic.code] += 1
         if diagnostic.severity is Severity.WARNING and shown[diagnostic.code] > repeats:
             repeated.append(_line(diagnostic, paint))
@@ -70,15 +68,14 @@ def text(
             yield "\n".join(_block(diagnostic, paint)) + "\n"
     if repeated:
         yield "\n".join(("more of these warnings:", *repeated)) + "\n"
-    if len(diagnostics) > limit:
-        yield f"… and {len(diagnostics) - limit} more; fix the first ones and run again\n"
+    if len(diagnostics) > LIMIT:
+        yield f"… and {len(diagnostics) - LIMIT} more; fix the first ones and run again\n"
 
 
 def _line(diagnostic: Diagnostic, paint: Paint) -> str:
     """Return a problem on one line."""
-    place = one_line(diagnostic.path)
-    if diagnostic.span:
-        place = _place(_mark(diagnostic.span, "", ""))
+    span = diagnostic.span
+    place = _place(_mark(span, "", "")) if span else one_line(diagnostic.path)
     code = paint(diagnostic.severity.name.lower(), diagnostic.code)
     only = f" ({diagnostic.holds_for})" if diagnostic.distros else ""
     return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}{only}"

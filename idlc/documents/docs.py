@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeAlias
 
 from idlc.check.compiler import sound_models, stage
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import printable
 from idlc.documents.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
 from idlc.generate.gen import is_name, named_packages
@@ -83,20 +84,16 @@ def _package_page(
         root="../" * home.count("/"),
         words=words(name),
         description=blocks(about.description.split("\n")),
-        facts=" · ".join([*shown, counted(interfaces)]),
+        facts=" · ".join([*shown, numbers(interfaces)]),
         described=any(entry.about for entry in entries),
         entries=entries,
     )
 
 
-def counted(interfaces: Sequence[ir.Interface]) -> str:
+def numbers(interfaces: Sequence[ir.Interface]) -> str:
     """Return the number of interfaces of each kind, in words."""
     kinds: Counter[str] = Counter(interface.name.kind for interface in interfaces)
-    return ", ".join(
-        f"{kinds[kind]} {word}{'s' * (kinds[kind] > 1)}"
-        for kind, word in KINDS.items()
-        if kinds[kind]
-    )
+    return ", ".join(counted(kinds[kind], word) for kind, word in KINDS.items() if kinds[kind])
 
 
 def first_line(interface: ir.Interface) -> str:
@@ -137,7 +134,7 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
         for name, interfaces in packages.items():
             own_facts = about.get(name, About())
             version = [f"version {own_facts.version}"] if own_facts.version else []
-            line = " · ".join([*version, counted(interfaces)])
+            line = " · ".join([*version, numbers(interfaces)])
             entries.append(Entry(home[name], words(name), "", line, own_facts.description))
         shown = Listing("Interfaces", "", (), (), "", True, entries)
         yield RenderedFile("index.html", template.render(page=shown))

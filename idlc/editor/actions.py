@@ -23,7 +23,6 @@ from idlc.editor.workspace import in_folder
 
 if TYPE_CHECKING:
     from idlc.generate.gen import Run
-    from idlc.generate.package import Generated
     from idlc.project.inputs import Inputs
 
 _FIX, _FIX_ALL = "quickfix", "source.fixAll.idlc"
@@ -242,15 +241,10 @@ def _update(state: ServerState, uri: str) -> None:
         texts = (f"{each.where[0]}: {each.code}: {each.message}" for each in report.errors)
         message = f"idlc gen: nothing was written: {first_few(texts, NAMED)}"
     else:
-        message = f"idlc gen: {first_few(map(_outcome, generated), NAMED)}"
+        outcomes = (f"{each.package}: {each.changes} in {each.out}" for each in generated)
+        message = f"idlc gen: {first_few(outcomes, NAMED)}"
     kind = _ERROR if report.had_errors else _INFO
     state.notify("window/showMessage", {"type": kind, "message": message})
-
-
-def _outcome(generated: Generated) -> str:
-    counts = [f"{generated.written} written"] if generated.written else []
-    counts += [f"{generated.removed} removed"] if generated.removed else []
-    return f"{generated.package}: {', '.join(counts) or 'unchanged'} in {generated.out}"
 
 
 # Formatting, as `idlc fmt` does it.

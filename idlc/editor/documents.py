@@ -20,7 +20,7 @@ from idlc.diagnostics.source import Source
 from idlc.editor.parts import Change, DocumentItem, Position, Range
 from idlc.language.tree import BYTE_ORDER_MARK
 from idlc.model import ir
-from idlc.project.atomic import create, move_over
+from idlc.project.atomic import write_whole
 from idlc.project.files import cache_folder
 from idlc.project.find import KINDS
 from idlc.project.lock import digest
@@ -212,14 +212,8 @@ def file_of(source: Source) -> Path | None:
     if base is None:
         return None
     path = base / FOLDER / inside(source)
-    data = source.text.encode()
     try:
-        if not path.is_file() or path.read_bytes() != data:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            draft = path.with_suffix(f".{os.getpid()}")
-            create(str(draft), data)
-            draft.chmod(0o444)  # nobody is to edit it
-            move_over(str(draft), str(path))
+        write_whole(path, source.text.encode(), 0o444)  # nobody is to edit it
     except OSError:
         return None
     return path

@@ -27,11 +27,10 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
     before, after = lines_of(old), lines_of(new)
     places = Places(old, encoding)
     starts = [*accumulate(map(len, before), initial=0)]
+    matcher = SequenceMatcher(None, before, after, autojunk=False)
     return [
         TextEdit(places.range(starts[low], starts[high]), "".join(after[start:end]))
-        for what, low, high, start, end in SequenceMatcher(
-            None, before, after, autojunk=False
-        ).get_opcodes()
+        for what, low, high, start, end in matcher.get_opcodes()
         if what != "equal"
     ]
 
@@ -169,8 +168,6 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     """
     offset = context.state.offset(context.source, position)
     for element in elements(context):
-        if not element.line.start <= offset <= element.comment.end:
-            continue
         parts: list[tuple[Part, Span | None]] = [
             ("name", element.name),
             ("type", element.span(element.body.type.whole)),
@@ -180,7 +177,6 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
         for part, span in parts:
             if span and span.start <= offset <= span.end and span.end > span.start:
                 return Spot(element, part, span)
-        return None
     return None
 
 

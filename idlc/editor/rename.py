@@ -21,7 +21,7 @@ from idlc.editor.navigation import mentions
 from idlc.editor.parts import PositionParams, RenameFilesParams, RenameParams, TextEdit
 from idlc.editor.protocol import REQUEST_FAILED, RequestError
 from idlc.editor.state import InterfaceContext, Renaming, ServerState
-from idlc.model import ir, names
+from idlc.model import derive, ir, names
 from idlc.project.files import is_file
 from idlc.project.root import Root
 
@@ -245,11 +245,6 @@ def _what_breaks(changes: Iterable[Change] | None, context: InterfaceContext) ->
     what = f"breaks {levels} for whoever uses `{name}`"
     what += f": {first_few(direct, NAMED)}" if direct else ""
     if "hash" in levels and context.snapshot.library.distro.has_hashes:
-        reached = {name}
-        waiting = [name]
-        while waiting:
-            new = holders.get(waiting.pop(), set()) - reached
-            reached |= new
-            waiting += new
+        reached = derive.closure([name], lambda held: holders.get(held, ()))
         what += f"; changes the type hash of {counted(len(reached), 'interface')}"
     return what, True

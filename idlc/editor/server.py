@@ -61,13 +61,10 @@ FILE_METHODS: dict[str, tuple[str, str, str, object]] = {
 }
 
 
-def feature(name: str) -> Callable[[object, object], object]:
+def feature(name: str) -> Any:
     """Import and return the function that answers a method."""
     module, function = (FILE_METHODS.get(name) or METHODS[name])[:2]
-    answering: Callable[[object, object], object] = getattr(
-        import_module(f"idlc.editor.{module}"), function
-    )
-    return answering
+    return getattr(import_module(f"idlc.editor.{module}"), function)
 
 
 #: No process has a higher number.

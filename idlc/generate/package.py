@@ -113,6 +113,13 @@ class Generated(NamedTuple):
     removed: int = 0
     needs: tuple[str, ...] = ()
 
+    @property
+    def changes(self) -> str:
+        """The numbers of written and removed files, in words."""
+        numbers = {"written": self.written, "removed": self.removed}
+        done = (f"{number} {what}" for what, number in numbers.items() if number)
+        return ", ".join(done) or "unchanged"
+
 
 def generated(package: Package) -> Generated:
     """Return the outcome for a package that is ready to be written."""

@@ -75,6 +75,16 @@ def create(path: str, data: bytes, how: int = os.O_TRUNC, *, sync: bool = False)
         raise
 
 
+def write_whole(target: Path, data: bytes, mode: int) -> None:
+    """Give a file a content and a mode, as a whole or not at all, unless it has the content."""
+    if not target.is_file() or target.read_bytes() != data:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = target.with_name(f"{target.name}.{os.getpid()}")
+        create(str(draft), data)
+        draft.chmod(mode)
+        move_over(str(draft), str(target))
+
+
 def make_folder(folder: Path, created: list[Path]) -> None:
     """Make a folder and those above it; add the ones that were not there to `created`."""
     missing = itertools.takewhile(lambda each: not is_folder(each), (folder, *folder.parents))

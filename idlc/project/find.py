@@ -45,12 +45,11 @@ class Exclusions(msgspec.Struct, frozen=True):
 
     def seen_from(self, place: Path, top: Path) -> Exclusions:
         """Return the same for a copy of the folder `top` that lies in `place`."""
-        return Exclusions(
-            tuple(
-                (patterns, place / base.relative_to(top) if base.is_relative_to(top) else base)
-                for patterns, base in self.parts
-            )
+        parts = (
+            (patterns, place / base.relative_to(top) if base.is_relative_to(top) else base)
+            for patterns, base in self.parts
         )
+        return Exclusions(tuple(parts))
 
 
 def exclusion(patterns: Iterable[str], base: Path) -> Exclusions:

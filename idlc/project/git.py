@@ -86,12 +86,10 @@ class Revision(NamedTuple):
 
     def counterpart(self, path: str) -> str | None:
         """Return the path in the revision for one of the working tree; `None` outside of it."""
-        try:
-            return (
-                self.folder / self.root.absolute(path).resolve().relative_to(self.top)
-            ).as_posix()
-        except ValueError:
-            return None
+        with suppress(ValueError):
+            inside = self.root.absolute(path).resolve().relative_to(self.top)
+            return (self.folder / inside).as_posix()
+        return None
 
     def files(
         self, paths: Iterable[str], exclude: Exclusions, report: Report
@@ -295,9 +293,8 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
             target.parent.mkdir(parents=True, exist_ok=True)
             if mode != _LINK:
                 target.write_bytes(contents[identity])
-        _link(
-            root, {path: contents[identity] for mode, identity, path in selected if mode == _LINK}
-        )
+        links = {path: contents[identity] for mode, identity, path in selected if mode == _LINK}
+        _link(root, links)
     except (OSError, ValueError) as error:
         raise GitError(f"its files cannot be written to `{root}`: {reason(error)}", "") from None
     return entries

@@ -182,12 +182,10 @@ def packages(
 
     `empty` are the folders of packages that may be without interfaces.
     """
-    files = tuple(files)
-    root = scope.root
-    if scope.package is not None and files:
-        home = min(by_home(files, root))
-        return (load(scope.package, files, home, root, report),)
+    files, root = tuple(files), scope.root
     homes = by_home(files, root)
+    if scope.package is not None and homes:
+        return (load(scope.package, files, min(homes), root, report),)
     read = [load("", own, home, root, report) for home, own in homes.items()]
     named = [_named(package_inputs, scope, report) for package_inputs in read]
     empty_homes = (home for home in sorted(set(empty)) if not homes.keys() & {home, *home.parents})

@@ -135,14 +135,10 @@ class Manifest(NamedTuple):
     format: str
     elements: tuple[Element, ...]
 
-    @property
-    def children(self) -> tuple[Element, ...]:
-        """The elements directly within `<package>`."""
-        return tuple(element for element in self.elements if element.parents == ("package",))
-
     def texts(self, *tags: str) -> list[str]:
-        """Return the texts of the children with one of these tags."""
-        return [element.text for element in self.children if element.tag in tags]
+        """Return the texts of the elements directly within `<package>` with one of these tags."""
+        children = (element for element in self.elements if element.parents == ("package",))
+        return [element.text for element in children if element.tag in tags]
 
 
 def read(data: bytes, encoding: str | None = None) -> Manifest:
@@ -280,14 +276,14 @@ def add_dependencies(
     if not own:
         lines = " ".join(f"<depend>{name}</depend>" for name in depends)
         why = "it has no `<name>`"
-        if not manifest.children:
+        if not manifest.elements:
             why = "this is not a well-formed package.xml"
         return Refused(why, lines, "within `<package>`")
     running = own.union(manifest.texts(*AT_RUN_TIME))
     testing = own.union(manifest.texts(*AT_TEST_TIME))
-    tag = "run_depend" if manifest.format == "1" else "depend"
-    new = [(tag, name) for name in depends if name not in running]
-    execute = "run_depend" if manifest.format == "1" else "exec_depend"
+    old = ("run_depend", "run_depend")
+    depend, execute = old if manifest.format == "1" else ("depend", "exec_depend")
+    new = [(depend, name) for name in depends if name not in running]
     new += [(execute, name) for name in executes if name not in {*running, *depends}]
     testing.update(name for _, name in new)
     new += [("test_depend", name) for name in tests if name not in testing]

@@ -14,7 +14,6 @@ from idlc.model import distros
 from idlc.model.names import is_package_name
 from idlc.project.files import entries, is_file, is_folder, read_bytes
 from idlc.project.package_xml import declared_version
-from idlc.project.root import Root
 
 #: Where a prefix lists what is installed in it, by kind and name.
 INDEX = "share/ament_index/resource_index"
@@ -119,28 +118,6 @@ def installed(prefix: Path) -> Distribution | None:
     return Distribution(name, f"rosidl {version} in {prefix.as_posix()}")
 
 
-class InstalledPackage(NamedTuple):
-    """A package with interfaces that is in a prefix's index, by which C++ tools find it."""
-
-    prefix: Path
-    package: str
-    root: Root
-
-    @property
-    def share(self) -> str:
-        """The folder of its interfaces."""
-        return self.root.shown(self.prefix / "share" / self.package)
-
-    def library(self, name: str) -> str:
-        """Return the path of one of its libraries, as people know it."""
-        return self.root.shown(self.prefix / "lib" / name)
-
-    def content(self, name: str) -> bytes | None:
-        """Return the content of one of its libraries, `None` if it has no such file."""
-        path = self.prefix / "lib" / name
-        return read_bytes(path, self.root.shown(path), Report()) if is_file(path) else None
-
-
 def prefixes(folder: Path) -> list[Path]:
     """Return the prefixes that a folder is or holds: colcon makes one for each package."""
     if is_folder(folder / INDEX):
@@ -148,11 +125,10 @@ def prefixes(folder: Path) -> list[Path]:
     return [path for path in entries(folder) if is_folder(path / INDEX)]
 
 
-def installed_packages(prefix: Path, root: Root) -> Iterator[InstalledPackage]:
-    """Yield the packages of a prefix that its index lists as packages with interfaces."""
-    for name in _registered(prefix, "rosidl_interfaces"):
-        if is_file(prefix / INDEX / "packages" / name):
-            yield InstalledPackage(prefix, name, root)
+def with_interfaces(prefix: Path) -> list[str]:
+    """Return the packages with interfaces in a prefix's index, by which C++ tools find them."""
+    names = _registered(prefix, "rosidl_interfaces")
+    return [name for name in names if is_file(prefix / INDEX / "packages" / name)]
 
 
 def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:

@@ -96,10 +96,10 @@ def read_table(
         read = read_value(value, fields[key].type, key, place, report)
         if read is not None:
             values[fields[key].name] = read
-    missing = [key for key, field in fields.items() if field.required and key not in table]
-    for key in missing:
-        what = _meta(fields[key].type).description
-        place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
+    for key, field in fields.items():
+        if field.required and key not in table:
+            what = _meta(field.type).description
+            place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
     required = {field.name for field in fields.values() if field.required}
     return shape(**values) if required <= values.keys() else None
 
@@ -275,7 +275,7 @@ class Scope(msgspec.Struct, frozen=True):
     exclude: Exclusions = Exclusions()
     paths: tuple[str, ...] = ()
     out: str | None = None
-    distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros_named(()))
+    distros: tuple[Distro, ...] = ()
 
     @property
     def distro(self) -> Distro:
@@ -294,6 +294,7 @@ def scope(
     left_out = exclusion(exclude, settings.root.base).parts if exclude else ()
     if settings.exclude and settings.folder is not None:
         left_out += exclusion(settings.exclude, settings.folder).parts
+    names = split_names(distro) if distro else settings.distro
     return Scope(
         settings.root,
         package or settings.package or None,
@@ -301,10 +302,5 @@ def scope(
         Exclusions(left_out),
         settings.paths,
         settings.out or None,
-        _distros_named(split_names(distro) if distro else settings.distro),
+        tuple(dict.fromkeys(BY_NAME[name] for name in names)),
     )
-
-
-def _distros_named(names: Sequence[str]) -> tuple[Distro, ...]:
-    """Return the distributions with these names, each once."""
-    return tuple(dict.fromkeys(BY_NAME[name] for name in names))

@@ -28,9 +28,14 @@ def check_interface_name(name: str) -> str:
 
 
 def interface_text(kind: str, fields: Sequence[str], comment: str = "") -> str:
-    """Return the text of an interface file; without fields, all parts are empty."""
+    """Return the text of an interface file; without fields, all parts are empty.
+
+    Raises ValueError for a wrong number of parts, and for a field that is more than one line.
+    """
     parts: list[list[str]] = [[]]
     for field in fields:
+        if len(field.splitlines()) > 1:
+            raise ValueError(f"a field is one line, not {field!r}")
         if field.strip() == SEPARATOR:
             parts.append([])
         else:
@@ -75,13 +80,6 @@ def starter(word: str) -> tuple[str, str]:
     return f"{kind}/{check_interface_name(name)}.{kind}", interface_text(
         kind, _STARTERS[kind], comment
     )
-
-
-def check_fields(fields: Sequence[str]) -> None:
-    """Raise ValueError for a field that would be more than one line of the file."""
-    for field in fields:
-        if len(field.splitlines()) > 1:
-            raise ValueError(f"a field is one line, not {field!r}")
 
 
 WHERE = "to the packages that rosidl_generate_interfaces() depends on, and find_package() it"

@@ -123,10 +123,8 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
         }
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)
-        texts = {}
-        for path in paths(own, project.names("launch")):
-            if (content := project.text(path)) is not None:
-                texts[path] = content
+        wanted = paths(own, project.names("launch"))
+        texts = {path: content for path in wanted if (content := project.text(path)) is not None}
         keys, present = project.keys(), folders(project.path)
         entry = node_entry(planned, texts, used, launch=settings.launch, keys=keys, folders=present)
         entry = entry._replace(added={**files, **entry.added})

@@ -197,7 +197,10 @@ def _parameter(parameter: spec.Parameter) -> ParameterView:
 def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
     """Yield the requests that a node sends."""
     alone = len(planned.asking) == 1
-    for request, word, interface in planned.asking:
+    for endpoint, word, interface in planned.asking:
+        request = endpoint.role.request
+        assert request is not None
+        assert interface is not None
         message = derive.sections(interface)[0]
         prefix = "" if alone else f"{word}_"
         type_ = Code(page.use(message.name))

@@ -63,26 +63,17 @@ class PackageView(NamedTuple):
         return self.build_type == PYTHON
 
 
-#: Files of a package of nodes, each with its template; NAME stands for the package.
-_PYTHON_FILES = {
-    "package.xml": "package/package.xml.jinja",
-    "setup.py": "package/setup.py.jinja",
-    "setup.cfg": "package/setup.cfg.jinja",
-    "pyproject.toml": "package/pyproject.toml.jinja",
-    "launch/NAME_launch.py": "package/launch.py.jinja",
-    "test/conftest.py": "package/conftest.py.jinja",
-    "test/test_style.py": "package/test_style.py.jinja",
-    "README.md": "package/README.md.jinja",
-    ".gitattributes": "package/gitattributes.jinja",
-    ".gitignore": "package/gitignore.jinja",
+#: Templates whose names differ from those of their files.
+_TEMPLATES = {
+    (PYTHON, "launch/NAME_launch.py"): "launch.py",
+    (CMAKE, "pyproject.toml"): "interfaces_pyproject.toml",
 }
-_CMAKE_FILES = {
-    "package.xml": "package/package.xml.jinja",
-    "CMakeLists.txt": "package/CMakeLists.txt.jinja",
-    "pyproject.toml": "package/interfaces_pyproject.toml.jinja",
-    "README.md": "package/README.md.jinja",
-    ".gitignore": "package/gitignore.jinja",
-}
+#: Files of a package of nodes, and of one of interfaces; NAME stands for the package.
+_PYTHON_FILES = (
+    *("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "launch/NAME_launch.py"),
+    *("test/conftest.py", "test/test_style.py", "README.md", ".gitattributes", ".gitignore"),
+)
+_CMAKE_FILES = ("package.xml", "CMakeLists.txt", "pyproject.toml", "README.md", ".gitignore")
 #: Files of a new package that are edited later on.
 GROWING = (
     *("package.xml", "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
@@ -107,10 +98,11 @@ def check_package_name(name: str) -> str:
 def package_files(package: Package, templates: Templates) -> dict[str, str]:
     """Return the texts of a new package's files by their paths in its folder."""
     listed = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
-    files = {
-        path.replace("NAME", package.name): rendered(template, package, templates)
-        for path, template in listed.items()
-    }
+    files = {}
+    for path in listed:
+        template = _TEMPLATES.get((package.build_type, path), path.rpartition("/")[2].lstrip("."))
+        text = rendered(f"package/{template}.jinja", package, templates)
+        files[path.replace("NAME", package.name)] = text
     text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
     files["LICENSE"] = text.replace("(c) HOLDER", f"(c) {package.maintainer}")
     if package.build_type == PYTHON:

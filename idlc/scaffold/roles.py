@@ -153,6 +153,7 @@ def _positive(text: str, subject: str, unit: str) -> float:
     return value
 
 
+_SERVER = ("ActionServer", "CancelResponse", "ServerGoalHandle")
 ROLES: tuple[Role, ...] = (
     Role(
         name="publisher",
@@ -202,14 +203,7 @@ ROLES: tuple[Role, ...] = (
         summary="works on goals for",
         family="action",
         samples=("result", "feedback"),
-        imports={
-            "rclpy.action.server": (
-                "ActionServer",
-                "CancelResponse",
-                "GoalResponse",
-                "ServerGoalHandle",
-            )
-        },
+        imports={"rclpy.action.server": (*_SERVER, "GoalResponse")},
         test_imports={"action_msgs.msg": ("GoalStatus",), "rclpy.action.client": ("ActionClient",)},
         helpers=frozenset({"pause", "retire"}),
     ),
@@ -226,10 +220,7 @@ ROLES: tuple[Role, ...] = (
             "rclpy.task": ("Future",),
             "typing": ("Any",),
         },
-        test_imports={
-            "rclpy.action.server": ("ActionServer", "CancelResponse", "ServerGoalHandle"),
-            "rclpy.task": ("Future",),
-        },
+        test_imports={"rclpy.action.server": _SERVER, "rclpy.task": ("Future",)},
         helpers=frozenset({"pause", "retire", "until"}),
         request=Request("the goal", "send_{}_goal", cancel="cancel_{}_goal"),
     ),

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
-from idlc.scaffold.roles import DEFAULT_QOS, ROLES, Endpoint, Request, Role, qos_preset
+from idlc.scaffold.roles import DEFAULT_QOS, ROLES, Endpoint, Role, qos_preset
 
 #: Names that a module of a node cannot have in its package.
 TAKEN = frozenset({"msg", "srv", "action"})
@@ -79,11 +79,6 @@ def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
     return Endpoint(role, *role.read(text), quality)
 
 
-def in_order(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
-    """Return endpoints in the order of the roles."""
-    return tuple(sorted(endpoints, key=lambda endpoint: ROLES.index(endpoint.role)))
-
-
 def parameter(text: str) -> Parameter:
     """Return the parameter that `NAME:TYPE=DEFAULT` means; `TYPE[]` for several values."""
     head, equals, default = text.partition("=")
@@ -127,14 +122,6 @@ class Placed(NamedTuple):
     interface: ir.Interface | None
 
 
-class Asking(NamedTuple):
-    """An endpoint that sends a request or a goal, which the command line describes."""
-
-    request: Request
-    word: str
-    interface: ir.Interface
-
-
 class Plan(NamedTuple):
     """A node with its endpoints and all messages that those may need."""
 
@@ -143,13 +130,9 @@ class Plan(NamedTuple):
     messages: Mapping[ir.TypeName, ir.Message]
 
     @property
-    def asking(self) -> tuple[Asking, ...]:
-        """The endpoints that send requests or goals."""
-        return tuple(
-            Asking(placed.endpoint.role.request, placed.word, placed.interface)
-            for placed in self.endpoints
-            if placed.endpoint.role.request and placed.interface
-        )
+    def asking(self) -> tuple[Placed, ...]:
+        """The endpoints that send requests or goals, which the command line describes."""
+        return tuple(placed for placed in self.endpoints if placed.endpoint.role.request)
 
     @property
     def once(self) -> bool:

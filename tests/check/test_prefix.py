@@ -132,7 +132,7 @@ def test_another_distribution(here, said, monkeypatch):
     for name, fits in (("jazzy", True), ("kilted", True), ("humble", False), ("lyrical", False)):
         (here / LIBRARY).write_bytes(made(layout=name))
         there = Distribution("jazzy", "for this test")
-        monkeypatch.setattr("idlc.check.prefix.distribution", lambda _, found=there: found)
+        monkeypatch.setattr("idlc.project.prefixes.distribution", lambda _, found=there: found)
         status, found = said()
         assert (status, found) == (
             (0, [])

@@ -22,9 +22,7 @@ from idlc.project.package_xml import Facts
 _INDEX = "share/ament_index/resource_index"
 
 
-@lru_cache(maxsize=16)
-def _read(source: Source) -> Setup:
-    return Setup(source)
+_read = lru_cache(maxsize=16)(Setup)
 
 
 class _Package(NamedTuple):
@@ -317,9 +315,7 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
         for name in sorted(output.inputs.keys() | facts.inputs.keys()):
             before, now = output.inputs.get(name), facts.inputs.get(name)
             if before != now:
-                what = (
-                    "was added" if before is None else "was removed" if now is None else "changed"
-                )
+                what = "was added" if before is None else "changed" if now else "was removed"
                 changed.append(f"`{name}` {what}")
         if changed:
             folder = facts.manifest.path.rpartition("/")[0] or "."

@@ -82,11 +82,11 @@ class Layout(NamedTuple):
     def folder(self, package: str) -> str:
         """Return the folder of a package, relative to setup.py."""
         names = package.split(".")
-        for end in range(len(names), -1, -1):
-            root = self.roots.get(".".join(names[:end]))
-            if root is not None or not end:
-                return normpath("/".join((root or ".", *names[end:])))
-        raise AssertionError
+        end = len(names)
+        while end and ".".join(names[:end]) not in self.roots:
+            end -= 1
+        root = self.roots.get(".".join(names[:end])) or "."
+        return normpath("/".join((root, *names[end:])))
 
     def packages(self, folders: Mapping[str, bool]) -> dict[str, bool]:
         """Return folders by the names that their packages have in setuptools."""

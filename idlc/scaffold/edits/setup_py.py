@@ -241,9 +241,8 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
     dynamic = project.get("dynamic", ())
     if project and not {"scripts", "entry-points"}.intersection(dynamic):
         return PYPROJECT, _in_pyproject(files[PYPROJECT], project, script)
-    if SETUP_CFG in files and _section(files[SETUP_CFG].splitlines(), SECTION):
-        return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
-    if SETUP_PY in files:
+    in_cfg = _section(files.get(SETUP_CFG, "").splitlines(), SECTION)
+    if SETUP_PY in files and not in_cfg:
         return SETUP_PY, add_to_setup(files[SETUP_PY], script)
     if SETUP_CFG in files:
         return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
