@@ -28,10 +28,8 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
     if new == source.text:
         return new
     after = lower(parse(Source(source.path, new)), name, again, NEWEST)
-    same = [problem.code for problem in problems.errors] == [
-        problem.code for problem in again.errors
-    ]
-    if same and meaning(after) == meaning(before):
+    codes = [[problem.code for problem in each.errors] for each in (problems, again)]
+    if codes[0] == codes[1] and meaning(after) == meaning(before):
         return new
     if problems.had_errors:  # the meaning of a wrong definition cannot be compared reliably
         return source.text

@@ -49,12 +49,10 @@ def unique_names(model: Model) -> Iterator[Diagnostic]:
             for element in elements:
                 earlier = first.setdefault(element.name, element)
                 if earlier is not element and earlier.name_span:
-                    yield code.at(
-                        element.name_span,
-                        f"a second {noun} `{element.name}`",
-                        labels=(Label(earlier.name_span, "the first is here"),),
-                        hint="rename or remove one of them",
-                    )
+                    text = f"a second {noun} `{element.name}`"
+                    labels = (Label(earlier.name_span, "the first is here"),)
+                    hint = "rename or remove one of them"
+                    yield code.at(element.name_span, text, hint=hint, labels=labels)
 
 
 def unique_modules(model: Model) -> Iterator[Diagnostic]:

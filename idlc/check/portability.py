@@ -106,12 +106,9 @@ def chars(model: Model) -> Iterator[Diagnostic]:
             if wide:  # there is room to leave the name in its column
                 whole = Span(span.source, span.start, wide.end())
                 edit = Edit(whole, f"uint8{wide[1]}{wide[2]}")
-            yield codes.CHAR_TYPE.at(
-                span,
-                "`char` is an unsigned number of one byte in ROS 2, not a character",
-                hint="write `uint8`; bytes, hash and code stay the same",
-                edits=(edit,),
-            )
+            text = "`char` is an unsigned number of one byte in ROS 2, not a character"
+            hint = "write `uint8`; bytes, hash and code stay the same"
+            yield codes.CHAR_TYPE.at(span, text, hint=hint, edits=(edit,))
 
 
 def _is_char(type_: ir.FieldType) -> bool:
@@ -131,11 +128,9 @@ def nested_bounds(model: Model) -> Iterator[Diagnostic]:
         element = ir.element_of(field.type)
         bound = element.bound if isinstance(element, ir.String) else None
         if bound is not None and element is not field.type:
-            yield codes.UNENFORCED_BOUND.at(
-                field.type_span,
-                f"no middleware enforces that each text has at most {bound} characters",
-                hint="check the length in code; the bound still is part of the type hash",
-            )
+            message = f"no middleware enforces that each text has at most {bound} characters"
+            hint = "check the length in code; the bound still is part of the type hash"
+            yield codes.UNENFORCED_BOUND.at(field.type_span, message, hint=hint)
 
 
 def several_units(model: Model) -> Iterator[Diagnostic]:

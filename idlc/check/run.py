@@ -119,12 +119,8 @@ def checkers(
 ) -> dict[str, Checker]:
     """Return the checker of packages for each distribution; `again`: they check repeatedly."""
     distros = scope.distros or (scope.distro,)
-    return {
-        distro.name: Checker(
-            packages, msgspec.structs.replace(scope, distros=(distro,)), again=again
-        )
-        for distro in distros
-    }
+    scopes = [msgspec.structs.replace(scope, distros=(distro,)) for distro in distros]
+    return {each.distro.name: Checker(packages, each, again=again) for each in scopes}
 
 
 class Checker:
@@ -174,9 +170,8 @@ def check_all(
 ) -> tuple[list[Diagnostic], dict[str, list[Model]]]:
     """Return the problems to show, each once, and the models for each distribution."""
     reports = {distro: Report() for distro in checkers}
-    models = {
-        distro: checker.check(packages, reports[distro]) for distro, checker in checkers.items()
-    }
+    items = checkers.items()
+    models = {distro: checker.check(packages, reports[distro]) for distro, checker in items}
     own = (interface for some in models.values() for model in some for interface in model.own)
     sources = {part.source.path: part.source for part in own if part.source}.values()
     together = merge(reports) if len(reports) > 1 else next(iter(reports.values()))

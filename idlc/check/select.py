@@ -105,11 +105,9 @@ def without_ignored(
             yield diagnostic
     for at, remark in enumerate(remarks):
         if not remark.reason:
-            yield codes.IGNORE_WITHOUT_REASON.at(
-                remark.span,
-                f"this does not say why `{remark.code}` is ignored",
-                hint=f"write the reason after it: `ignore[{remark.code}] REASON`",
-            )
+            message = f"this does not say why `{remark.code}` is ignored"
+            hint = f"write the reason after it: `ignore[{remark.code}] REASON`"
+            yield codes.IGNORE_WITHOUT_REASON.at(remark.span, message, hint=hint)
         elif at not in used:
             code = codes.CODES.get(remark.code)
             if code is None:

@@ -144,11 +144,9 @@ def documented_interfaces(model: Model) -> Iterator[Diagnostic]:
     for interface in model.own:
         if interface.source and not any(part.comment for part in derive.sections(interface)):
             noun = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
-            yield codes.UNDOCUMENTED_INTERFACE.at(
-                _top(interface),
-                f"nothing says what {noun} `{interface.name.name}` is for",
-                hint="begin the file with a comment and an empty line",
-            )
+            message = f"nothing says what {noun} `{interface.name.name}` is for"
+            hint = "begin the file with a comment and an empty line"
+            yield codes.UNDOCUMENTED_INTERFACE.at(_top(interface), message, hint=hint)
 
 
 def documented_fields(model: Model) -> Iterator[Diagnostic]:
@@ -196,11 +194,9 @@ def constant_prefixes(model: Model) -> Iterator[Diagnostic]:
         for constant in whole:
             first = constant.name.partition("_")[0]
             if firsts[first] == 1 and len(whole) > 1 and first not in names:
-                yield codes.CONSTANT_WITHOUT_PREFIX.at(
-                    constant.name_span,
-                    f"`{constant.name}` does not say what it is a value of",
-                    hint=f"begin it with the name of its field, as in `MODE_{constant.name}`",
-                )
+                text = f"`{constant.name}` does not say what it is a value of"
+                hint = f"begin it with the name of its field, as in `MODE_{constant.name}`"
+                yield codes.CONSTANT_WITHOUT_PREFIX.at(constant.name_span, text, hint=hint)
 
 
 def suffixes(model: Model) -> Iterator[Diagnostic]:
@@ -209,8 +205,6 @@ def suffixes(model: Model) -> Iterator[Diagnostic]:
         name, kind = interface.name.name, interface.name.kind
         endings = (ending for ending in _SUFFIXES[kind] if name.endswith(ending) and name != ending)
         if suffix := next(endings, None):
-            yield codes.REDUNDANT_SUFFIX.of(
-                ir.path_of(interface),
-                f"`{name}.{kind}` says twice that it is a .{kind} file",
-                hint=f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use",
-            )
+            message = f"`{name}.{kind}` says twice that it is a .{kind} file"
+            hint = f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use"
+            yield codes.REDUNDANT_SUFFIX.of(ir.path_of(interface), message, hint=hint)

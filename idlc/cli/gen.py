@@ -61,7 +61,7 @@ def _line(package: Generated, check: bool) -> str:
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
 
-    is_all = not check and package.written == package.files and not package.removed
+    is_all = not check and package.written >= package.files and not package.removed
     note = "" if is_all else f" ({'up to date' if check else package.changes})"
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (

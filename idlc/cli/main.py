@@ -21,18 +21,17 @@ def _run(words: list[str]) -> int:
     if words in (["--version"], ["-V"]):
         sys.stdout.write(f"idlc {__version__}\n")
         return 0
+    from idlc.cli.exit_status import status_of
+
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
         # hooks call this for each commit, and importing click takes longer than checking a file
         from idlc.cli.direct import check_paths
-        from idlc.cli.exit_status import status_of
 
         return status_of(lambda: check_paths(tuple(words[1:])))
     # words that editors add to a server's command have no effect
-    if words[:1] == ["lsp"] and all(
-        word == "--stdio" or word.startswith("--clientProcessId=") for word in words[1:]
-    ):
+    added = all(word == "--stdio" or word.startswith("--clientProcessId=") for word in words[1:])
+    if words[:1] == ["lsp"] and added:
         from idlc.cli.direct import serve_editor
-        from idlc.cli.exit_status import status_of
 
         return status_of(serve_editor)
     from idlc.cli.app import run

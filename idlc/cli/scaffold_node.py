@@ -77,9 +77,8 @@ def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
         )
     if role.kind != "msg":
         return spec.endpoint(role, value)
-    preset = click.prompt(
-        "Quality of service", type=click.Choice(QOS_NAMES), default=DEFAULT_QOS.name
-    )
+    presets = click.Choice(QOS_NAMES)
+    preset = click.prompt("Quality of service", type=presets, default=DEFAULT_QOS.name)
     return spec.endpoint(role, value, preset)
 
 

@@ -227,9 +227,7 @@ NO_SUCH_TOPIC = Code("IDL655", "no-such-topic", ERROR, usage=True)
 INTERNAL_ERROR = Code("IDL901", "internal-error", ERROR)
 
 #: All codes by id.
-CODES: dict[str, Code] = {
-    code.id: code for code in tuple(globals().values()) if isinstance(code, Code)
-}
+CODES = {code.id: code for code in tuple(globals().values()) if isinstance(code, Code)}
 
 #: Ids of the codes that mean exit status 2.
 USAGE = frozenset(code.id for code in CODES.values() if code.usage)

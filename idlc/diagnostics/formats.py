@@ -151,14 +151,9 @@ def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     reported = list(diagnostics)
     codes = sorted({diagnostic.code for diagnostic in reported})
     seen: dict[str, int] = {}
+    rules = [_rule(code) for code in codes]
     whole = {
-        "tool": {
-            "driver": {
-                "name": "idlc",
-                "version": run.version,
-                "rules": [_rule(code) for code in codes],
-            }
-        },
+        "tool": {"driver": {"name": "idlc", "version": run.version, "rules": rules}},
         "automationDetails": {"id": f"idlc/{run.command}/"},
         "columnKind": "unicodeCodePoints",
         "results": [
@@ -223,9 +218,8 @@ def _artifact(path: str) -> dict[str, str]:
 
 
 def _physical_region(span: Span) -> dict[str, int]:
-    return dict(
-        zip(("startLine", "startColumn", "endLine", "endColumn"), span.corners, strict=True)
-    )
+    names = ("startLine", "startColumn", "endLine", "endColumn")
+    return dict(zip(names, span.corners, strict=True))
 
 
 #: By the name of the format.

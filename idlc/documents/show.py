@@ -85,9 +85,8 @@ def requested_models(
         yield from recorded_models(recordings, scope, report)
     if paths:
         problems = Report()
-        packages = inputs.packages(
-            find(paths, scope.root, problems, scope.exclude), scope, problems
-        )
+        files = find(paths, scope.root, problems, scope.exclude)
+        packages = inputs.packages(files, scope, problems)
         report.extend(problems)
         report.notes += problems.notes
         if not problems.had_errors:

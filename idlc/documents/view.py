@@ -65,11 +65,7 @@ def picture(
         if not names:
             continue
         nodes: list[tuple[ir.TypeName | None, str]] = [
-            (
-                other,
-                other.name if other.package == name.package else f"{other.package}/{other.name}",
-            )
-            for other in names[:_MOST]
+            (other, spell(ir.Ref(other), name.package)) for other in names[:_MOST]
         ]
         if len(names) > _MOST:
             nodes.append((None, f"and {len(names) - _MOST} more"))
@@ -219,9 +215,8 @@ def words(name: str) -> list[str]:
 
 def prefix(interface: ir.Interface, part: ir.Message) -> str:
     """Return the prefix of a part's anchors, which differs for the parts of a service or action."""
-    return part.name.name.removeprefix(interface.name.name).strip("_") + "." * (
-        part.name != interface.name
-    )
+    inner = part.name.name.removeprefix(interface.name.name).strip("_")
+    return inner if part.name == interface.name else f"{inner}."
 
 
 def blocks(lines: Sequence[str]) -> list[Block]:
@@ -240,11 +235,9 @@ def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
 
 def _section(title: str, message: ir.Message, before: str, pages: Pages) -> Section:
     package = message.name.package
-    constants, fields = (
-        _table(elements, package, before, pages) for elements in (message.constants, message.fields)
-    )
-    empty = not (message.constants or message.fields)
-    return Section(title, blocks(message.comment), constants, fields, empty)
+    own = (message.constants, message.fields)
+    constants, fields = (_table(elements, package, before, pages) for elements in own)
+    return Section(title, blocks(message.comment), constants, fields, not any(own))
 
 
 def _table(

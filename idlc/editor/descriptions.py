@@ -137,9 +137,8 @@ def _escaped(match: re.Match[str]) -> str:
         return text
     blanks = text[: len(text) - len(text.lstrip())]
     mark = text.lstrip()
-    return blanks + (
-        f"{mark}\\" if mark.isdigit() else "".join(f"\\{character}" for character in mark)
-    )
+    escaped = f"{mark}\\" if mark.isdigit() else "".join(f"\\{character}" for character in mark)
+    return blanks + escaped
 
 
 def hints(context: InterfaceContext, params: RangeParams) -> list[dict[str, object]]:

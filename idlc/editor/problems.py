@@ -140,12 +140,11 @@ def publish(state: ServerState) -> None:
     if not state.is_changed:
         return
     state.is_changed = False
-    new_documents = [
-        document for uri, document in state.documents.items() if uri not in state.fingerprints
-    ]
+    opened = state.documents.items()
+    new_documents = [document for uri, document in opened if uri not in state.fingerprints]
     state.fingerprints |= _fingerprints(state, new_documents)
     problems_now = diagnostics(state)
-    versions = {uri: document.version for uri, document in state.documents.items()}
+    versions = {uri: document.version for uri, document in opened}
     new = {
         uri: (versions.get(uri), msgspec.json.encode(problems_now.get(uri, ())))
         for uri in (*problems_now, *versions)
@@ -192,9 +191,8 @@ def _fingerprints(
     state: ServerState, documents: Iterable[Document]
 ) -> dict[str, tuple[int | None, object]]:
     """Return for documents their version, and what others decide of their hints and lenses."""
-    if not documents or not any(
-        state.supports("workspace", part, "refreshSupport") for part in _PARTS
-    ):
+    refreshes = any(state.supports("workspace", part, "refreshSupport") for part in _PARTS)
+    if not documents or not refreshes:
         return {}
     counts = Counter(target for _, _, target in uses(state))
     shown: dict[str, tuple[int | None, object]] = {}

@@ -109,9 +109,8 @@ def requests_problems(client: object) -> bool:
     Others request those of a document when it changes. They would keep showing an error that a
     change elsewhere removed, so they get all problems pushed.
     """
-    return supports(client, *_REQUESTS) and supports(
-        client, "workspace", "diagnostics", "refreshSupport"
-    )
+    refreshes = supports(client, "workspace", "diagnostics", "refreshSupport")
+    return refreshes and supports(client, *_REQUESTS)
 
 
 def initialize_result(client: dict[str, Any]) -> dict[str, object]:

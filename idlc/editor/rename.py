@@ -172,9 +172,8 @@ def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | 
             if not is_own or uri in state.documents:
                 edits.setdefault(uri, []).extend(some)
     for problem in report:
-        state.notify(
-            "window/showMessage", {"type": 2, "message": f"{BUILD} is left: {problem.message}"}
-        )
+        message = f"{BUILD} is left: {problem.message}"
+        state.notify("window/showMessage", {"type": 2, "message": message})
     return workspace_edit(edits, state) if edits else None
 
 

@@ -109,9 +109,8 @@ class ServerState:
             client = parts.Initialize()
         self.client = client.capabilities
         self.encoding = protocol.encoding(client.capabilities)
-        self.is_watching = self.supports(
-            "workspace", "didChangeWatchedFiles", "dynamicRegistration"
-        )
+        watching = ("workspace", "didChangeWatchedFiles", "dynamicRegistration")
+        self.is_watching = self.supports(*watching)
         self._use_settings(client.initialization_options)
         folders = client.workspace_folders
         if folders is None:
@@ -138,10 +137,9 @@ class ServerState:
     def workspaces(self) -> list[Workspace]:
         """Return the workspaces of the client's folders and of stray files, innermost first."""
         strays: dict[Path, set[str]] = {}
+        own = self._folders.values()
         for path in filter(None, (document.path for document in self.documents.values())):
-            if path.suffix in KINDS and not any(
-                workspace.holds(path) for workspace in self._folders.values()
-            ):
+            if path.suffix in KINDS and not any(workspace.holds(path) for workspace in own):
                 folder, paths = stray_folder(path)
                 strays.setdefault(folder, set()).update(paths)
         keys = [(folder, tuple(sorted(paths))) for folder, paths in strays.items()]
@@ -164,9 +162,8 @@ class ServerState:
 
     def notice_changes(self) -> bool:
         """Have folders that changed on disk read again; return whether any did."""
-        changed = [
-            workspace for workspace in self._known_workspaces() if not workspace.is_current()
-        ]
+        known = self._known_workspaces()
+        changed = [workspace for workspace in known if not workspace.is_current()]
         for workspace in changed:
             workspace.forget()
         self.is_changed |= bool(changed)
@@ -313,11 +310,8 @@ class ServerState:
     def _change_settings(self, params: parts.DidChangeSettings) -> None:
         """Fetch the settings, or use those that a client sends which answers no such request."""
         if self.supports("workspace", "configuration"):
-            self.ask(
-                "workspace/configuration",
-                {"items": [{"section": "idlc"}]},
-                lambda values: self._use_settings(*values[:1]),
-            )
+            query = {"items": [{"section": "idlc"}]}
+            self.ask("workspace/configuration", query, lambda items: self._use_settings(*items[:1]))
         else:
             self._use_settings(params.settings)
 

@@ -162,9 +162,8 @@ class Workspace:
             self._settings = settings = load_settings(root, report)
             selected = select.selection(settings, report)
             self._selection = selected.with_lists(options.select, options.ignore)
-            self._scope = scope(
-                settings, options.package or None, options.include, options.exclude, options.distro
-            )
+            chosen = (options.package, options.include, options.exclude, options.distro)
+            self._scope = scope(settings, *chosen)
             # a mistake in the settings stops the command line, too
             if not report.had_errors:
                 paths = self._paths or settings.paths or (".",)
@@ -265,9 +264,8 @@ class Workspace:
 
     def _concerns(self, path: Path) -> bool:
         """Return whether a file outside of the packages may change the result of a check."""
-        if path.name in (settings.SETTINGS_FILE, MANIFEST) and self.folder.is_relative_to(
-            path.parent
-        ):
+        is_above = self.folder.is_relative_to(path.parent)
+        if is_above and path.name in (settings.SETTINGS_FILE, MANIFEST):
             return True
         folders = (self.folder, *(in_folder(self.folder, folder) for folder in self._scope.include))
         return any(path.is_relative_to(folder) for folder in (*folders, *prefixes.ament_prefixes()))

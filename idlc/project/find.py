@@ -253,9 +253,8 @@ def walk(
             report.add(unreadable(current.as_posix(), error))
             continue
         identity = (status.st_dev, status.st_ino)
-        if (identity in visited and status.st_ino) or (
-            current != folder and any(entry.name in CLOSING for entry in inside)
-        ):
+        is_closed = current != folder and any(entry.name in CLOSING for entry in inside)
+        if is_closed or (identity in visited and status.st_ino):
             continue
         visited.add(identity)
         for entry in inside:

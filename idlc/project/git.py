@@ -95,11 +95,9 @@ class Revision(NamedTuple):
         self, paths: Iterable[str], exclude: Exclusions, report: Report
     ) -> tuple[InterfaceFile, ...]:
         """Return the interface files that paths of the working tree meant; there may be none."""
-        counterparts = [place for path in paths if (place := self.counterpart(path))]
-        places = [place for place in counterparts if Path(place).exists()]
-        listed = list_files(
-            places, self.root, report, exclude.seen_from(self.folder, self.top)
-        ).files
+        places = [place for place in map(self.counterpart, paths) if place and Path(place).exists()]
+        left_out = exclude.seen_from(self.folder, self.top)
+        listed = list_files(places, self.root, report, left_out).files
         return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in listed)
 
     def holds(self, path: Path) -> bool:
@@ -193,9 +191,8 @@ def _top(path: Path) -> Path | None:
     Git would also take a tracked folder for a repository that only looks like the inside of one.
     """
     real = path.resolve()
-    return next(
-        (folder for folder in (real, *real.parents) if os.path.lexists(folder / ".git")), None
-    )
+    folders = (real, *real.parents)
+    return next((folder for folder in folders if os.path.lexists(folder / ".git")), None)
 
 
 def _repository(path: Path) -> Path:

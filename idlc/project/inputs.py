@@ -138,11 +138,10 @@ class Inputs(msgspec.Struct, frozen=True):
 
         For a borrowed one it is the digest of its meaning: the next run may find another copy.
         """
+        contents = {entry.file.key: entry.data for entry in self.files}
         if self.borrowed:
-            return {
-                entry.file.key: meaning(entry.data.decode(), self.package) for entry in self.files
-            }
-        return {entry.file.key: digest(entry.data) for entry in self.files}
+            return {key: meaning(data.decode(), self.package) for key, data in contents.items()}
+        return {key: digest(data) for key, data in contents.items()}
 
     def is_whole(self, root: Root) -> bool:
         """Return whether an argument is a folder, so that the package has no other interfaces."""

@@ -319,9 +319,7 @@ def _candidates(text: str, library: Library) -> tuple[ResolvedType, ...]:
                 return (resolved,)
             places = [(package, kind) for kind in ir.KINDS]
         case [package] if package in library.packages():
-            return tuple(
-                ResolvedType(interface, interface) for interface in library.interfaces(package)
-            )
+            return tuple(ResolvedType(own, own) for own in library.interfaces(package))
         case [name]:
             places = [(package, kind) for package in library.packages() for kind in ir.KINDS]
         case _:

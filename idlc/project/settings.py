@@ -47,12 +47,10 @@ class TableLocation(NamedTuple):
 
     def wrong(self, key: str, message: str, report: Report, hint: str | None = None) -> None:
         """Report a problem with a setting, at its location in the file."""
-        span = self._span(key)
-        report.add(
-            BAD_CONFIG.of(self.source.path, message, hint=hint)
-            if span is None
-            else BAD_CONFIG.at(span, message, hint=hint)
-        )
+        if span := self._span(key):
+            report.add(BAD_CONFIG.at(span, message, hint=hint))
+        else:
+            report.add(BAD_CONFIG.of(self.source.path, message, hint=hint))
 
     def no_url(self, key: str, value: str, report: Report) -> None:
         """Report a URL: files, which others may have written, do not cause downloads."""

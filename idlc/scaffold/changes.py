@@ -156,9 +156,8 @@ class Project:
                     message = f"`{place}` exists and is not what would be written"
                     hint = "keep it and choose another name, or run again with --force, "
                     hint += "which keeps a copy"
-                    self._report.add(
-                        codes.EXISTING_FILE.of(place, message, hint=hint, detail=detail)
-                    )
+                    problem = codes.EXISTING_FILE.of(place, message, hint=hint, detail=detail)
+                    self._report.add(problem)
             done.append(FileOutcome(path, what))
         if self._report.had_errors:
             return None

@@ -76,10 +76,8 @@ def starter(word: str) -> tuple[str, str]:
     kind = kind or "msg"
     if kind not in _STARTERS:
         raise ValueError(f"`{word}` is no interface: write `Drive`, `srv/Ask` or `action/Walk`")
-    comment = "An example: say here what it is for."
-    return f"{kind}/{check_interface_name(name)}.{kind}", interface_text(
-        kind, _STARTERS[kind], comment
-    )
+    path = f"{kind}/{check_interface_name(name)}.{kind}"
+    return path, interface_text(kind, _STARTERS[kind], "An example: say here what it is for.")
 
 
 WHERE = "to the packages that rosidl_generate_interfaces() depends on, and find_package() it"
@@ -98,9 +96,8 @@ def add_cmake_dependencies(text: str, names: Sequence[str]) -> Outcome:
     if len(lists) != 1:
         why = f"there is no `set({_LIST} ...)`, or more than one"
         return Refused(why, " ".join(missing), WHERE)
-    return Edited(
-        apply(text, (dependency_edit(lists[0], name, listed=True) for name in missing))[0]
-    )
+    edits = (dependency_edit(lists[0], name, listed=True) for name in missing)
+    return Edited(apply(text, edits)[0])
 
 
 CMAKE = "CMakeLists.txt"
@@ -146,9 +143,8 @@ def interface(
             added[TEST] = rendered_for(own, "package/test_interfaces.py.jinja", used)
     needed, tests = implied_packages(model), ["python3-pytest"] if TEST in added else []
     manifest = project.text(MANIFEST) or ""
-    edits: dict[str, Outcome] = {
-        MANIFEST: package_xml.add_dependencies(manifest, depends=needed, tests=tests, group=True)
-    }
+    declared = package_xml.add_dependencies(manifest, depends=needed, tests=tests, group=True)
+    edits: dict[str, Outcome] = {MANIFEST: declared}
     keys, setup = {*project.keys(), path}, project.text(SETUP)
     cmake = project.text(CMAKE)
     if cmake is not None:

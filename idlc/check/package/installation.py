@@ -240,11 +240,9 @@ def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     if setup is None:
         return
     if not facts.marker:
-        yield codes.NO_RESOURCE_MARKER.at(
-            facts.place,
-            f"`resource/{facts.name}` is missing, the file by which ROS 2 finds the package",
-            hint=f"create it: `mkdir -p resource && touch resource/{facts.name}`",
-        )
+        message = f"`resource/{facts.name}` is missing, the file by which ROS 2 finds the package"
+        hint = f"create it: `mkdir -p resource && touch resource/{facts.name}`"
+        yield codes.NO_RESOURCE_MARKER.at(facts.place, message, hint=hint)
     elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
         message = f"`resource/{facts.name}` is not among the `data_files`"
         line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
@@ -299,11 +297,9 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
         script = key.strip().replace("-", "_") in ("script_dir", "install_scripts")
         if equals and script and "/lib/" in folder and not folder.endswith(f"/lib/{facts.name}"):
             at = start + line.index(folder)
-            yield codes.NAME_MISMATCH.at(
-                Span(facts.setup_cfg, at, at + len(folder)),
-                f"`ros2 run` looks for scripts in `lib/{facts.name}`",
-                hint=f"write `$base/lib/{facts.name}`",
-            )
+            span = Span(facts.setup_cfg, at, at + len(folder))
+            message = f"`ros2 run` looks for scripts in `lib/{facts.name}`"
+            yield codes.NAME_MISMATCH.at(span, message, hint=f"write `$base/lib/{facts.name}`")
 
 
 def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
@@ -320,8 +316,6 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
         if changed:
             folder = facts.manifest.path.rpartition("/")[0] or "."
             words = ("gen", folder, "-o", output.path.rpartition("/")[0])
-            yield codes.STALE_GENERATED_CODE.of(
-                output.path,
-                f"the generated code is out of date: {first_few(changed, 3)}",
-                hint=f"run `idlc {shlex.join(words)}`",
-            )
+            message = f"the generated code is out of date: {first_few(changed, 3)}"
+            hint = f"run `idlc {shlex.join(words)}`"
+            yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)

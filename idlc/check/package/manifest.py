@@ -106,12 +106,10 @@ def _has_gaps(model: Model) -> bool:
 def interface_group(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """A package whose interfaces CMake generates is a member of the group of such packages."""
     if facts.generates and model.own and _GROUP not in facts.declared("member_of_group"):
-        yield codes.NOT_IN_INTERFACE_GROUP.at(
-            facts.place,
-            "CMake stops at a package with interfaces that is in no interface group",
-            hint=f"add `<member_of_group>{_GROUP}</member_of_group>`",
-            edits=_additions(facts, ("member_of_group", _GROUP)),
-        )
+        message = "CMake stops at a package with interfaces that is in no interface group"
+        hint = f"add `<member_of_group>{_GROUP}</member_of_group>`"
+        edits = _additions(facts, ("member_of_group", _GROUP))
+        yield codes.NOT_IN_INTERFACE_GROUP.at(facts.place, message, hint=hint, edits=edits)
 
 
 def generators(facts: Facts, model: Model) -> Iterator[Diagnostic]:
@@ -128,12 +126,10 @@ def generators(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     ]
     if missing:
         needed = " and ".join(f"`{package}`" for _, package in missing)
-        yield codes.NO_INTERFACE_GENERATORS.at(
-            facts.place,
-            f"a package with interfaces needs {needed}",
-            hint="add " + " and ".join(f"`<{tag}>{name}</{tag}>`" for tag, name in missing),
-            edits=_additions(facts, *missing),
-        )
+        message = f"a package with interfaces needs {needed}"
+        edits = _additions(facts, *missing)
+        hint = "add " + " and ".join(f"`<{tag}>{name}</{tag}>`" for tag, name in missing)
+        yield codes.NO_INTERFACE_GENERATORS.at(facts.place, message, hint=hint, edits=edits)
 
 
 def names_runtime(texts: Iterable[str]) -> bool:
@@ -147,11 +143,9 @@ def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     if facts.runtime == "installed" and not names_runtime(file.text for file in files if file):
         place = facts.setup_py or facts.pyproject or facts.manifest
         setting = "install_requires" if place is facts.setup_py else "dependencies"
-        yield codes.UNDECLARED_IMPORT.at(
-            Span(place, 0, 0),
-            f"the classes import `idlc_runtime`, which `{place.path}` does not require",
-            hint=f"add `{RUNTIME}` to `{setting}`",
-        )
+        message = f"the classes import `idlc_runtime`, which `{place.path}` does not require"
+        hint = f"add `{RUNTIME}` to `{setting}`"
+        yield codes.UNDECLARED_IMPORT.at(Span(place, 0, 0), message, hint=hint)
     if not facts.modules:
         return
     from idlc.check.package.setup_py import imported_modules, span_of
@@ -164,12 +158,11 @@ def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
             if package in facts.available and package not in declared:
                 declared.add(package)
                 tag = "depend" if package in used else "exec_depend"
-                yield codes.UNDECLARED_IMPORT.at(
-                    span_of(source, node),
-                    f"`{facts.manifest.path}` does not declare `{package}`",
-                    hint=f"add `<{tag}>{package}</{tag}>`",
-                    edits=_additions(facts, (tag, package)),
-                )
+                message = f"`{facts.manifest.path}` does not declare `{package}`"
+                hint = f"add `<{tag}>{package}</{tag}>`"
+                edits = _additions(facts, (tag, package))
+                span = span_of(source, node)
+                yield codes.UNDECLARED_IMPORT.at(span, message, hint=hint, edits=edits)
 
 
 def _additions(facts: Facts, *elements: tuple[str, str]) -> tuple[Edit, ...]:

@@ -130,9 +130,8 @@ def layout(
     if "src" in folders:
         return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
     tops = {name for name in folders if "." not in name} - _NOT_FOUND
-    return Layout(
-        roots or {}, Installed(place, is_nothing=True) if len(tops) > 1 and not roots else None
-    )
+    is_nothing = len(tops) > 1 and not roots
+    return Layout(roots or {}, Installed(place, is_nothing=True) if is_nothing else None)
 
 
 def _is_within(root: str) -> bool:

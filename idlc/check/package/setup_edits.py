@@ -100,9 +100,8 @@ def margin_of(source: Source, node: Brackets) -> str:
     margins = [indent_of(source, at) for at in starts if _begins_line(source, at)]
     if margins:
         return margins[-1]
-    return indent_of(source, range_of(source, node)[1] - 1) + step_of(source) * is_spread(
-        source, node
-    )
+    step = step_of(source) * is_spread(source, node)
+    return indent_of(source, range_of(source, node)[1] - 1) + step
 
 
 def is_spread(source: Source, node: Brackets) -> bool:
@@ -204,9 +203,8 @@ def wrap_lines(old: str, new: str) -> str:
         wide = {at for at, line in lines if len(line) > WIDTH and line not in before}
         tree = parse(new) if wide else None
         nodes = ast.walk(tree) if tree else ()
-        text = next(
-            (spread for node in nodes if (spread := _spread(new, node, wide, refused))), None
-        )
+        texts = (_spread(new, node, wide, refused) for node in nodes)
+        text = next(filter(None, texts), None)
         if tree is None or text is None:
             break
         # the tree has neither parentheses around items nor text that may follow a generator

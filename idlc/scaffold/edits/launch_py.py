@@ -78,19 +78,17 @@ def _additions(file: Setup, description: ast.Call, node: Started, called: str) -
     """Yield the statement that adds a node before a function returns its description."""
     for function in file.nodes:
         match function:
-            case ast.FunctionDef(
-                body=[*_, last, ast.Return(value=ast.Name(id=returned)) as end]
-            ) if (last.end_lineno or 0) < end.lineno and any(
-                _names(statement, description, returned) for statement in function.body
-            ):
+            case ast.FunctionDef(body=[*body, ast.Return(value=ast.Name(id=returned)) as end]):
+                is_named = any(_names(statement, description, returned) for statement in body)
+                if not is_named or (body[-1].end_lineno or 0) >= end.lineno:
+                    continue
                 margin = setup_edits.indent_of(file.source, range_of(file.source, end)[0])
                 nodes = next(file.calls_of("Node"), None)
                 quote = setup_edits.quote_of(file.source, nodes) if nodes else "'"
                 before = f"{margin}{returned}.add_action("
                 new = _call(called, node, margin, before, ")").replace("'", quote)
-                yield setup_edits.insertion(
-                    file.source, _line_end(file.source, last), f"\n{before}{new})"
-                )
+                at = _line_end(file.source, body[-1])
+                yield setup_edits.insertion(file.source, at, f"\n{before}{new})")
 
 
 def _names(statement: ast.stmt, description: ast.Call, name: str) -> bool:
