@@ -236,7 +236,7 @@ def message(cls: Any, structure: Structure) -> tuple[int, ...]:
         "__setitem__": staticmethod(store),
         "__getitem__": staticmethod(c.taking(structure.name, fetch)),
     }
-    converter: object = type("Converter", (), methods)()
+    converter: Any = type("Converter", (), methods)()
     size = ctypes.sizeof(c_structure(structure))
     content = introspection.content(structure)
     try:
