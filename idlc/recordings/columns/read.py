@@ -77,20 +77,21 @@ def to_columns(
 ) -> Any:
     """Return Columns with a row for each message, or without `ragged` what was returned before."""
     table, top = table_of(kind, messages, fields, datetimes)
-    columns = table.columns(top)
     if ragged:
-        return columns
+        return table.columns(top)
     warnings.warn(
         "to_columns will return Columns: `to_columns(..., ragged=True)` does so now, "
         "and `.structured()` makes a structured array of them",
         DeprecationWarning,
         stacklevel=3,
     )
+    table.views = True  # they are copied into the array
     try:
-        return columns.structured()
+        return table.columns(top).structured()
     except ValueError as error:
+        table.views = False
         if ragged is None:
-            return columns
+            return table.columns(top)
         raise ValueError(f"{error}; ragged=True takes it") from None
 
 

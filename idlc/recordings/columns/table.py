@@ -28,8 +28,11 @@ class Elements(NamedTuple):
 class Table:
     """The located fields of messages, by column.
 
-    `order` is that of all messages; "<" if only some are big-endian.
+    `order` is that of all messages; "<" if only some are big-endian. With `views`, columns may be
+    in the memory of the messages.
     """
+
+    views = False
 
     def __init__(self, source: Source, order: str, scanned: ScanResult) -> None:
         self.source = source
@@ -121,12 +124,14 @@ class Table:
         return result
 
     def native(self, numbers: Any, code: str, big: Any) -> Any:
-        """Return numbers as this machine has them, outside of the buffer.
+        """Return numbers as this machine has them, and outside of the messages without `views`.
 
         Those at `big` are big-endian; of bools, every byte but zero is true.
         """
         if code == "?":
             return numbers != 0
+        if self.views and big is None and numbers.dtype == code:
+            return numbers
         if self.source.shares(numbers):
             numbers = numbers.copy()
         result = np.ascontiguousarray(numbers, code)
