@@ -241,6 +241,7 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
         imports["threading"].add("Event")
         plain.append("signal")
     else:
+        imports["contextlib"].add("suppress")
         imports["rclpy.executors"].add("ExternalShutdownException")
     if node.lifecycle:
         imports["contextlib"].add("ExitStack")

@@ -19,6 +19,7 @@ ENDINGS = {
     "rclpy notices a shutdown": ("raise ExternalShutdownException", 0),
     "SIGTERM": ("terminated()", 0),
     "Ctrl-C after SIGTERM": ("terminated(); interrupted()", 0),
+    "Ctrl-C while it fails after SIGTERM": ("overtaken()", 0),
     "it fails": ("raise ValueError('broken')", 1),
     "it exits": ("raise SystemExit(3)", 3),
 }
@@ -38,8 +39,17 @@ def interrupted():
         raise KeyboardInterrupt
 
 
+def overtaken():
+    global ok
+
+    def ok():
+        raise KeyboardInterrupt
+
+    raise RuntimeError('the context is invalid')
+
+
 def main("""
-CREATED = "        node = Stays()\n"
+CREATED = "            node = Stays()\n"
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +73,9 @@ def test_a_main_ends_quietly_unless_it_fails(package, ros_environment, how):
     ending, expected = ENDINGS[how]
     text = (package / "demo/stays.py").read_text()
     assert CREATED in text
-    text = text.replace(CREATED, f"        {ending}\n{CREATED}").replace("\n\ndef main(", HELPERS)
+    text = text.replace(CREATED, f"            {ending}\n{CREATED}").replace(
+        "\n\ndef main(", HELPERS
+    )
     (package / "demo/stays_not.py").write_text(text)
     command = [sys.executable, "-m", "demo.stays_not"]
     status, printed = programs.ended(*command, cwd=package, environment=ros_environment)

@@ -41,15 +41,15 @@ NODES = {
     "managed_actor": ["--action-server", "test_msgs/Fibonacci:count", "--lifecycle"],
 }
 RAISES = "raise RuntimeError('broken')"
-ENDS = "except (KeyboardInterrupt, ExternalShutdownException):\n        pass\n"
+ENDS = "                raise\n"
 ENDING = {
     "dies at its start": (
         "        super().__init__(",
         f"        {RAISES}\n        super().__init__(",
     ),
-    "does not end": (ENDS, ENDS.replace("pass", "__import__('time').sleep(99)")),
-    "ends with a traceback": (ENDS, ENDS.replace("pass", "raise")),
-    "ends with another status": (ENDS, ENDS.replace("pass", "sys.exit(3)")),
+    "does not end": (ENDS, f"{ENDS}    __import__('time').sleep(99)\n"),
+    "ends with a traceback": ("suppress(KeyboardInterrupt, ", "suppress("),
+    "ends with another status": (ENDS, f"{ENDS}    raise SystemExit(3)\n"),
     "has another name": ("        super().__init__('", "        super().__init__('x"),
 }
 ENDING_ONCE = {

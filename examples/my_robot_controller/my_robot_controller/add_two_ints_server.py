@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from my_robot_controller.srv import AddTwoInts
 import rclpy
 from rclpy.executors import (
@@ -43,18 +45,17 @@ class AddTwoIntsServer(Node):
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    try:
-        executor = SingleThreadedExecutor()
-        node = AddTwoIntsServer()
-        executor.add_node(node)
-        while ok():
-            # not without end: rclpy can miss a signal that comes while it starts
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal shut rclpy down before the node was complete
-            raise
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        try:
+            executor = SingleThreadedExecutor()
+            node = AddTwoIntsServer()
+            executor.add_node(node)
+            while ok():
+                # not without end: rclpy can miss a signal that comes while it starts
+                executor.spin_once(timeout_sec=1.0)
+        except Exception:
+            if ok():  # otherwise a signal shut rclpy down before the node was complete
+                raise
 
 
 if __name__ == '__main__':

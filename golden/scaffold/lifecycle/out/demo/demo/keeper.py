@@ -7,7 +7,10 @@ from collections.abc import (
     Callable,
     Coroutine,
 )
-from contextlib import ExitStack
+from contextlib import (
+    ExitStack,
+    suppress,
+)
 import sys
 import time
 from typing import Any
@@ -245,18 +248,17 @@ def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     options = parse_arguments(args)
     rclpy.init(args=args)
-    try:
-        executor = SingleThreadedExecutor()
-        node = Keeper(options)
-        executor.add_node(node)
-        while ok():
-            # not without end: rclpy can miss a signal that comes while it starts
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal shut rclpy down before the node was complete
-            raise
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        try:
+            executor = SingleThreadedExecutor()
+            node = Keeper(options)
+            executor.add_node(node)
+            while ok():
+                # not without end: rclpy can miss a signal that comes while it starts
+                executor.spin_once(timeout_sec=1.0)
+        except Exception:
+            if ok():  # otherwise a signal shut rclpy down before the node was complete
+                raise
 
 
 if __name__ == '__main__':

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from demo.srv import Ask
 import rclpy
 from rclpy.executors import (
@@ -44,18 +46,17 @@ class Oracle(Node):
 def main(args: list[str] | None = None) -> None:
     """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    try:
-        executor = SingleThreadedExecutor()
-        node = Oracle()
-        executor.add_node(node)
-        while ok():
-            # not without end: rclpy can miss a signal that comes while it starts
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal shut rclpy down before the node was complete
-            raise
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        try:
+            executor = SingleThreadedExecutor()
+            node = Oracle()
+            executor.add_node(node)
+            while ok():
+                # not without end: rclpy can miss a signal that comes while it starts
+                executor.spin_once(timeout_sec=1.0)
+        except Exception:
+            if ok():  # otherwise a signal shut rclpy down before the node was complete
+                raise
 
 
 if __name__ == '__main__':
