@@ -168,8 +168,9 @@ def missing_units(model: Model) -> Iterator[Diagnostic]:
     """A number whose name is a physical quantity has a unit."""
     for field in _quantities(model):
         unit = expects_unit(field.name)
-        words = re.sub(r"[()]", " ", "\n".join(field.comment)).split()
-        if unit and not unit_of(field) and unit not in words:
+        if not unit or unit_of(field):
+            continue
+        if unit not in re.sub(r"[()]", " ", "\n".join(field.comment)).split():
             hint = f"write it in brackets, as in `# [{unit}]`"
             yield codes.MISSING_UNIT.at(field.name_span, f"`{field.name}` has no unit", hint=hint)
 

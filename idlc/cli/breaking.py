@@ -65,7 +65,7 @@ EPILOG += "\n" + options.example(
     'at = "demo/msg/Drive.speed"',
     'reason = "all robots are updated in the same week"',
     "until = 2030-12-31",
-    title="A change that is meant is allowed in pyproject.toml, with a reason and for a time",
+    title="Allow an intentional change in pyproject.toml, with a reason and an end date",
 )
 
 

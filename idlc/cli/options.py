@@ -53,8 +53,8 @@ def typed(*without: str) -> tuple[str, ...]:
 package = click.option(
     "--package",
     metavar="NAME",
-    help="The package's name. Otherwise that of the nearest package.xml, of the package that "
-    "was generated from the files, or of the folder.",
+    help="The package's name. By default, the name in the nearest package.xml, the name of the "
+    "package that was generated from the files, or the folder's name.",
 )
 include = click.option(
     "-I",

@@ -219,13 +219,13 @@ def version_changes(
         hint="build everything that uses it from one version, and start it again",
         detail="\n".join(lines),
     )
-    for difference, old, new in sides:
+    for difference, changes, old, new in sides:
         key = (str(difference.new.name), *difference.hashes)
         if key not in seen:
             seen.add(key)
             met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
             misread = any(_misreads(a, b, models) for a, b in met or [(old, new)])
-            for change in with_wire(_changes(difference), misread):
+            for change in with_wire(changes, misread):
                 yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
 
 
@@ -248,10 +248,11 @@ def _misreads(sender: Version, reader: Version, models: Models) -> bool:
 
 def _all_sides(
     left: Version, right: Version, models: Models
-) -> Iterator[tuple[Sides, Version, Version]]:
+) -> Iterator[tuple[Sides, list[Change], Version, Version]]:
     """Yield the structures that differ between two versions of a type, nested ones included.
 
-    The change is from left to right, unless only the right version is sent.
+    Each comes with its changes, without those of nested types, which have their own. They are from
+    left to right, unless only the right version is sent.
     """
     backwards = not (left.sends and right.reads) and right.sends and left.reads
     old, new = (right, left) if backwards else (left, right)
@@ -262,14 +263,10 @@ def _all_sides(
     for shared in sorted(_with_nested(name, before) & _with_nested(name, after)):
         if before.describer.hash(str(shared)) != after.describer.hash(str(shared)):
             sides = Sides(before.messages[shared], after.messages[shared], before, after)
-            if _changes(sides):
-                yield sides, old, new
-
-
-def _changes(sides: Sides) -> list[Change]:
-    """Return the changes of a structure, without those of nested types, which have their own."""
-    changes = (*field_changes(sides), *constant_changes(sides))
-    return [change for change in changes if change.code is not codes.USED_TYPE_CHANGED]
+            every = (*field_changes(sides), *constant_changes(sides))
+            changes = [change for change in every if change.code is not codes.USED_TYPE_CHANGED]
+            if changes:
+                yield sides, changes, old, new
 
 
 def _with_nested(name: ir.TypeName, model: Model) -> set[ir.TypeName]:

@@ -84,13 +84,13 @@ def _package_page(
         root="../" * home.count("/"),
         words=words(name),
         description=blocks(about.description.split("\n")),
-        facts=" · ".join([*shown, numbers(interfaces)]),
+        facts=" · ".join([*shown, kind_counts(interfaces)]),
         described=any(entry.about for entry in entries),
         entries=entries,
     )
 
 
-def numbers(interfaces: Sequence[ir.Interface]) -> str:
+def kind_counts(interfaces: Sequence[ir.Interface]) -> str:
     """Return the number of interfaces of each kind, in words."""
     kinds: Counter[str] = Counter(interface.name.kind for interface in interfaces)
     return ", ".join(counted(kinds[kind], word) for kind, word in KINDS.items() if kinds[kind])
@@ -134,7 +134,7 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
         for name, interfaces in packages.items():
             own_facts = about.get(name, About())
             version = [f"version {own_facts.version}"] if own_facts.version else []
-            line = " · ".join([*version, numbers(interfaces)])
+            line = " · ".join([*version, kind_counts(interfaces)])
             entries.append(Entry(home[name], words(name), "", line, own_facts.description))
         shown = Listing("Interfaces", "", (), (), "", True, entries)
         yield RenderedFile("index.html", template.render(page=shown))

@@ -168,6 +168,8 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     """
     offset = context.state.offset(context.source, position)
     for element in elements(context):
+        if not element.line.start <= offset <= element.comment.end:
+            continue
         parts: list[tuple[Part, Span | None]] = [
             ("name", element.name),
             ("type", element.span(element.body.type.whole)),
@@ -177,6 +179,7 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
         for part, span in parts:
             if span and span.start <= offset <= span.end and span.end > span.start:
                 return Spot(element, part, span)
+        return None
     return None
 
 

@@ -142,7 +142,7 @@ def test_a_missing_part_is_reported_with_wrong_types_of_another_one():
     report = Report()
     text = "module demo { module srv { struct A_Request { Thing a; }; }; };"
     lower(parse_any(Source("x.idl", text)), ir.TypeName("demo", "srv", "A"), report)
-    messages = [one.message for one in report]
+    messages = [problem.message for problem in report]
     assert any("the type `Thing`" in message for message in messages)
     assert any("a module without `A_Response`" in message for message in messages)
 

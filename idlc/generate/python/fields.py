@@ -139,7 +139,7 @@ def shadows(structure: ir.Message) -> bool:
     return any(python_names.field(field.name) in BUILTINS for field in structure.fields)
 
 
-def numbers(type_: ir.FieldType) -> ir.PrimitiveInfo | None:
+def number_info(type_: ir.FieldType) -> ir.PrimitiveInfo | None:
     """Return the facts of the elements of a numeric array; `None` for any other type."""
     match type_:
         case ir.Sequence(ir.Primitive(name)) | ir.Array(ir.Primitive(name)):
@@ -173,7 +173,7 @@ def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
         parameter=Code(parameter),
         fresh=Code(fresh),
         docstring=attribute(field, references.file),
-        numbers=numbers(field.type) is not None,
+        numbers=number_info(field.type) is not None,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
         is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
     )
@@ -181,7 +181,7 @@ def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
 
 def usual_class(field: ir.Field, references: References, naming: Naming) -> Code:
     """Return the class of what is usually assigned to a field; empty if it takes any values."""
-    if numbers(field.type):
+    if number_info(field.type):
         return Code("")
     if isinstance(field.type, (ir.Array, ir.Sequence)):
         return Code(f"{naming.builtins}list")
@@ -199,7 +199,7 @@ def _shape(field: ir.Field, references: References, naming: Naming) -> tuple[str
         return element, f"{element} = {value}", ""
     if isinstance(field.type, ir.Ref):
         return element, f"{element} | None = None", f"{element}()"
-    if info := numbers(field.type):
+    if info := number_info(field.type):
         annotation, values, fresh = _numbers(field.type, info)
     elif references.converts:
         inside = getattr(ir.element_of(field.type), "name", "")
@@ -267,6 +267,6 @@ def default(type_: ir.FieldType, value: ir.Value) -> tuple[Code, tuple[Code, ...
     if not isinstance(value, tuple):
         return Code(literals.scalar(element, value)), ()
     values = tuple(Code(literals.scalar(element, item)) for item in value)
-    if info := numbers(type_):
+    if info := number_info(type_):
         return Code("_idlc.Fresh"), (Code(f"{numeric_class(type_, info)}.of"), *values)
     return Code("_idlc.FreshList" if values else "_idlc.FreshList()"), values

@@ -209,7 +209,7 @@ def module_views(
 
 def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
     every = [field for message in structures for field in message.fields]
-    numeric = [field for field in every if fields.numbers(field.type)]
+    numeric = [field for field in every if fields.number_info(field.type)]
     standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
     if any(isinstance(field.type, ir.Sequence) and not field.default for field in numeric):
         standard.append("from array import array as _array")

@@ -208,7 +208,7 @@ def _is_utf8(texts: Texts) -> bool:
 
 
 def _valid(texts: Texts, encoding: str) -> Texts:
-    """Return texts of an encoding in UTF-8, with U+FFFD for what is not valid."""
+    """Return texts of an encoding in UTF-8; U+FFFD replaces invalid bytes."""
     raw, ends = texts.values.tobytes(), texts.offsets.tolist()
     parts = [raw[a:b].decode(encoding, "replace").encode() for a, b in pairwise(ends)]
     sizes = np.fromiter(map(len, parts), np.int64, len(parts))

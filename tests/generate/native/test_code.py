@@ -46,8 +46,8 @@ def test_the_code_is_what_its_text_says(machine, tmp_path):
     assert code == ours
     assert {name: symbols[name] for name in entries} == entries
     relocations = run(tool("readelf"), "--relocs", "--wide", tmp_path / "code.o")
-    found = re.findall(r"^0+([0-9a-f]+) .* R_\S+ +[0-9a-f]+ (\w+) ", relocations, re.MULTILINE)
-    assert sorted((int(at, 16), name) for at, name in found) == sorted(holes.items())
+    relocated = re.findall(r"^0+([0-9a-f]+) .* R_\S+ +[0-9a-f]+ (\w+) ", relocations, re.MULTILINE)
+    assert sorted((int(at, 16), name) for at, name in relocated) == sorted(holes.items())
 
 
 @pytest.mark.parametrize(("here", "there"), PLACES)
@@ -70,15 +70,15 @@ def test_addresses_are_filled_in_as_a_linker_does(machine, here, there, tmp_path
 
 
 def test_all_machines_have_the_same_functions():
-    found = [parts_of(machine)[1:] for machine in MADE_FOR.values()]
-    names = [(list(entries), sorted(set(holes.values()))) for entries, holes in found]
+    parts = [parts_of(machine)[1:] for machine in MADE_FOR.values()]
+    names = [(list(entries), sorted(set(holes.values()))) for entries, holes in parts]
     assert names[0] == names[1]
 
 
 def test_functions_may_be_entered_through_pointers(machine):
     code = MADE_FOR[machine].code
-    found = {name for name, digits in code.items() if digits.startswith(PADS[machine])}
-    assert found == set(code) - INNER
+    padded = {name for name, digits in code.items() if digits.startswith(PADS[machine])}
+    assert padded == set(code) - INNER
 
 
 def test_the_writer_is_small():
