@@ -30,7 +30,8 @@ TEST_ENV := .venv/test-$(KIND)$(if $(filter no,$(ROS)),-without-ros)
 KILTED_ENV := .venv/kilted-$(KIND)
 LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
-DEMO_ENV := .venv/demo-$(TAG)
+# no lock is for the demonstration alone
+DEMO_ENV := $(if $(filter yes,$(LOCKED)),$(TEST_ENV),.venv/demo-$(TAG))
 SITE_ENV := $(if $(filter no,$(ROS)),.venv/site-$(TAG),$(TEST_ENV))
 RELEASE_ENV := .venv/release-$(KIND)
 LOCK_ENV := .venv/lock-$(TAG)
@@ -38,7 +39,8 @@ DEMO_OUT := build/demo
 VSCODE := build/vscode
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website
-BROWSER_TESTS := tests/documents/test_docs_browser.py tests/website/test_website_browser.py
+BROWSER_TESTS := tests/documents/test_docs_browser.py tests/website/test_website_browser.py \
+    tests/website/test_playground_browser.py tests/website/test_accessibility.py
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
@@ -56,7 +58,7 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help install demo test test-long test-bare test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
-    lock site release-check runtime-wheel clean
+    lock site playground release-check runtime-wheel clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -102,6 +104,7 @@ test-lowest: ## run the tests that need no ROS with the lowest versions that pyp
 vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)
 	@mkdir -p build
 	cd editors/vscode && npm ci && npm run check && npm test && npm run build && npm run package
+	$(PYTHON) -m maintenance.release extension build/idlc.vsix
 
 test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code; save pictures of it
 	@mkdir -p $(VSCODE)
@@ -139,6 +142,9 @@ bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says w
 site: $(SITE_ENV)/installed ## write the documentation site into build/site
 	$(SITE_ENV)/bin/python -m maintenance.website build/site
 
+playground: $(SITE_ENV)/installed ## write the playground into build/site/playground (needs Node 20 or newer)
+	$(SITE_ENV)/bin/python -m maintenance.playground build/site/playground
+
 release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
 	$(RELEASE_ENV)/bin/python -m maintenance.release check $(ARGS)
 
@@ -164,19 +170,20 @@ clean: ## remove environments and everything that was built
 $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(KILTED_ENV)/installed: EXTRA := test-kilted
 $(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
-$(DEMO_ENV)/installed: EXTRA := ros
+$(if $(filter-out yes,$(LOCKED)),$(DEMO_ENV)/installed: EXTRA := ros)
 $(SITE_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),docs,test-ros)
 $(RELEASE_ENV)/installed: EXTRA := release
 
 # One pip call per environment: the resolver sees everything at once. An environment that is
-# there already is brought up to date.
+# there already is brought up to date. A lock names everything, so pip resolves nothing (--no-deps):
+# some versions of pip reject a lock when a newer release of a package with extras comes out.
 .venv/%/installed: pyproject.toml $(LOCKS:%=maintenance/requirements/%.txt)
 	@echo 'preparing .venv/$* ...'
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "idlc needs Python 3.10 or newer, $(PYTHON) is " + sys.version)'
 	@$(PYTHON) -m venv .venv/$*
 ifeq ($(LOCKED),yes)
 	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --requirement maintenance/requirements/build.txt
-	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --no-build-isolation \
+	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --no-build-isolation --no-deps \
 	    --requirement maintenance/requirements/$(EXTRA).txt
 	@.venv/$*/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation --editable .
 else
