@@ -1,0 +1,197 @@
+"""The graph of a domain: its nodes and endpoints, from liveliness tokens, and mismatches in it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice, product
+from threading import Condition
+from typing import NamedTuple, TypeVar
+
+from idlc.robot.keys import Entity, Kind, all_tokens, parse_token
+from idlc.robot.qos import incompatible_policies
+from idlc.robot.transport import Transport
+
+#: The total length of the tokens that a graph keeps: enough for 100,000 endpoints.
+MOST_CHARACTERS = 32 * 2**20
+#: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
+_SETTLED = 1.0
+_TIMES = 10
+T = TypeVar("T")
+Listener = Callable[[Entity, bool], None]
+
+
+class Graph:
+    """The entities of a domain, with those of the own session.
+
+    An endpoint can appear before its node and outlive it. Methods can be called on any thread.
+    `ignored` counts the malformed tokens and those beyond the limit. `is_full` is True if there
+    were too many, so that entities are missing.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        domain: int,
+        *,
+        timeout: float = 5.0,
+        limit: int = MOST_CHARACTERS,
+    ) -> None:
+        self.ignored = 0
+        self.is_full = False
+        self._limit = limit
+        self._characters = 0
+        self._entities: dict[str, Entity] = {}
+        self._named: dict[tuple[Kind, str], dict[str, Entity]] = {}
+        self._listeners: dict[object, Listener] = {}
+        self._changed = Condition()
+        pattern = all_tokens(domain)
+        # Zenoh answers the question only before the watch; what goes in between never arrives
+        expected = {token for token in transport.tokens(pattern, timeout) if parse_token(token)}
+        self._watch = transport.watch(pattern, self._update)
+        for _ in range(_TIMES):
+            if self.wait_for(lambda _: self.is_full or expected <= self._entities.keys(), _SETTLED):
+                break
+            expected.intersection_update(transport.tokens(pattern, timeout))
+
+    def close(self) -> None:
+        """Stop watching; the entities stay as they are."""
+        self._watch.close()
+
+    def entities(
+        self,
+        kind: Kind | None = None,
+        *,
+        name: str | None = None,
+        type: str | None = None,  # noqa: A002 - the word for it
+        node: str | None = None,
+    ) -> tuple[Entity, ...]:
+        """Return the entities of this kind, with this absolute name, type and node."""
+        with self._changed:
+            if kind is not None and name is not None:
+                chosen = [*self._named.get((kind, name), {}).values()]
+            else:
+                chosen = [*self._entities.values()]
+        return tuple(
+            entity
+            for entity in chosen
+            if (kind is None or entity.kind is kind)
+            and (name is None or entity.name == name)
+            and (type is None or entity.type == type)
+            and (node is None or entity.node_name == node)
+        )
+
+    def count(self, kind: Kind, name: str) -> int:
+        """Return the number of publishers, say, of the topic with this absolute name."""
+        with self._changed:
+            return len(self._named.get((kind, name), ()))
+
+    def types(self, *kinds: Kind) -> dict[str, tuple[str, ...]]:
+        """Return the types of each topic or service, by its absolute name, sorted."""
+        types: dict[str, set[str]] = {}
+        for kind in kinds:
+            for entity in self.entities(kind):
+                types.setdefault(entity.name, set()).add(entity.type)
+        return {name: tuple(sorted(types[name])) for name in sorted(types)}
+
+    def wait_for(self, condition: Callable[[Graph], T], timeout: float | None) -> T:
+        """Return the first true result of `condition`, or its last result after `timeout` seconds.
+
+        The condition is called again after each change of the graph.
+        """
+        end = None if timeout is None else time.monotonic() + timeout
+        with self._changed:
+            while True:
+                result = condition(self)
+                left = None if end is None else end - time.monotonic()
+                if result or (left is not None and left <= 0):
+                    return result
+                self._changed.wait(left)
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Call `listener` with each entity that appears (True) or goes (False) from now on.
+
+        It runs on a thread of the transport, and hands over. Returns the function that ends it.
+        """
+        ticket = object()
+        with self._changed:
+            self._listeners[ticket] = listener
+
+        def end() -> None:
+            self._listeners.pop(ticket, None)
+
+        return end
+
+    def _update(self, token: str, appears: bool) -> None:
+        with self._changed:
+            entity = self._add(token) if appears else self._remove(token)
+            listeners = [*self._listeners.values()]
+            if entity is None:
+                return
+            self._changed.notify_all()
+        for listener in listeners:
+            listener(entity, appears)
+
+    def _add(self, token: str) -> Entity | None:
+        if token in self._entities:
+            return None
+        entity = parse_token(token)
+        full = self._characters + len(token) > self._limit
+        self.is_full |= full
+        if entity is None or full:
+            self.ignored += 1
+            return None
+        self._characters += len(token)
+        self._entities[token] = entity
+        self._named.setdefault((entity.kind, entity.name), {})[token] = entity
+        return entity
+
+    def _remove(self, token: str) -> Entity | None:
+        entity = self._entities.pop(token, None)
+        if entity is not None:
+            self._characters -= len(token)
+            same = self._named[entity.kind, entity.name]
+            del same[token]
+            if not same:
+                del self._named[entity.kind, entity.name]
+        return entity
+
+
+class Mismatch(NamedTuple):
+    """Two endpoints of one name that do not fit together.
+
+    `sender` is a publisher or a client, `receiver` a subscription or a service. `reasons` contains
+    `type`, or `hash`, or names of QoS policies.
+    """
+
+    sender: Entity
+    receiver: Entity
+    reasons: tuple[str, ...]
+
+
+_PAIRS = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.CLIENT: Kind.SERVICE}
+#: A topic with more pairs than these is compared in part.
+MOST_PAIRS = 100_000
+
+
+def mismatches(entities: Iterable[Entity]) -> Iterator[Mismatch]:
+    """Yield the pairs of endpoints with one name that differ in type, version or QoS.
+
+    Endpoints without a hash fit every version.
+    """
+    places: dict[tuple[Kind, str], list[Entity]] = {}
+    for entity in entities:
+        places.setdefault((entity.kind, entity.name), []).append(entity)
+    for (kind, name), senders in sorted(places.items()):
+        receivers = places.get((_PAIRS[kind], name), []) if kind in _PAIRS else []
+        for sender, receiver in islice(product(senders, receivers), MOST_PAIRS):
+            if reasons := _reasons(sender, receiver):
+                yield Mismatch(sender, receiver, reasons)
+
+
+def _reasons(sender: Entity, receiver: Entity) -> tuple[str, ...]:
+    if sender.type != receiver.type:
+        return ("type",)
+    if sender.hash and receiver.hash and sender.hash != receiver.hash:
+        return ("hash",)
+    return incompatible_policies(sender.qos, receiver.qos)

@@ -1,0 +1,254 @@
+"""rmw_zenoh's protocol: data keys, liveliness tokens, the QoS part of a token, attachments.
+
+A token announces a node or an endpoint to all sessions. Tokens and attachments that others send
+are bounded and checked here, so that an `Entity` contains only valid names.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from enum import Enum
+from functools import lru_cache
+from typing import NamedTuple
+
+import msgspec
+
+from idlc.robot.names import (
+    dds_type,
+    full_name,
+    is_absolute,
+    is_namespace,
+    is_node_name,
+    ros_type,
+)
+from idlc.robot.qos import (
+    DEFAULT_DEPTH,
+    INFINITE,
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from idlc.robot.xxh3 import xxh3_128
+
+#: The longest token that idlc reads.
+MOST_TOKEN = 2048
+#: The hash of Humble, which has none.
+NO_HASH = "TypeHashNotSupported"
+GID_SIZE = 16
+_SECOND = 10**9
+_PREFIX = "@ros2_lv"
+_HEAD_PARTS = 6
+_NODE_PARTS = 9
+_ENDPOINT_PARTS = 13
+_HEAD = re.compile(r"(\d{1,6})/([0-9a-f]{1,32})/(\d{1,10})/(\d{1,10})/(NN|M[PS]|S[SC])/", re.ASCII)
+_HASH = re.compile(r"[A-Za-z0-9_]{1,128}", re.ASCII)
+_NUMBER = r"(\d{0,10})"
+_QOS = re.compile(
+    rf"{_NUMBER}:{_NUMBER}:{_NUMBER},{_NUMBER}"
+    rf":{_NUMBER},{_NUMBER}:{_NUMBER},{_NUMBER}:{_NUMBER},{_NUMBER},{_NUMBER}",
+    re.ASCII,
+)
+
+
+class Kind(str, Enum):
+    """A kind of entity; the values are those in tokens."""
+
+    NODE = "NN"
+    PUBLISHER = "MP"
+    SUBSCRIPTION = "MS"
+    SERVICE = "SS"
+    CLIENT = "SC"
+
+
+class Entity(msgspec.Struct, frozen=True, kw_only=True):
+    """A node or an endpoint, as its token announces it.
+
+    `session` is the Zenoh id, `id` counts in the session, `node_id` is the `id` of the node.
+    `name` is absolute, `type` is such as `std_msgs/msg/String`, and `hash` is empty if the other
+    side sends none (Humble); all are empty for a node. `token` is made of the other fields unless
+    it was received.
+    """
+
+    domain: int
+    session: str
+    node_id: int
+    id: int
+    kind: Kind
+    enclave: str = "/"
+    namespace: str = "/"
+    node: str
+    name: str = ""
+    type: str = ""
+    hash: str = ""
+    qos: QoSProfile = QoSProfile()
+    token: str = ""
+
+    def __post_init__(self) -> None:
+        """Make the token of an own entity."""
+        if not self.token:
+            msgspec.structs.force_setattr(self, "token", _make_token(self))
+
+    @property
+    def node_name(self) -> str:
+        """The absolute name of the node."""
+        return full_name(self.namespace, self.node)
+
+    @property
+    def key(self) -> str:
+        """The key of the endpoint's messages, or of its requests."""
+        return data_key(self.domain, self.name, self.type, self.hash)
+
+    @property
+    def gid(self) -> bytes:
+        """The id that the endpoint adds to each message."""
+        return _gid(self.token)
+
+
+@lru_cache(4096)
+def _gid(token: str) -> bytes:
+    return xxh3_128(token.encode()).to_bytes(GID_SIZE, "little")
+
+
+def data_key(domain: int, name: str, type_: str, hash_: str) -> str:
+    """Return the key of a topic's messages or a service's requests.
+
+    The type of a service is `package/srv/Name`. The hash `*` is that of every version.
+    """
+    return f"{domain}/{name.strip('/')}/{dds_type(type_)}/{hash_ or NO_HASH}"
+
+
+def all_tokens(domain: int) -> str:
+    """Return the key expression of all tokens of a domain."""
+    return f"{_PREFIX}/{domain}/**"
+
+
+def _make_token(entity: Entity) -> str:
+    head = (_PREFIX, entity.domain, entity.session, entity.node_id, entity.id, entity.kind.value)
+    names = [entity.enclave, entity.namespace, entity.node]
+    if entity.kind is not Kind.NODE:
+        names += (entity.name, dds_type(entity.type), entity.hash or NO_HASH)
+    parts = [*map(str, head), *(name.replace("/", "%") for name in names)]
+    return "/".join(parts if entity.kind is Kind.NODE else [*parts, format_qos(entity.qos)])
+
+
+def parse_token(token: str) -> Entity | None:
+    """Return the entity that a token announces; `None` if it is malformed.
+
+    Further parts, which later versions of rmw_zenoh add, are ignored.
+    """
+    match = _HEAD.match(token, len(_PREFIX) + 1) if token.startswith(f"{_PREFIX}/") else None
+    if match is None or len(token) > MOST_TOKEN:
+        return None
+    domain, session, node_id, id_, mark = match.groups()
+    kind = Kind(mark)
+    parts = [part.replace("%", "/") for part in token[match.end() :].split("/")]
+    if len(parts) < (_NODE_PARTS if kind is Kind.NODE else _ENDPOINT_PARTS) - _HEAD_PARTS:
+        return None
+    enclave, namespace, node, *rest = parts
+    if not (is_namespace(enclave) and is_namespace(namespace) and is_node_name(node)):
+        return None
+    name = type_ = hash_ = ""
+    qos: QoSProfile | None = None
+    if kind is not Kind.NODE:
+        name, dds, hash_, qos_part, *_ = rest
+        type_, qos = ros_type(dds) or "", parse_qos(qos_part)
+        if not (is_absolute(name) and type_ and _HASH.fullmatch(hash_) and qos):
+            return None
+    return Entity(
+        domain=int(domain),
+        session=session,
+        node_id=int(node_id),
+        id=int(id_),
+        kind=kind,
+        enclave=enclave,
+        namespace=namespace,
+        node=node,
+        name=name,
+        type=type_,
+        hash="" if hash_ == NO_HASH else hash_,
+        qos=qos or QoSProfile(),
+        token=token,
+    )
+
+
+def format_qos(qos: QoSProfile) -> str:
+    """Return the QoS part of a token, in which defaults are empty."""
+    depth = "" if qos.depth == DEFAULT_DEPTH else qos.depth
+    return (
+        f"{_other(qos.reliability, ReliabilityPolicy.RELIABLE)}"
+        f":{_other(qos.durability, DurabilityPolicy.VOLATILE)}"
+        f":{_other(qos.history, HistoryPolicy.KEEP_LAST)},{depth}"
+        f":{_duration(qos.deadline)}:{_duration(qos.lifespan)}"
+        f":{_other(qos.liveliness, LivelinessPolicy.AUTOMATIC)}"
+        f",{_duration(qos.liveliness_lease_duration)}"
+    )
+
+
+def _other(value: int, default: int) -> str:
+    return "" if value == default else str(int(value))
+
+
+def _duration(nanoseconds: int) -> str:
+    pairs = zip(divmod(nanoseconds, _SECOND), divmod(INFINITE, _SECOND), strict=True)
+    return ",".join(_other(value, default) for value, default in pairs)
+
+
+@lru_cache(1024)
+def parse_qos(text: str) -> QoSProfile | None:
+    """Return the profile of a token's QoS part; `None` if it is malformed."""
+    match = _QOS.fullmatch(text)
+    if match is None:
+        return None
+    values = [int(value) if value else None for value in match.groups()]
+    durations = []
+    for at in (4, 6, 9):
+        pairs = zip(values[at : at + 2], divmod(INFINITE, _SECOND), strict=True)
+        seconds, rest = (default if value is None else value for value, default in pairs)
+        durations.append(seconds * _SECOND + rest)
+    try:
+        return QoSProfile(
+            reliability=ReliabilityPolicy(values[0] or 0),
+            durability=DurabilityPolicy(values[1] or 0),
+            history=HistoryPolicy(values[2] or 0),
+            depth=values[3] or 0,
+            deadline=durations[0],
+            lifespan=durations[1],
+            liveliness=LivelinessPolicy(values[8] or 0),
+            liveliness_lease_duration=durations[2],
+        )
+    except ValueError:
+        return None
+
+
+class Attachment(NamedTuple):
+    """The bytes that accompany each message, request and reply.
+
+    `sequence` counts the messages of the sender from 1, `time` is its clock in nanoseconds. A
+    reply repeats the `sequence` and the `gid` of its request.
+    """
+
+    sequence: int
+    time: int
+    gid: bytes
+
+
+_ATTACHMENT = struct.Struct(f"<qqB{GID_SIZE}s")
+
+
+def pack_attachment(sequence: int, time: int, gid: bytes) -> bytes:
+    """Return an attachment as bytes."""
+    return _ATTACHMENT.pack(sequence, time, GID_SIZE, gid)
+
+
+def parse_attachment(data: bytes) -> Attachment | None:
+    """Return the attachment of a message; `None` if it is malformed.
+
+    Further bytes, which a later version may add, are ignored.
+    """
+    if len(data) < _ATTACHMENT.size:
+        return None
+    sequence, time, size, gid = _ATTACHMENT.unpack_from(data)
+    return Attachment(sequence, time, gid) if size == GID_SIZE else None

@@ -1,0 +1,1 @@
+"""Nodes without ROS, with the words of rclpy; `idlc.robot` exports their names."""

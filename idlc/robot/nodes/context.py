@@ -1,0 +1,175 @@
+"""Contexts: `init`, `shutdown` and `ok`, the session that nodes share, and signals."""
+
+from __future__ import annotations
+
+import atexit
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from enum import IntFlag
+from types import FrameType
+from typing import Any
+from weakref import WeakSet
+
+from idlc.robot.errors import RobotError
+from idlc.robot.nodes.arguments import Arguments, parse_arguments
+from idlc.robot.nodes.logger import set_levels
+from idlc.robot.session import Session, open_session
+
+
+class SignalHandlerOptions(IntFlag):
+    """The signals that shut contexts down."""
+
+    NO = 0
+    SIGINT = 1
+    SIGTERM = 2
+    ALL = 3
+
+
+class Context(AbstractContextManager["Context"]):
+    """A session, and the arguments of the program. The session is opened by the first node."""
+
+    def __init__(self, session: Session | None = None) -> None:
+        self.arguments = Arguments()
+        self._is_valid = session is not None
+        self._session = session
+        self._is_own = session is None
+        self._address: tuple[str, ...] = ()
+        self._domain: int | None = None
+        self._lock = threading.Lock()
+        self._sleepers: WeakSet[Any] = WeakSet()
+        self._callbacks: list[Callable[[], Any]] = []
+
+    def init(
+        self,
+        args: Sequence[str] | None = None,
+        *,
+        domain_id: int | None = None,
+        address: str | None = None,
+    ) -> None:
+        """Begin; see the function `init`."""
+        if self._is_valid:
+            raise RobotError("the context is initialized already", "call `shutdown()` first")
+        self.arguments = parse_arguments(sys.argv if args is None else args)
+        set_levels(self.arguments.log_levels)
+        self._address = () if address is None else (address,)
+        self._domain = domain_id
+        self._is_valid = True
+
+    @property
+    def session(self) -> Session:
+        """The session; opened if it is not. Raises RobotError."""
+        with self._lock:
+            if not self._is_valid:
+                raise RobotError("the context is not initialized", "call `idlc.robot.init()` first")
+            if self._session is None:
+                self._session = open_session(*self._address, domain=self._domain)
+                # tokens go at once, and no thread of the transport calls a program that ends
+                atexit.register(self.shutdown)
+            return self._session
+
+    def ok(self) -> bool:
+        """Return whether the context is initialized and not shut down."""
+        return self._is_valid
+
+    def on_shutdown(self, callback: Callable[[], Any]) -> None:
+        """Call `callback` when `shutdown` is called, or at the end of the program."""
+        self._callbacks.append(callback)
+
+    def wake_at_shutdown(self, sleeper: Any) -> None:
+        """Call the method `wake` of an object at shutdown, also in a signal handler."""
+        self._sleepers.add(sleeper)
+
+    def invalidate(self) -> None:
+        """End all waits; nodes stay in the graph until `shutdown`. For signal handlers."""
+        self._is_valid = False
+        for sleeper in [*self._sleepers]:
+            sleeper.wake()
+
+    def shutdown(self) -> None:
+        """End all waits, and close the session if the context opened it. May be called again."""
+        self.invalidate()
+        callbacks, self._callbacks = self._callbacks, []
+        for callback in callbacks:
+            callback()
+        with self._lock:
+            session, self._session = self._session, None
+        if session is not None and self._is_own:
+            atexit.unregister(self.shutdown)
+            session.close()
+
+    try_shutdown = shutdown
+
+    def __exit__(self, *_: object) -> None:
+        self.shutdown()
+
+
+_default = Context()
+_previous: dict[int, Any] = {}
+
+
+def get_default_context() -> Context:
+    """Return the context of programs that name none."""
+    return _default
+
+
+def init(
+    *,
+    args: Sequence[str] | None = None,
+    context: Context | None = None,
+    domain_id: int | None = None,
+    signal_handler_options: SignalHandlerOptions | None = None,
+    address: str | None = None,
+) -> Context:
+    """Begin; the result can be used in a `with` statement, which shuts it down.
+
+    `args` are those of the program, `sys.argv` by default. `address` is a robot, such as
+    `tcp/robot:7447`; without it, the session is as rmw_zenoh's (see `open_session`). Ctrl-C
+    and SIGTERM shut the default context down. Raises RobotError.
+    """
+    chosen = context or _default
+    chosen.init(args, domain_id=domain_id, address=address)
+    if signal_handler_options is None:
+        signal_handler_options = (
+            SignalHandlerOptions.ALL if chosen is _default else SignalHandlerOptions.NO
+        )
+    if threading.current_thread() is threading.main_thread():
+        for option in (SignalHandlerOptions.SIGINT, SignalHandlerOptions.SIGTERM):
+            if option in signal_handler_options:
+                _install(getattr(signal, str(option.name)))
+    return chosen
+
+
+def _install(number: int) -> None:
+    if number not in _previous:
+        _previous[number] = signal.signal(number, _handle)
+
+
+def _handle(number: int, frame: FrameType | None) -> None:
+    _default.invalidate()
+    previous = _previous.get(number)
+    if callable(previous):  # of Ctrl-C, the one that raises KeyboardInterrupt
+        previous(number, frame)
+
+
+def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
+    """Shut a context down: nodes leave the graph, and executors stop. May be called again."""
+    chosen = context or _default
+    chosen.shutdown()
+    uninstall = chosen is _default if uninstall_handlers is None else uninstall_handlers
+    if uninstall and threading.current_thread() is threading.main_thread():
+        for number in [*_previous]:
+            if signal.getsignal(number) is _handle:
+                signal.signal(number, _previous.pop(number))
+
+
+def try_shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
+    """Do the same as `shutdown`, which fails in rclpy if it is called twice."""
+    shutdown(context=context, uninstall_handlers=uninstall_handlers)
+
+
+def ok(*, context: Context | None = None) -> bool:
+    """Return whether a context is initialized and not shut down."""
+    return (context or _default).ok()

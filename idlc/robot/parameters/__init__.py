@@ -1,0 +1,1 @@
+"""The parameters of nodes: values, declarations, services, and values from the command line."""

@@ -1,0 +1,154 @@
+"""Quality of service in the words of rclpy: profiles, the predefined ones, and compatibility."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import msgspec
+
+#: Nanoseconds of a duration that never ends, and of one that follows the other side.
+INFINITE = 2**63 - 1
+FOLLOWS = INFINITE - 1
+#: The depth of a profile that leaves it to the middleware.
+DEFAULT_DEPTH = 42
+#: No depth is larger, so that no announcement of another program is either.
+MOST_DEPTH = 2**31 - 1
+
+# The numbers of all policies are those of rmw, which are also on the wire.
+
+
+class ReliabilityPolicy(IntEnum):
+    """Delivery of each message, or of the newest that arrive."""
+
+    SYSTEM_DEFAULT = 0
+    RELIABLE = 1
+    BEST_EFFORT = 2
+    BEST_AVAILABLE = 4
+
+
+class DurabilityPolicy(IntEnum):
+    """Delivery of earlier messages to late subscriptions, or not."""
+
+    SYSTEM_DEFAULT = 0
+    TRANSIENT_LOCAL = 1
+    VOLATILE = 2
+    BEST_AVAILABLE = 4
+
+
+class HistoryPolicy(IntEnum):
+    """The kept messages: the last `depth`, or all."""
+
+    SYSTEM_DEFAULT = 0
+    KEEP_LAST = 1
+    KEEP_ALL = 2
+
+
+class LivelinessPolicy(IntEnum):
+    """The way in which a publisher asserts that it is alive."""
+
+    SYSTEM_DEFAULT = 0
+    AUTOMATIC = 1
+    MANUAL_BY_TOPIC = 3
+    BEST_AVAILABLE = 5
+
+
+class QoSProfile(msgspec.Struct, frozen=True, kw_only=True):
+    """Quality of service of one endpoint.
+
+    Durations are nanoseconds, or objects that have `nanoseconds`, such as rclpy's; a profile
+    contains integers. Values that leave the choice to the middleware become its choice:
+    SYSTEM_DEFAULT the default of the policy, depth 0 a depth of 42, a duration of 0 infinite.
+    Raises ValueError if a value is out of range.
+    """
+
+    history: HistoryPolicy = HistoryPolicy.KEEP_LAST
+    depth: int = 0
+    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
+    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
+    lifespan: Any = INFINITE
+    deadline: Any = INFINITE
+    liveliness: LivelinessPolicy = LivelinessPolicy.AUTOMATIC
+    liveliness_lease_duration: Any = INFINITE
+
+    def __post_init__(self) -> None:
+        """Check the values and fill in the choices of the middleware."""
+        chosen: dict[str, Any] = {"depth": self.depth or DEFAULT_DEPTH}
+        if not 0 <= self.depth <= MOST_DEPTH:
+            raise ValueError(f"a depth must be between 0 and {MOST_DEPTH}, not {self.depth}")
+        for name in _DURATIONS:
+            value = getattr(self, name)
+            nanoseconds = int(getattr(value, "nanoseconds", value)) or INFINITE
+            if not 0 < nanoseconds <= INFINITE:
+                raise ValueError(f"{name} must be between 0 and {INFINITE} ns, not {nanoseconds}")
+            chosen[name] = nanoseconds
+        for name, default in _POLICIES.items():
+            chosen[name] = type(default)(getattr(self, name)) or default
+        for name, value in chosen.items():
+            msgspec.structs.force_setattr(self, name, value)
+
+    @property
+    def is_latched(self) -> bool:
+        """True if late subscriptions get earlier messages."""
+        return self.durability is DurabilityPolicy.TRANSIENT_LOCAL
+
+
+_DURATIONS = ("lifespan", "deadline", "liveliness_lease_duration")
+_POLICIES: dict[str, IntEnum] = {
+    "history": HistoryPolicy.KEEP_LAST,
+    "reliability": ReliabilityPolicy.RELIABLE,
+    "durability": DurabilityPolicy.VOLATILE,
+    "liveliness": LivelinessPolicy.AUTOMATIC,
+}
+
+qos_profile_default = QoSProfile(depth=10)
+qos_profile_system_default = QoSProfile()
+qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+qos_profile_services_default = qos_profile_default
+qos_profile_parameters = QoSProfile(depth=1000)
+qos_profile_parameter_events = qos_profile_parameters
+qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+qos_profile_rosout_default = QoSProfile(
+    depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=10 * 10**9
+)
+qos_profile_best_available = QoSProfile(
+    depth=10,
+    reliability=ReliabilityPolicy.BEST_AVAILABLE,
+    durability=DurabilityPolicy.BEST_AVAILABLE,
+    deadline=FOLLOWS,
+    liveliness=LivelinessPolicy.BEST_AVAILABLE,
+    liveliness_lease_duration=FOLLOWS,
+)
+
+
+def qos_profile(value: QoSProfile | int) -> QoSProfile:
+    """Return a profile as it is, or the default profile with this depth."""
+    return value if isinstance(value, QoSProfile) else QoSProfile(depth=value)
+
+
+def incompatible_policies(offered: QoSProfile, requested: QoSProfile) -> tuple[str, ...]:
+    """Return the policies for which a publisher offers less than a subscription requests.
+
+    ROS 2 on DDS does not connect such ends; rmw_zenoh connects them all the same.
+    """
+    reliability, durability = ReliabilityPolicy, DurabilityPolicy
+    return tuple(
+        name
+        for name, unfit in {
+            "reliability": (offered.reliability, requested.reliability)
+            == (reliability.BEST_EFFORT, reliability.RELIABLE),
+            "durability": (offered.durability, requested.durability)
+            == (durability.VOLATILE, durability.TRANSIENT_LOCAL),
+            "deadline": _longer(offered.deadline, requested.deadline),
+            "liveliness": (offered.liveliness, requested.liveliness)
+            == (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC),
+            "liveliness_lease_duration": _longer(
+                offered.liveliness_lease_duration, requested.liveliness_lease_duration
+            ),
+        }.items()
+        if unfit
+    )
+
+
+def _longer(offered: int, requested: int) -> bool:
+    return offered > requested and requested != FOLLOWS

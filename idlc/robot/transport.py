@@ -1,0 +1,120 @@
+"""The interface between idlc.robot and a middleware; `zenoh_transport.py` is the one for Zenoh.
+
+Payloads and attachments are bytes. Callbacks run on threads of the middleware: they hand over to
+a queue, return at once, and never close anything. All `close` methods may be called twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from idlc.robot.qos import QoSProfile
+
+
+class Sample(NamedTuple):
+    """A message or a reply; the attachment is empty if the sender sent none."""
+
+    key: str
+    payload: bytes
+    attachment: bytes
+
+
+class Closeable(Protocol):
+    """A declaration that lasts until it is closed."""
+
+    def close(self) -> None:
+        """Withdraw the declaration; afterwards, no new callback starts."""
+        ...
+
+
+class Sender(Closeable, Protocol):
+    """A declared publisher."""
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send a message."""
+        ...
+
+
+class Request(Protocol):
+    """A request that a service received."""
+
+    @property
+    def payload(self) -> bytes:
+        """The encoded request."""
+        ...
+
+    @property
+    def attachment(self) -> bytes:
+        """The attachment; empty if the client sent none."""
+        ...
+
+    def reply(self, payload: bytes, attachment: bytes) -> None:
+        """Send the reply and finish; it may run later, on any thread."""
+        ...
+
+    def drop(self) -> None:
+        """Finish without a reply, so that the client does not wait for one."""
+        ...
+
+
+class Transport(Protocol):
+    """A connection to other programs."""
+
+    @property
+    def id(self) -> str:
+        """The id of this session in tokens."""
+        ...
+
+    def publisher(self, key: str, qos: QoSProfile) -> Sender:
+        """Declare a publisher; one that is latched keeps its last messages."""
+        ...
+
+    def subscriber(
+        self,
+        key: str,
+        qos: QoSProfile,
+        callback: Callable[[Sample], None],
+        *,
+        ignore_local: bool = False,
+    ) -> Closeable:
+        """Call `callback` with each message; a latched profile also gets earlier ones.
+
+        `ignore_local` leaves out the messages of this session.
+        """
+        ...
+
+    def service(self, key: str, callback: Callable[[Request], None]) -> Closeable:
+        """Call `callback` with each request."""
+        ...
+
+    def call(
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        callback: Callable[[Sample | None], None],
+        *,
+        timeout: float,
+    ) -> None:
+        """Send a request; call `callback` with each reply, and at the end once with `None`.
+
+        The end comes when all services have answered, or after `timeout` seconds.
+        """
+        ...
+
+    def announce(self, token: str) -> Closeable:
+        """Show a token to all sessions while the declaration lasts."""
+        ...
+
+    def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
+        """Call `callback` with each token that matches, now and later: True appears, False goes."""
+        ...
+
+    def tokens(self, pattern: str, timeout: float) -> list[str]:
+        """Return the tokens that match now; waits for answers for at most `timeout` seconds."""
+        ...
+
+    def close(self) -> None:
+        """Close the connection; all declarations end with it."""
+        ...

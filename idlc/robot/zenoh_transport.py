@@ -1,0 +1,208 @@
+"""The transport over Zenoh, with the options that rmw_zenoh uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+import zenoh.ext
+
+from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from idlc.robot.transport import Closeable, Request, Sample, Sender
+
+#: Seconds between the heartbeats by which subscriptions notice that they missed a message.
+_HEARTBEAT = 0.5
+
+
+class ZenohTransport:
+    """The declarations of one Zenoh session."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session: Any = session
+        self._liveliness = session.liveliness()
+        self.id = str(session.info.zid())
+        #: Zenoh withdraws declarations that nobody refers to.
+        self._declared: set[_Declared] = set()
+
+    def publisher(self, key: str, qos: QoSProfile) -> Sender:
+        """Declare a publisher."""
+        reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        control, reliability = zenoh.CongestionControl, zenoh.Reliability
+        blocks = reliable and qos.history is HistoryPolicy.KEEP_ALL
+        options: dict[str, Any] = {
+            "congestion_control": control.BLOCK if blocks else control.DROP,
+            "reliability": reliability.RELIABLE if reliable else reliability.BEST_EFFORT,
+        }
+        if not qos.is_latched:
+            return _Sender(self._declared, self._session.declare_publisher(key, **options))
+        if reliable:
+            options["sample_miss_detection"] = zenoh.ext.MissDetectionConfig(
+                heartbeat=None, sporadic_heartbeat=_HEARTBEAT
+            )
+        publisher = zenoh.ext.declare_advanced_publisher(
+            self._session,
+            key,
+            publisher_detection=True,
+            cache=zenoh.ext.CacheConfig(max_samples=qos.depth),
+            **options,
+        )
+        return _LatchedSender(self._declared, publisher)
+
+    def subscriber(
+        self,
+        key: str,
+        qos: QoSProfile,
+        callback: Callable[[Sample], None],
+        *,
+        ignore_local: bool = False,
+    ) -> Closeable:
+        """Declare a subscriber."""
+
+        def put(sample: zenoh.Sample) -> None:
+            if sample.kind == zenoh.SampleKind.PUT:
+                callback(_sample(sample))
+
+        receive = _direct(put)
+        options: dict[str, Any] = {}
+        if ignore_local:
+            options["allowed_origin"] = zenoh.Locality.REMOTE
+        if not qos.is_latched:
+            return _Declared(
+                self._declared, self._session.declare_subscriber(key, receive, **options)
+            )
+        if qos.reliability is not ReliabilityPolicy.BEST_EFFORT:
+            options["recovery"] = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+        subscriber = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            key,
+            receive,
+            subscriber_detection=True,
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
+            **options,
+        )
+        return _Declared(self._declared, subscriber)
+
+    def service(self, key: str, callback: Callable[[Request], None]) -> Closeable:
+        """Declare a queryable."""
+        receive = _direct(lambda query: callback(_Request(query, key)))
+        queryable = self._session.declare_queryable(key, receive, complete=True)
+        return _Declared(self._declared, queryable)
+
+    def call(
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        callback: Callable[[Sample | None], None],
+        *,
+        timeout: float,
+    ) -> None:
+        """Send a query to all services."""
+
+        def answer(reply: zenoh.Reply) -> None:
+            if (sample := reply.ok) is not None:
+                callback(_sample(sample))
+
+        self._session.get(
+            key,
+            zenoh.handlers.Callback(answer, lambda: callback(None), indirect=False),
+            payload=payload,
+            attachment=attachment,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout,
+        )
+
+    def announce(self, token: str) -> Closeable:
+        """Declare a liveliness token."""
+        return _Declared(self._declared, self._liveliness.declare_token(token))
+
+    def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
+        """Subscribe to liveliness tokens, with those that exist."""
+
+        def receive(sample: zenoh.Sample) -> None:
+            callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        return _Declared(
+            self._declared, self._liveliness.declare_subscriber(pattern, receive, history=True)
+        )
+
+    def tokens(self, pattern: str, timeout: float) -> list[str]:
+        """Query the liveliness tokens that exist."""
+        replies = self._liveliness.get(pattern, timeout=timeout)
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
+    def close(self) -> None:
+        """Close the Zenoh session."""
+        if not self._session.is_closed():
+            self._session.close()
+
+
+def _direct(callback: Callable[[Any], None]) -> Any:
+    """Return a callback for Zenoh's own threads, as Zenoh never forgets one for another thread."""
+    return zenoh.handlers.Callback(callback, lambda: None, indirect=False)
+
+
+class _Declared:
+    """A declaration; Zenoh itself does not let it be withdrawn twice."""
+
+    def __init__(self, declared: set[_Declared], declaration: Any) -> None:
+        self._declared = declared
+        self._declaration = declaration
+        declared.add(self)
+
+    def close(self) -> None:
+        """Withdraw it."""
+        if self in self._declared:
+            self._declared.discard(self)
+            self._declaration.undeclare()
+
+
+class _Sender(_Declared):
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send a message."""
+        self._declaration.put(payload, attachment=attachment)
+
+
+class _LatchedSender(_Sender):
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send a message."""
+        if self not in self._declared:
+            raise RuntimeError("the publisher is closed")
+        super().put(payload, attachment)
+
+    def close(self) -> None:
+        """Withdraw it by forgetting it.
+
+        Its `undeclare` keeps the GIL while it waits for a task, for ten seconds if a callback on
+        the thread of that task waits for the GIL.
+        """
+        self._declared.discard(self)
+        self._declaration = None
+
+
+class _Request:
+    def __init__(self, query: zenoh.Query, key: str) -> None:
+        self._query: Any = query
+        self._key = key
+        self.payload = query.payload.to_bytes() if query.payload is not None else b""
+        self.attachment = query.attachment.to_bytes() if query.attachment is not None else b""
+
+    def reply(self, payload: bytes, attachment: bytes) -> None:
+        """Send the reply, and finish the query."""
+        self._query.reply(self._key, payload, attachment=attachment)
+        self.drop()
+
+    def drop(self) -> None:
+        """Finish the query."""
+        self._query.drop()
+
+
+def _sample(sample: zenoh.Sample) -> Sample:
+    attachment = sample.attachment
+    return Sample(
+        str(sample.key_expr),
+        sample.payload.to_bytes(),
+        b"" if attachment is None else attachment.to_bytes(),
+    )

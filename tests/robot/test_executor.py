@@ -1,0 +1,371 @@
+"""The executor, futures, tasks, timers, clocks, arguments and loggers, without a network."""
+
+import sys
+
+import pytest
+
+from idlc.robot import (
+    Clock,
+    ClockType,
+    Context,
+    Duration,
+    Executor,
+    ExternalShutdownException,
+    Future,
+    MutuallyExclusiveCallbackGroup,
+    RobotError,
+    Time,
+    Timer,
+    get_logger,
+    remove_ros_args,
+)
+from idlc.robot.nodes.arguments import Arguments, Override, Remap, parse_arguments
+from idlc.robot.nodes.endpoints import MOST_QUEUED, Bounded
+from idlc.robot.nodes.executor import CallbackGroup
+from idlc.robot.nodes.logger import LoggingSeverity, set_levels
+from idlc.robot.qos import HistoryPolicy, QoSProfile
+
+SECOND = 10**9
+HOUR = 3600
+
+
+class Timers:
+    """A node that has timers only."""
+
+    executor = None
+
+    def __init__(self, *timers):
+        self.timers = timers
+
+    def attach(self, executor):
+        self.executor = executor
+        for timer in self.timers:
+            timer.attach(executor)
+
+
+@pytest.fixture
+def executor():
+    context = Context()
+    context.init([])
+    with context, Executor(context=context) as executor:
+        yield executor
+
+
+def simulated():
+    clock = Clock(clock_type=ClockType.ROS_TIME)
+    clock.simulate(0)
+    return clock
+
+
+# futures and tasks
+
+
+def test_a_coroutine_goes_on_when_what_it_awaits_is_there(executor):
+    future, seen = Future(), []
+
+    async def wait(number):
+        seen.append(number)
+        return await future + number
+
+    task = executor.create_task(wait, 2)
+    executor.spin_once(timeout_sec=0)
+    executor.spin_once(timeout_sec=0)
+    assert (seen, task.done(), task.executing()) == ([2], False, False)
+    future.set_result(1)
+    executor.spin_until_future_complete(task)
+    assert task.result() == 3
+    task.cancel()
+    assert task.done()
+
+
+def test_tasks_await_tasks_functions_and_nothing(executor):
+    class Nothing:
+        def __await__(self):
+            yield
+
+    async def outer():
+        await Nothing()
+        return await executor.create_task(lambda number: number + 1, 1)
+
+    task = executor.create_task(outer())
+    executor.spin_until_future_complete(task)
+    assert task.result() == 2
+
+
+def test_exceptions_are_raised_by_the_spin_and_to_who_awaits(executor):
+    async def fail():
+        raise KeyError("x")
+
+    task = executor.create_task(fail)
+    with pytest.raises(KeyError):
+        executor.spin_once()
+    with pytest.raises(KeyError):
+        task.result()
+    assert isinstance(task.exception(), KeyError)
+
+
+def test_a_cancelled_coroutine_is_closed(executor):
+    closed = []
+
+    async def wait():
+        try:
+            await Future()
+        finally:
+            closed.append(True)
+
+    task = executor.create_task(wait)
+    executor.spin_once(timeout_sec=0)
+    task.cancel()
+    assert closed == [True]
+    assert task.cancelled()
+    executor.spin_until_future_complete(task)
+
+
+def test_callbacks_of_futures_run_once(executor):
+    future, seen = Future(), []
+    future.add_done_callback(seen.append)
+    future.add_done_callback(print)
+    assert future.remove_done_callback(print)
+    assert not future.remove_done_callback(print)
+    future.set_result(1)
+    future.set_result(2)
+    future.cancel()
+    future.add_done_callback(seen.append)
+    assert seen == [future, future]
+    assert future.result() == 1
+    failed = Future(executor=executor)
+    failed.add_done_callback(lambda each: seen.append(each.exception()))
+    error = ValueError()
+    failed.set_exception(error)
+    assert len(seen) == 2
+    executor.spin_once(timeout_sec=0)
+    assert seen[2] is error
+
+
+def test_a_callback_can_spin(executor):
+    future = Future()
+
+    def outer():
+        executor.create_task(future.set_result, 1)
+        executor.spin_until_future_complete(future)
+        return future.result()
+
+    task = executor.create_task(outer)
+    executor.spin_until_future_complete(task)
+    assert task.result() == 1
+
+
+def test_waits_end(executor):
+    executor.spin_once(timeout_sec=0)
+    executor.spin_until_future_complete(Future(), timeout_sec=0.001)
+    executor.spin_once_until_future_complete(Future(), timeout_sec=0)
+    executor.context.on_shutdown(lambda: None)
+    executor.create_task(executor.context.invalidate)
+    executor.spin()
+    with pytest.raises(ExternalShutdownException):
+        executor.spin_once()
+    executor.shutdown()
+    executor.spin_once()
+
+
+# timers and clocks
+
+
+@pytest.mark.parametrize("hours", [1, pytest.param(24, marks=pytest.mark.long)])
+def test_timers_are_called_on_time(executor, hours):
+    clock = simulated()
+    calls = {1: 0, 7: 0, 3600: 0}
+
+    def count(period):
+        calls[period] += 1
+        assert clock.now().nanoseconds % (period * SECOND) == 0
+
+    group = MutuallyExclusiveCallbackGroup()
+    timers = [
+        Timer(lambda period=period: count(period), group, period * SECOND, clock)
+        for period in calls
+    ]
+    node = Timers(*timers)
+    executor.add_node(node)
+    for second in range(1, hours * HOUR + 1):
+        clock.simulate(second * SECOND)
+        while any(timer.is_ready() for timer in timers):
+            executor.spin_once(timeout_sec=0)
+    assert calls == {period: hours * HOUR // period for period in calls}
+    assert executor._queue.qsize() == 0
+
+
+def test_late_calls_are_left_out(executor):
+    clock, calls = simulated(), []
+    timer = Timer(lambda: calls.append(clock.now().nanoseconds), None, 10, clock)
+    executor.add_node(Timers(timer))
+    for now in (9, 10, 35, 39, 40):
+        clock.simulate(now)
+        executor.spin_once(timeout_sec=0)
+        executor.spin_once(timeout_sec=0)
+    assert calls == [10, 35, 40]
+    assert (timer.time_since_last_call(), timer.time_until_next_call()) == (0, 10)
+    timer.timer_period_ns = 20
+    assert timer.timer_period_ns == 20
+
+
+def test_timers_stop_and_begin_again(executor):
+    clock, calls = simulated(), []
+    timer = Timer(lambda: calls.append(1), None, 10, clock, autostart=False)
+    executor.add_node(Timers(timer))
+    clock.simulate(100)
+    assert timer.is_canceled()
+    assert timer.time_until_next_call() is None
+    executor.spin_once(timeout_sec=0)
+    timer.reset()
+    clock.simulate(109)
+    assert not timer.is_ready()
+    clock.simulate(110)
+    executor.spin_once(timeout_sec=0)
+    assert calls == [1]
+    clock.simulate(5)  # time moved back: a period begins
+    assert timer.time_until_next_call() == 10
+    timer.destroy()
+    timer.destroy()
+    assert clock.at_jump == []
+    with pytest.raises(ValueError, match="must not be negative"):
+        Timer(None, None, -1, clock)
+
+
+def test_times_and_durations_are_numbers():
+    time = Time(seconds=1, nanoseconds=5)
+    assert (time - Time(nanoseconds=5)) == Duration(seconds=1)
+    assert (time - Duration(nanoseconds=5)) == Time(seconds=1)
+    assert (Duration(nanoseconds=1) + time).nanoseconds == SECOND + 6
+    assert time.seconds_nanoseconds() == (1, 5)
+    assert Time(nanoseconds=1) < time
+    assert Duration(nanoseconds=1) < Duration(nanoseconds=2)
+    assert len({time, Time(seconds=1, nanoseconds=5), Duration(seconds=1)}) == 2
+    assert Time.from_msg(time.to_msg(), ClockType.SYSTEM_TIME) == time
+    assert Duration.from_msg(Duration(nanoseconds=-1).to_msg()) == Duration(nanoseconds=-1)
+    assert repr(time) == "Time(nanoseconds=1000000005, clock_type=SYSTEM_TIME)"
+    assert repr(Duration(nanoseconds=1)) == "Duration(nanoseconds=1)"
+    with pytest.raises(TypeError, match="different clocks, SYSTEM_TIME and ROS_TIME"):
+        time < Time(clock_type=ClockType.ROS_TIME)  # noqa: B015
+    with pytest.raises(ValueError, match="a time must be between"):
+        Time(nanoseconds=-1)
+    assert Clock(clock_type=ClockType.STEADY_TIME).now().nanoseconds > 0
+
+
+# queues
+
+
+def test_queues_are_bounded_in_number_and_bytes():
+    queue = Bounded(QoSProfile(depth=2))
+    assert [queue.append(item, 10) for item in "abc"] == [[], [], ["a"]]
+    assert queue.append("large", MOST_QUEUED * 2) == ["b", "c"]
+    assert len(queue) == 1
+    assert queue.append("d", 1) == ["large"]
+    assert (queue.pop(), queue.pop(), len(queue)) == ("d", None, 0)
+    everything = Bounded(QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1))
+    dropped = [everything.append(item, MOST_QUEUED // 4) for item in range(5)]
+    assert dropped == [[], [], [], [0], [1]]
+
+
+def test_groups_that_are_not_exclusive_are_never_busy():
+    assert not CallbackGroup.is_exclusive
+
+
+# arguments
+
+
+def test_arguments_of_ros_are_read():
+    words = ["prog", "a", "--ros-args", "-r", "x:=y", "--remap", "n:__node:=m", "-p", "k:=1", "--"]
+    words += ["b", "--ros-args", "-r", "rostopic://c:=rostopic:///d", "-r", "__ns:=/e"]
+    words += ["--param", "n:k.l:=[1, 2]", "--params-file", "f.yaml", "--log-level", "debug"]
+    words += ["--log-level", "a.b:=WARN", "--disable-rosout-logs", "-e", "/", "-r", "__name:=z"]
+    words += ["--disable-stdout-logs"]
+    assert remove_ros_args(words) == ["prog", "a", "b"]
+    arguments = parse_arguments(words)
+    assert arguments == Arguments(
+        (
+            Remap("", "", "x", "y"),
+            Remap("n", "", "__node", "m"),
+            Remap("", "rostopic", "c", "/d"),
+            Remap("", "", "__ns", "/e"),
+            Remap("", "", "__node", "z"),
+        ),
+        (Override("", "k", "1"), Override("n", "k.l", "[1, 2]")),
+        ("f.yaml",),
+        (("", "debug"), ("a.b", "WARN")),
+        enable_rosout=False,
+    )
+    assert arguments.special("n", "__node") == "m"
+    assert arguments.special("other", "__node") == "z"
+    assert arguments.rename("x", "/s", "n", "rostopic") == "/s/y"
+    assert arguments.rename("c", "/", "n", "rostopic") == "/d"
+    assert arguments.rename("c", "/", "n", "rosservice") == "/c"
+    own = parse_arguments(["--ros-args", "-r", "x:=first", "-p", "k:=2"]) + arguments
+    assert own.rename("x", "/", "n", "rostopic") == "/first"
+    assert own.overrides[-1].value == "2"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-r"], "`-r` has no value (write it after `-r`)"),
+        (["-r", "a b:=c"], "`a b:=c` does not replace a name: `a b` is not a name"),
+        (["-r", "a"], "`a` does not replace a name: it is not of the form"),
+        (["-r", "__node:=a b"], "`__node:=a b` does not replace a name"),
+        (["-r", "__ns:=//"], "`__ns:=//` does not replace a name"),
+        (["-p", "a"], "`a` does not set a parameter (write `-p name:=value`)"),
+        (["x\n"], "`x\u240a` is not an argument of ROS"),
+    ],
+)
+def test_a_bad_argument_is_one_sentence(words, message):
+    with pytest.raises(RobotError) as caught:
+        parse_arguments(["--ros-args", *words])
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+# loggers
+
+
+@pytest.fixture
+def lines(monkeypatch, capsys):
+    monkeypatch.setattr("idlc.robot.nodes.logger._levels", {})
+    return lambda: [line.partition("]: ")[2] for line in capsys.readouterr().err.splitlines()]
+
+
+def test_messages_are_logged_by_level(lines):
+    logger = get_logger("a").get_child("b")
+    logger.debug("hidden")
+    assert logger.info("shown")
+    get_logger("a").set_level(LoggingSeverity.ERROR)
+    assert not logger.warn("hidden")
+    assert logger.fatal("shown")
+    assert not logger.is_enabled_for(LoggingSeverity.WARN)
+    set_levels([("a.b", "debug"), ("", "warn")])
+    assert logger.debug("shown")
+    assert not get_logger("c").info("hidden")
+    assert lines() == ["shown"] * 3
+    with pytest.raises(RobotError, match="`x` is not a level of loggers"):
+        set_levels([("", "x")])
+
+
+def test_a_line_can_log_once_or_now_and_then(lines):
+    clock, logger = simulated(), get_logger("a")
+    for now in range(5):
+        clock.simulate(now * SECOND)
+        logger.info(f"once {now}", once=True)
+        logger.info(f"rest {now}", skip_first=now < 3)
+        logger.info(f"now {now}", throttle_duration_sec=2, throttle_time_source_type=clock)
+    logger.info("x", throttle_duration_sec=10**9)
+    expected = ["once 0", "now 0", "rest 1", "rest 2", "now 2", "rest 3", "rest 4", "now 4", "x"]
+    assert lines() == expected
+
+
+def test_colours_and_format_are_those_of_ros(capsys, monkeypatch):
+    monkeypatch.setenv("RCUTILS_COLORIZED_OUTPUT", "1")
+    get_logger("a").error("x")
+    text = capsys.readouterr().err
+    assert text.startswith("\033[31m[ERROR] [")
+    assert text.endswith("] [a]: x\033[0m\n")
+    monkeypatch.setattr(sys, "stderr", None)
+    assert get_logger("a").error("x")

@@ -1,0 +1,190 @@
+"""The graph from tokens, in any order and in any number, and mismatches in it."""
+
+import random
+import threading
+
+import pytest
+
+from idlc.robot.graph import Graph, Mismatch, mismatches
+from idlc.robot.keys import Entity, Kind
+from idlc.robot.qos import QoSProfile, qos_profile_sensor_data
+
+HASH = "RIHS01_" + "0" * 64
+
+
+class Tokens:
+    """The tokens of a transport, which a test changes itself."""
+
+    def __init__(self, *initial):
+        self.initial = initial
+        self.update = None
+        self.gone = set()
+
+    def watch(self, pattern, callback):
+        assert pattern == "@ros2_lv/0/**"
+        self.update = callback
+        for token in self.initial:
+            if token not in self.gone:
+                callback(token, True)
+        return self
+
+    def tokens(self, pattern, timeout):
+        assert (pattern, timeout) == ("@ros2_lv/0/**", 5.0)
+        tokens, self.initial = self.initial, [t for t in self.initial if t not in self.gone]
+        return tokens
+
+    def close(self):
+        self.update = None
+
+
+def entity(kind, number=0, name="/chatter", type_="std_msgs/msg/String", hash_=HASH, **more):
+    if kind is Kind.NODE:
+        name = type_ = hash_ = ""
+    return Entity(
+        domain=0,
+        session="f1",
+        node_id=0,
+        id=number,
+        kind=kind,
+        node=more.pop("node", "talker"),
+        name=name,
+        type=type_,
+        hash=hash_,
+        **more,
+    )
+
+
+def test_an_endpoint_can_come_before_its_node_and_stay_after_it():
+    tokens = Tokens()
+    graph = Graph(tokens, 0)
+    endpoint, node = entity(Kind.PUBLISHER, 1), entity(Kind.NODE)
+    tokens.update(endpoint.token, True)
+    assert graph.entities() == (endpoint,)
+    tokens.update(node.token, True)
+    tokens.update(node.token, True)
+    assert graph.entities(Kind.NODE) == (node,)
+    assert graph.entities(node="/talker") == (endpoint, node)
+    tokens.update(node.token, False)
+    tokens.update(node.token, False)
+    assert graph.entities() == (endpoint,)
+    tokens.update(endpoint.token, False)
+    assert graph.entities() == ()
+    assert graph.count(Kind.PUBLISHER, "/chatter") == 0
+
+
+def test_entities_are_selected_by_all_that_is_known():
+    ends = [
+        entity(Kind.PUBLISHER, 1),
+        entity(Kind.PUBLISHER, 2, node="other"),
+        entity(Kind.SUBSCRIPTION, 3, type_="std_msgs/msg/Int8"),
+        entity(Kind.SERVICE, 4, name="/add", type_="a/srv/Add"),
+    ]
+    graph = Graph(Tokens(*(end.token for end in ends)), 0)
+    assert graph.entities(Kind.PUBLISHER, name="/chatter") == tuple(ends[:2])
+    assert graph.entities(node="/other") == (ends[1],)
+    assert graph.entities(type="std_msgs/msg/Int8") == (ends[2],)
+    assert graph.entities(Kind.CLIENT, name="/add") == ()
+    assert graph.count(Kind.PUBLISHER, "/chatter") == 2
+    assert graph.types(Kind.PUBLISHER, Kind.SUBSCRIPTION) == {
+        "/chatter": ("std_msgs/msg/Int8", "std_msgs/msg/String")
+    }
+    assert graph.types(Kind.SERVICE) == {"/add": ("a/srv/Add",)}
+
+
+def test_a_token_that_went_while_the_others_were_fetched_stays_away():
+    stays, goes = entity(Kind.PUBLISHER, 1), entity(Kind.PUBLISHER, 2)
+    tokens = Tokens(stays.token, goes.token)
+    tokens.gone.add(goes.token)
+    assert Graph(tokens, 0).entities() == (stays,)
+
+
+def test_garbage_is_counted_and_nothing_else():
+    tokens = Tokens("@ros2_lv/0/x", "", entity(Kind.NODE).token)
+    graph = Graph(tokens, 0)
+    random_ = random.Random(29)
+    for _ in range(1000):
+        tokens.update("@ros2_lv/0/" + "".join(map(chr, random_.sample(range(1, 5000), 30))), True)
+        tokens.update("never/seen", False)
+    assert graph.ignored == 1002
+    assert not graph.is_full
+    assert len(graph.entities()) == 1
+
+
+def test_a_robot_with_ten_thousand_endpoints_is_fine_and_a_flood_is_cut():
+    ends = [entity(Kind.PUBLISHER, n, name=f"/topic_{n}").token for n in range(10_000)]
+    graph = Graph(Tokens(*ends), 0)
+    assert len(graph.entities()) == 10_000
+    assert (graph.ignored, graph.is_full) == (0, False)
+    tokens = Tokens(*ends)
+    graph = Graph(tokens, 0, limit=sum(map(len, ends[:500])))
+    assert len(graph.entities()) == 500
+    assert (graph.ignored, graph.is_full) == (9_500, True)
+    for token in ends[:500]:
+        tokens.update(token, False)
+    tokens.update(ends[9_999], True)
+    assert [end.id for end in graph.entities()] == [9_999]
+
+
+def test_listeners_hear_each_change_until_they_end():
+    tokens, changes = Tokens(), []
+    graph = Graph(tokens, 0)
+    end = graph.listen(lambda entity, appears: changes.append((entity.id, appears)))
+    first, second = entity(Kind.PUBLISHER, 1), entity(Kind.PUBLISHER, 2)
+    tokens.update(first.token, True)
+    tokens.update(first.token, True)
+    tokens.update("garbage", True)
+    tokens.update(first.token, False)
+    end()
+    end()
+    tokens.update(second.token, True)
+    assert changes == [(1, True), (1, False)]
+    graph.close()
+    assert tokens.update is None
+    assert graph.entities() == (second,)
+
+
+def test_waiting_ends_with_a_change_or_with_time():
+    tokens = Tokens()
+    graph = Graph(tokens, 0)
+    publisher = entity(Kind.PUBLISHER, 1)
+    assert graph.wait_for(lambda graph: graph.entities(), 0) == ()
+    started = threading.Event()
+
+    def condition(graph):
+        started.set()
+        return graph.entities(Kind.PUBLISHER)
+
+    results = []
+    thread = threading.Thread(target=lambda: results.append(graph.wait_for(condition, None)))
+    thread.start()
+    assert started.wait(60)
+    tokens.update(publisher.token, True)
+    thread.join(60)
+    assert results == [(publisher,)]
+
+
+@pytest.mark.parametrize(
+    ("changed", "reasons"),
+    [
+        ({}, ()),
+        ({"hash_": "RIHS01_" + "1" * 64}, ("hash",)),
+        ({"hash_": ""}, ()),
+        ({"type_": "std_msgs/msg/Int8"}, ("type",)),
+        ({"name": "/chattr", "type_": "std_msgs/msg/Int8"}, ()),
+        ({"qos": QoSProfile(deadline=1)}, ("deadline",)),
+    ],
+)
+def test_ends_of_one_name_are_compared(changed, reasons):
+    publisher, subscription = entity(Kind.PUBLISHER), entity(Kind.SUBSCRIPTION, 1, **changed)
+    expected = [Mismatch(publisher, subscription, reasons)] if reasons else []
+    assert [*mismatches([subscription, publisher])] == expected
+    client, service = entity(Kind.CLIENT), entity(Kind.SERVICE, 1, **changed)
+    assert [mismatch.reasons for mismatch in mismatches([client, service])] == (
+        [reasons] if reasons else []
+    )
+
+
+def test_many_ends_of_one_topic_do_not_cost_the_square():
+    offered = [entity(Kind.PUBLISHER, n, qos=qos_profile_sensor_data) for n in range(1000)]
+    requested = [entity(Kind.SUBSCRIPTION, n) for n in range(1000)]
+    assert sum(1 for _ in mismatches([*offered, *requested])) == 100_000

@@ -1,0 +1,209 @@
+"""A robot as a source of types, and its messages from the shell."""
+
+import json
+import signal
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from idlc.cli.main import main
+from idlc.recordings.recording import Recording
+from idlc.robot.keys import Kind
+from idlc.robot.live.recorder import Recorder
+from idlc.robot.qos import DurabilityPolicy, QoSProfile
+from tests.robot.fake import FILES, Robot, demo_classes, standard, write_files
+
+LATCHED = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+
+
+@pytest.fixture
+def robot(router):
+    with running(router) as robot:
+        robot.describe_types()
+        yield robot
+
+
+@contextmanager
+def running(router, *arguments):
+    robot = Robot(router, *arguments)
+    try:
+        yield robot
+    finally:
+        robot.close()
+
+
+def test_the_types_that_a_robot_uses_are_compiled(robot, router, capsys):
+    robot.publisher("/drive", "demo_msgs/msg/Drive")
+    robot.publisher("/nothing", "demo_msgs/msg/Nothing")
+    robot.announce(Kind.SERVICE, "/gear", "demo_msgs/srv/Gear")
+    robot.action("/move", "demo_msgs/action/Move")
+    assert main(["gen", router, "-o", "out"]) == 0
+    assert "demo_msgs: 5 interfaces" in capsys.readouterr().out
+    assert "[m/s]" in Path("out/demo_msgs/msg/_wheel.py").read_text(encoding="utf-8")
+    assert main(["check", router]) == 0
+    write_files("mine")
+    assert main(["breaking", "mine", "--against", router]) == 0
+    write_files("mine", {**FILES, "srv/Gear.srv": "int8 gear\n---\nbool done\n"})
+    assert main(["breaking", "mine", "--against", router]) == 1
+    out = capsys.readouterr().out
+    assert "`demo_msgs/srv/Gear_Request` has 2 versions: in `/driver`; in your files" in out
+    assert "field `wheel` was added" in out
+
+
+def test_definitions_with_another_hash_are_refused(router, capsys):
+    service = standard("type_description_interfaces/srv/GetTypeDescription")
+
+    def lie(asked):
+        source = {"encoding": "msg", "raw_file_contents": "int8 other\n"}
+        return service.Response.from_dict(
+            {"successful": True, "type_sources": [{"type_name": asked.type_name, **source}]}
+        ).serialize()
+
+    with running(router) as robot:
+        robot.describe_types(lie)
+        robot.publisher("/drive", "demo_msgs/msg/Drive")
+        assert main(["gen", router, "-o", "out"]) == 0
+    assert not Path("out/demo_msgs").exists()
+    err = capsys.readouterr().err
+    assert "idlc skips `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
+    assert "another type hash" in err
+
+
+@pytest.mark.parametrize("reply", [b"", b"\0", b"\0\1\0\0" + b"\xff" * 50, b"x" * 5_000_000])
+def test_garbage_instead_of_definitions_is_reported(router, capsys, reply):
+    with running(router) as robot:
+        robot.describe_types(lambda _: reply)
+        robot.publisher("/drive", "demo_msgs/msg/Drive")
+        assert main(["check", router]) == 0
+    assert "does not define `demo_msgs/msg/Drive`" in capsys.readouterr().out
+
+
+def test_sources_cannot_name_files(router, tmp_path):
+    service = standard("type_description_interfaces/srv/GetTypeDescription")
+
+    def lie(asked):
+        names = (asked.type_name, "../../msg/Evil", "a/msg/../../Evil", "/etc/msg/X", "a b/msg/X")
+        source = {"encoding": "msg", "raw_file_contents": FILES["msg/Nothing.msg"]}
+        return service.Response.from_dict(
+            {"successful": True, "type_sources": [{"type_name": n, **source} for n in names]}
+        ).serialize()
+
+    with running(router) as robot:
+        robot.describe_types(lie)
+        robot.publisher("/nothing", "demo_msgs/msg/Nothing")
+        assert main(["gen", router, "-o", "out"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert not [path for path in Path("out").rglob("*") if "vil" in path.name]
+
+
+def test_the_graph_is_shown_with_what_does_not_fit(robot, router, capsys):
+    robot.publisher("/drive", "demo_msgs/msg/Drive")
+    robot.publisher("/nothing", "demo_msgs/msg/Nothing")
+    robot.action("/move", "demo_msgs/action/Move")
+    with running(router, "teleop", {**FILES, "msg/Drive.msg": "int8 x\n"}) as other:
+        other.announce(Kind.SUBSCRIPTION, "/drive", "demo_msgs/msg/Drive")
+        other.announce(Kind.SUBSCRIPTION, "/nothin", "demo_msgs/msg/Nothing")
+        other.announce(Kind.SUBSCRIPTION, "/hum", "demo_msgs/msg/Humble", "")
+        assert main(["show", router]) == 0
+        text = capsys.readouterr().out
+        assert main(["show", router, "--format", "json"]) == 0
+        facts = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert "mismatch: /drive: /driver → /teleop differ in hash" in text
+    assert "similar names: /nothing has no receiver, and /nothin no sender" in text
+    assert {"type": "node", "name": "/teleop"} in facts
+    action = next(fact for fact in facts if fact["type"] == "action")
+    assert (action["name"], action["receivers"]) == ("/move", ["/driver"])
+
+
+@pytest.mark.parametrize("style", ["yaml", "json", "csv"])
+def test_messages_are_printed_and_malformed_ones_counted(robot, router, capsys, style):
+    string = standard("std_msgs/msg/String")
+    publish = robot.publisher("/words", "std_msgs/msg/String", LATCHED)
+    publish(b"\0\1\0\0\xff\xff")
+    for word in ("one", "two"):
+        publish(string(data=word))
+    assert main(["echo", router, "words", "--count", "2", "--format", style]) == 0
+    out, err = capsys.readouterr()
+    expected = {
+        "yaml": "{data: one}\n---\n{data: two}\n---\n",
+        "json": '{"data": "one"}\n{"data": "two"}\n',
+        "csv": "data\none\ntwo\n",
+    }
+    assert out == expected[style]
+    assert "1 malformed messages" in err
+
+
+def test_unknown_names_and_robots_are_errors(robot, router, capsys):
+    robot.publisher("/words", "std_msgs/msg/String")
+    assert main(["echo", router, "/word"]) == 2
+    assert "did you mean `/words`?" in capsys.readouterr().err
+    assert main(["call", router, "/word"]) == 2
+    assert main(["record", router, "-o", "a.mcap", "/word"]) == 2
+    assert not Path("a.mcap").exists()
+    assert main(["show", "tcp/localhost"]) == 2
+    assert "IDL642" in capsys.readouterr().err
+    assert main(["columns", router]) != 0
+    assert "idlc record" in capsys.readouterr().err
+
+
+def test_requests_are_checked_before_they_are_sent(robot, router, capsys):
+    gear = demo_classes().demo_msgs.srv.Gear
+    seen = []
+
+    def answer(request):
+        seen.append(request)
+        return gear.Response(done=True, reason=f"{request.gear} {request.wheel.speed}")
+
+    robot.service("/gear", "demo_msgs/srv/Gear", gear, answer)
+    wrong = ("gear=300", "gear=x", "gear", "wheel.x=1", "wheel.code=[1,2]", "gear.x=1", "wheel=1")
+    for word in wrong:
+        assert main(["call", router, "/gear", word]) == 2, word
+    assert seen == []
+    capsys.readouterr()
+    words = ["gear=3", "wheel.speed=2.5", "wheel.code=[1,2,3]", "--format", "json"]
+    assert main(["call", router, "gear", *words]) == 0
+    assert json.loads(capsys.readouterr().out) == {"done": True, "reason": "3 2.5"}
+
+
+def test_a_recording_is_read_by_idlc_and_mcap(robot, router, capsys, monkeypatch):
+    drive = demo_classes().demo_msgs.msg.Drive
+    publish = robot.publisher("/drive", "demo_msgs/msg/Drive", LATCHED)
+    for gear in range(3):
+        publish(drive(gear=gear))
+    run, handler = Recorder.run, signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(
+        Recorder,
+        "run",
+        lambda self, is_over: run(self, lambda: is_over() or self._counts.get("/drive") == 3),
+    )
+    assert main(["record", router, "-o", "a.mcap", "/drive", "--duration", "60"]) == 0
+    assert main(["record", router, "-o", "b.mcap", "/drive", "--duration", "0.01"]) == 0
+    assert Path("b.mcap").stat().st_size > 0
+    assert signal.getsignal(signal.SIGTERM) == handler
+    with Recording("a.mcap") as recording:
+        assert [message.message.gear for message in recording["/drive"]] == [0, 1, 2]
+    with Path("a.mcap").open("rb") as file:
+        (channel,) = make_reader(file).get_summary().channels.values()
+        assert "durability: transient_local" in channel.metadata["offered_qos_profiles"]
+        assert channel.metadata["topic_type_hash"].startswith("RIHS01_")
+    assert main(["record", router, "-o", "a.mcap", "--duration", "1"]) == 1
+    assert "exists" in capsys.readouterr().err
+
+
+def test_a_robot_with_many_endpoints_is_shown(robot, router, capsys):
+    for number in range(2000):
+        robot.announce(Kind.PUBLISHER, f"/t{number}", "std_msgs/msg/String", wait=False)
+    robot.await_count(Kind.PUBLISHER, "", 2000)
+    assert main(["show", router, "--format", "json"]) == 0
+    assert capsys.readouterr().out.count('"type": "topic"') == 2000
+    assert threading.active_count() < 100

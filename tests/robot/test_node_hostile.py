@@ -1,0 +1,173 @@
+"""Whatever others send, a node ignores it or raises nothing; memory stays bounded."""
+
+import gc
+import random
+import sys
+
+import pytest
+
+from idlc.robot import QoSProfile, open_session
+from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.nodes.services import _MOST_REPLIES
+from idlc.robot.transport import Sample
+from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
+
+GID = bytes(16)
+
+
+class Request:
+    """A request as a transport passes it on."""
+
+    def __init__(self, payload, attachment):
+        self.payload, self.attachment = payload, attachment
+        self.replies, self.dropped = [], 0
+
+    def reply(self, payload, attachment):
+        self.replies.append((payload, attachment))
+
+    def drop(self):
+        self.dropped += 1
+
+
+@pytest.fixture
+def node(router):
+    with node_at(router, "node") as node:
+        yield node
+
+
+def mutated(rng, data):
+    """Return bytes with a few changes."""
+    result = bytearray(data)
+    for _ in range(rng.randrange(1, 4)):
+        match rng.randrange(3):
+            case 0 if result:
+                result[rng.randrange(len(result))] = rng.randrange(256)
+            case 1:
+                del result[rng.randrange(len(result) + 1) :]
+            case _:
+                result += rng.randbytes(rng.randrange(8))
+    return bytes(result)
+
+
+def test_mutated_messages_requests_and_responses_are_ignored(node, capsys):
+    rng = random.Random(29)
+    received = []
+    subscription = node.create_subscription(String, "chatter", received.append, 10)
+    service = node.create_service(SetBool, "set", lambda _, response: response)
+    client = node.create_client(SetBool, "set")
+    message = String(data="hello").serialize()
+    request = SetBool.Request(data=True).serialize()
+    response = SetBool.Response(message="x").serialize()
+    requests = []
+    for number in range(20_000):
+        attachment = pack_attachment(number, 2, GID)
+        match number % 3:
+            case 0:
+                payload, attached = mutated(rng, message), mutated(rng, attachment)
+                subscription._receive(Sample("0/x", rng.choice([message, payload]), attached))
+            case 1:
+                payload, attached = mutated(rng, request), mutated(rng, attachment)
+                requests.append(Request(payload, rng.choice([attachment, attached])))
+                service._receive(requests[-1])
+            case _:
+                client._response(number, Sample("0/x", mutated(rng, response), attachment))
+        if number % 10 == 0:
+            while node.executor._queue.qsize():
+                node.executor.spin_once(timeout_sec=0)
+    spin_until(lambda: not len(subscription._queue) and not len(service._queue), node)
+    assert received
+    assert subscription.ignored > 1000
+    assert service.ignored > 1000
+    assert client.ignored > 1000
+    assert all(len(each.replies) + each.dropped == 1 for each in requests)
+    assert service._open == set()
+    # one warning for all that could not be decoded
+    assert capsys.readouterr().err.count("[WARN]") == 1
+
+
+def test_a_flood_is_bounded(node):
+    subscription = node.create_subscription(String, "chatter", lambda _: None, 5)
+    service = node.create_service(SetBool, "set", lambda _, response: response)
+    waiting = node.executor._queue.qsize()
+    payload = SetBool.Request().serialize()
+    requests = [Request(payload, pack_attachment(number % 40, 2, GID)) for number in range(100)]
+    for number, request in enumerate(requests):
+        subscription._receive(Sample("0/x", b"", pack_attachment(number, 2, GID)))
+        service._receive(request)
+    assert len(subscription._queue) == 5
+    assert len(service._queue) == len(service._open) == 10
+    assert sum(each.dropped for each in requests) == 90
+    assert node.executor._queue.qsize() <= waiting + 2
+    node.destroy_service(service)
+    node.destroy_subscription(subscription)
+    assert sum(each.dropped for each in requests) == 100
+    assert len(subscription._queue) == 0
+
+
+def test_a_service_that_replies_for_ever_is_cut_short(node, router):
+    client = node.create_client(SetBool, "set")
+    with open_session(router, environ={}, timeout=LONG) as other:
+        held = []
+
+        def reply(request):
+            for _ in range(_MOST_REPLIES * 4):
+                request._query.reply(client.entity.key, b"", attachment=b"")
+            held.append(request)
+            request.drop()
+
+        other.transport.service(client.entity.key, reply)
+        other.transport.announce(
+            Entity(
+                domain=0,
+                session=other.id,
+                node_id=0,
+                id=1,
+                kind=Kind.SERVICE,
+                node="hostile",
+                name="/set",
+                type=client.interface.name,
+                hash=client.interface.hash,
+            ).token
+        )
+        assert client.wait_for_service(timeout_sec=LONG)
+        future = client.call_async(SetBool.Request())
+        spin_until(future.done, node)
+        assert held
+        assert 0 < client.ignored <= _MOST_REPLIES
+        assert future.exception() is not None
+        assert len(client._arrived) == 0
+
+
+def test_real_sends_without_attachments_are_counted(node, router):
+    subscription = node.create_subscription(String, "chatter", lambda _: None, 5)
+    service = node.create_service(SetBool, "set", lambda _, response: response)
+    with open_session(router, environ={}, timeout=LONG) as other:
+        sender = other.transport.publisher(subscription.entity.key, QoSProfile(depth=1))
+        ended = []
+        while not (subscription.ignored and service.ignored):
+            sender.put(b"\xff", b"")
+            other.transport.call(service.entity.key, b"", b"x" * 32, ended.append, timeout=LONG)
+            node.executor.spin_once(timeout_sec=0.01)
+
+
+@pytest.mark.parametrize("count", [10_000, pytest.param(10**6, marks=pytest.mark.long)])
+def test_memory_does_not_grow_with_messages(node, router, count):
+    received = 0
+
+    def receive(_):
+        nonlocal received
+        received += 1
+
+    node.create_subscription(String, "chatter", receive, QoSProfile(depth=1000))
+    with node_at(router, "other") as other:
+        publisher = other.create_publisher(String, "chatter", QoSProfile(depth=1000))
+        spin_until(publisher.get_subscription_count, node)
+        message, blocks = String(data="hello"), []
+        for number in range(1, count + 1):
+            publisher.publish(message)
+            if number % 500 == 0:
+                spin_until(lambda: received == number, node)  # noqa: B023 - called at once
+            if number % (count // 10) == 0:
+                gc.collect()
+                blocks.append(sys.getallocatedblocks())
+    assert blocks[-1] - blocks[0] < 5000

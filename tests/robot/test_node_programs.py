@@ -1,0 +1,135 @@
+"""Nodes as programs: they meet at a router, and signals end them without a trace."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from idlc.robot.keys import Kind
+from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
+
+PROGRAM = """
+import sys
+
+import idlc
+from idlc.robot import ExternalShutdownException, Node, init, spin
+
+String = idlc.load("std_msgs/msg/String").String
+SetBool = idlc.load("std_srvs/srv/SetBool").SetBool
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.publisher = self.create_publisher(String, "chatter", 10)
+        self.service = self.create_service(SetBool, "set", self.answer)
+        self.timer = self.create_timer(0.01, self.talk)
+
+    def talk(self):
+        self.publisher.publish(String(data="hello"))
+
+    def answer(self, request, response):
+        response.message = "on" if request.data else "off"
+        return response
+
+
+def main():
+    try:
+        with init(address=sys.argv[1]):
+            spin(Talker())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+
+
+main()
+"""
+
+
+@pytest.fixture
+def program(router, tmp_path):
+    """A started program, of which the node's name is replaced."""
+    file = tmp_path / "talker.py"
+    file.write_text(PROGRAM, encoding="utf-8")
+    command = [sys.executable, file, router, "--ros-args", "-r", "__ns:=/robot", "--"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        yield process
+        process.kill()
+
+
+def test_two_programs_meet_at_a_router(router, program):
+    with node_at(router, "listener") as node:
+        received = []
+        node.create_subscription(String, "/robot/chatter", received.append, 10)
+        client = node.create_client(SetBool, "/robot/set")
+        spin_until(lambda: received or program.poll() is not None, node)
+        assert received[0].data == "hello"
+        assert client.wait_for_service(timeout_sec=LONG)
+        assert client.call(SetBool.Request(data=True), LONG).message == "on"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_a_program_without_a_trace(router, program, number):
+    with node_at(router, "listener") as node:
+        names = {"/robot/chatter"}
+        graph = node.graph
+        assert graph.wait_for(lambda _: names <= {*graph.types(Kind.PUBLISHER)}, LONG)
+        program.send_signal(number)
+        _, errors = program.communicate(timeout=LONG)
+        assert (program.returncode, errors) == (0, "")
+        assert graph.wait_for(lambda _: not graph.entities(node="/robot/talker"), LONG)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_blocked_call_ends_with_the_program(router, tmp_path, number):
+    """In `wait_for_service`, in a thread or not, nothing keeps a program that ends."""
+    file = tmp_path / "waiting.py"
+    file.write_text(
+        "import sys, idlc\n"
+        "from idlc.robot import Node, init\n"
+        "try:\n"
+        "    with init(address=sys.argv[1]):\n"
+        '        node = Node("waiting")\n'
+        '        kind = idlc.load("std_srvs/srv/SetBool").SetBool\n'
+        '        node.create_client(kind, "set").wait_for_service()\n'
+        "except KeyboardInterrupt:\n"
+        "    pass\n"
+    )
+    with node_at(router, "listener") as node:
+        command = [sys.executable, file, router]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+            try:
+                assert node.graph.wait_for(lambda graph: graph.count(Kind.CLIENT, "/set"), LONG)
+                process.send_signal(number)
+                _, errors = process.communicate(timeout=LONG)
+                assert (process.returncode, errors) == (0, "")
+            finally:
+                process.kill()
+        assert node.graph.wait_for(lambda graph: not graph.count(Kind.CLIENT, "/set"), LONG)
+
+
+def test_an_exception_of_a_callback_ends_a_program(router, tmp_path):
+    file = tmp_path / "failing.py"
+    file.write_text(
+        "import sys\n"
+        "from idlc.robot import Node, init, spin\n"
+        "init(address=sys.argv[1])\n"
+        'node = Node("failing")\n'
+        "node.create_timer(0.0, lambda: 1 / 0)\n"
+        "spin(node)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, file, router], capture_output=True, text=True, timeout=LONG, check=False
+    )
+    assert done.returncode == 1
+    assert "ZeroDivisionError" in done.stderr
+
+
+def test_a_program_without_init_is_one_sentence():
+    code = "from idlc.robot import Node; Node('x')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=LONG, check=False
+    )
+    assert done.stderr.endswith(
+        "RobotError: the context is not initialized (call `idlc.robot.init()` first)\n"
+    )

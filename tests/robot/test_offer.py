@@ -1,0 +1,214 @@
+"""`python -m idlc.robot`: nodes of rclpy, unchanged, where there is no rclpy."""
+
+import ast
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from idlc.robot.offer.names import OFFERED
+from tests.robot.nodes import LONG
+from tests.support.paths import EXAMPLE, ROOT
+
+#: The installed packages that idlc uses here; the environment may have ROS 2's as well.
+USED = "_yaml click jinja2 lark markupsafe msgspec numpy typing_extensions xxhash yaml zenoh"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder of packages without those of ROS 2."""
+    folder = tmp_path_factory.mktemp("site")
+    for name in USED.split():
+        spec = find_spec(name)
+        if spec is None or spec.origin is None:
+            continue
+        origin = Path(spec.origin)
+        source = origin.parent if origin.name == "__init__.py" else origin
+        (folder / source.name).symlink_to(source)
+        if (libraries := source.parent / f"{name}.libs").is_dir():
+            (folder / libraries.name).symlink_to(libraries)
+    return folder
+
+
+class Program:
+    """A program in its own process, which ends with the test."""
+
+    def __init__(self, log, words, cwd, environment):
+        self._log = log
+        command = [sys.executable, "-S", "-u", "-m", "idlc.robot", *map(str, words)]
+        with log.open("w") as output:
+            self.process = subprocess.Popen(
+                command, cwd=cwd, env=environment, stdout=output, stderr=subprocess.STDOUT
+            )
+
+    @property
+    def output(self):
+        return self._log.read_text(encoding="utf-8")
+
+    def until(self, text, times=1):
+        """Wait until the program has printed a text this many times."""
+        end = time.monotonic() + LONG
+        while self.output.count(text) < times:
+            assert time.monotonic() < end, self.output
+            assert self.process.poll() is None, self.output
+            time.sleep(0.02)  # between two looks at the file
+
+    def ends(self):
+        return self.process.wait(LONG)
+
+
+@pytest.fixture
+def start(site, router, tmp_path):
+    """Return a function that starts a program in the example's folder."""
+    programs = []
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)]),
+        "ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{router}"]',
+        "RCUTILS_COLORIZED_OUTPUT": "0",
+    }
+
+    def started(*words, cwd=EXAMPLE):
+        log = tmp_path / f"{len(programs)}.log"
+        programs.append(Program(log, words, cwd, environment))
+        return programs[-1]
+
+    yield started
+    for program in programs:
+        program.process.kill()
+        program.process.wait()
+
+
+def file(name):
+    return f"my_robot_controller/{name}.py"
+
+
+def test_publisher_and_subscriber(start):
+    subscriber = start(file("sensor_subscriber"))
+    publisher = start(file("sensor_publisher"))
+    subscriber.until("Temperature: 25.5C", 2)
+    for program, number in ((subscriber, signal.SIGINT), (publisher, signal.SIGTERM)):
+        program.process.send_signal(number)
+        assert program.ends() == 0, program.output
+        assert "Traceback" not in program.output
+
+
+def test_service_and_client(start):
+    start(file("add_two_ints_server"))
+    client = start(file("add_two_ints_client"), "20", "22", "--server-timeout", LONG)
+    assert client.ends() == 0, client.output
+    assert "42 = 20 + 22" in client.output
+
+
+def test_action_with_feedback(start):
+    server = start("-m", "my_robot_controller.countdown_action_server")
+    client = start(file("countdown_action_client"), "2", "--server-timeout", LONG)
+    assert client.ends() == 0, client.output
+    assert client.output.count("feedback.current_count=") == 2
+    assert "success=True" in client.output
+    server.until("countdown: done")
+
+
+def test_action_that_is_cancelled_and_one_that_is_rejected(start):
+    server = start(file("countdown_action_server"))
+    client = start(file("countdown_action_client"), "1000", "--server-timeout", LONG)
+    client.until("feedback.current_count=")
+    client.process.send_signal(signal.SIGINT)
+    assert client.ends() == 130, client.output
+    server.until("countdown: cancelled")
+    client = start(file("countdown_action_client"), "0", "--server-timeout", LONG)
+    assert client.ends() == 1, client.output
+    assert "the goal was rejected" in client.output
+
+
+TUNED = """\
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("tuned")
+node.add_on_set_parameters_callback(lambda _: SetParametersResult(successful=True))
+value = node.declare_parameter("gain", 0.5, ParameterDescriptor(description="x")).value
+print("gain", value, node.get_name())
+node.destroy_node()
+rclpy.shutdown()
+"""
+
+
+def test_parameters_of_the_command_line(start, tmp_path):
+    (tmp_path / "tuned.py").write_text(TUNED, encoding="utf-8")
+    program = start("tuned.py", "--ros-args", "-p", "gain:=2.5", cwd=tmp_path)
+    assert program.ends() == 0, program.output
+    assert program.output == "gain 2.5 tuned\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("import rclpy.lifecycle", "rclpy.lifecycle"),
+        ("from rclpy.node import HIDDEN_NODE_PREFIX", "rclpy.node.HIDDEN_NODE_PREFIX"),
+        ("import rclpy; rclpy.get_rmw_implementation_identifier()", "rclpy.get_rmw_impl"),
+    ],
+)
+def test_other_names_of_rclpy_are_named(start, tmp_path, text, name):
+    (tmp_path / "node.py").write_text(text, encoding="utf-8")
+    program = start("node.py", cwd=tmp_path)
+    assert program.ends() == 1
+    last = program.output.splitlines()[-1]
+    assert f"idlc does not offer `{name}" in last
+    assert "docs/robot-nodes.md" in last
+
+
+def test_it_refuses_where_rclpy_can_be_imported(start, tmp_path):
+    (tmp_path / "rclpy.py").write_text("", encoding="utf-8")
+    (tmp_path / "node.py").write_text("print('ran')", encoding="utf-8")
+    program = start("node.py", cwd=tmp_path)
+    assert program.ends() == 2
+    assert "error: rclpy is installed" in program.output
+    assert "ran" not in program.output
+
+
+@pytest.mark.parametrize("words", [[], ["none.py"], ["--unknown"]])
+def test_mistakes_on_the_command_line_are_errors(start, words):
+    program = start(*words)
+    assert program.ends() == 2
+    assert program.output.startswith("error: ")
+    assert "Traceback" not in program.output
+
+
+@pytest.mark.parametrize("module", OFFERED)
+def test_each_offered_name_exists(module):
+    for home, words in OFFERED[module].items():
+        for word in words.split():
+            assert hasattr(__import__(home, fromlist=[word]), word), (home, word)
+
+
+def test_the_page_lists_the_names():
+    page = (ROOT / "docs/robot-nodes.md").read_text(encoding="utf-8")
+    for module, homes in OFFERED.items():
+        names = sorted({word for words in homes.values() for word in words.split()})
+        assert f"| `{module}` | {', '.join(f'`{name}`' for name in names)} |" in page
+
+
+def test_scaffolded_nodes_use_only_offered_names():
+    used = set()
+    for path in (ROOT / "golden").rglob("*.py"):
+        if "/test/" in path.as_posix():
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("rclpy."):
+                used |= {(node.module, alias.name) for alias in node.names}
+    offered = {
+        (module, word)
+        for module, homes in OFFERED.items()
+        for words in homes.values()
+        for word in words.split()
+    }
+    assert ("rclpy.node", "Node") in used
+    assert {module for module, _ in used - offered} <= {"rclpy.lifecycle"}

@@ -1,0 +1,91 @@
+"""Profiles, and which of them fit."""
+
+import datetime
+
+import pytest
+
+from idlc.robot.qos import (
+    INFINITE,
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    incompatible_policies,
+    qos_profile,
+    qos_profile_best_available,
+    qos_profile_sensor_data,
+)
+
+SECOND = 10**9
+
+
+class Duration:
+    nanoseconds = 7
+
+
+def test_choices_of_the_middleware_are_filled_in():
+    profile = QoSProfile(
+        history=HistoryPolicy.SYSTEM_DEFAULT,
+        reliability=ReliabilityPolicy.SYSTEM_DEFAULT,
+        durability=DurabilityPolicy.SYSTEM_DEFAULT,
+        liveliness=LivelinessPolicy.SYSTEM_DEFAULT,
+        deadline=0,
+    )
+    assert profile == QoSProfile()
+    assert (profile.depth, profile.deadline) == (42, INFINITE)
+    assert profile.history is HistoryPolicy.KEEP_LAST
+
+
+def test_a_number_is_a_depth_and_a_duration_has_nanoseconds():
+    assert qos_profile(7) == QoSProfile(depth=7)
+    assert qos_profile(qos_profile_sensor_data) is qos_profile_sensor_data
+    assert QoSProfile(depth=1, deadline=Duration()).deadline == 7
+    assert QoSProfile(depth=1, reliability=2).reliability is ReliabilityPolicy.BEST_EFFORT
+
+
+def test_a_profile_does_not_change():
+    with pytest.raises(AttributeError):
+        qos_profile_sensor_data.depth = 1
+    assert hash(QoSProfile(depth=1)) == hash(QoSProfile(depth=1))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"depth": -1},
+        {"depth": 2**31},
+        {"deadline": -1},
+        {"lifespan": 2**63},
+        {"reliability": 3},
+        {"durability": 9},
+    ],
+)
+def test_values_out_of_range_are_refused(values):
+    with pytest.raises(ValueError, match=r"\d"):
+        QoSProfile(**values)
+
+
+def test_values_of_another_type_are_refused():
+    with pytest.raises(TypeError):
+        QoSProfile(deadline=datetime.timedelta(seconds=1))
+
+
+@pytest.mark.parametrize(
+    ("policy", "weak", "strong"),
+    [
+        ("reliability", ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE),
+        ("durability", DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL),
+        ("deadline", INFINITE, SECOND),
+        ("deadline", 2 * SECOND, SECOND),
+        ("liveliness", LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC),
+        ("liveliness_lease_duration", INFINITE, SECOND),
+    ],
+)
+def test_a_publisher_offers_at_least_what_is_requested(policy, weak, strong):
+    less, more = QoSProfile(**{policy: weak}), QoSProfile(**{policy: strong})
+    assert incompatible_policies(less, more) == (policy,)
+    for offered, requested in ((more, less), (less, less), (more, more)):
+        assert incompatible_policies(offered, requested) == ()
+    for profile in (less, more):
+        assert incompatible_policies(profile, qos_profile_best_available) == ()

@@ -1,0 +1,342 @@
+"""Sessions with a router and with each other, on loopback, over the real Zenoh."""
+
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from idlc.cli.main import main
+from idlc.robot.errors import RobotError
+from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from idlc.robot.session import is_address, open_router, open_session
+from tests.robot.conftest import free_endpoint, start_router
+from tests.robot.nodes import pass_on
+
+pytest.importorskip("zenoh", reason="eclipse-zenoh has no wheel for this platform")
+#: Seconds after which a test gives up; it never takes that long.
+LONG = 60
+LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def opened(*addresses, **options):
+    return open_session(*addresses, **{"environ": {}, "timeout": LONG, **options})
+
+
+def entity(session, kind=Kind.PUBLISHER, **more):
+    words = {} if kind is Kind.NODE else {"name": "/chatter", "type": "std_msgs/msg/String"}
+    return Entity(
+        domain=session.domain,
+        session=session.id,
+        node_id=0,
+        id=session.next_id(),
+        kind=kind,
+        node="talker",
+        **words,
+        **more,
+    )
+
+
+@pytest.fixture
+def sessions(router):
+    with opened(router) as left, opened(router) as right:
+        yield left, right
+
+
+def test_nodes_and_endpoints_appear_in_the_other_graph_and_go(sessions):
+    left, right = sessions
+    node, early, late = entity(left, Kind.NODE), entity(left), entity(left)
+    for each in (node, early):
+        left.transport.announce(each.token)
+    assert right.graph.wait_for(lambda graph: len(graph.entities()) == 2, LONG)
+    assert {*right.graph.entities()} == {node, early}
+    declaration = left.transport.announce(late.token)
+    assert right.graph.wait_for(lambda graph: graph.count(Kind.PUBLISHER, "/chatter") == 2, LONG)
+    declaration.close()
+    declaration.close()
+    assert right.graph.wait_for(lambda graph: graph.count(Kind.PUBLISHER, "/chatter") == 1, LONG)
+    assert right.graph is right.graph
+    left.close()
+    left.close()
+    assert right.graph.wait_for(lambda graph: not graph.entities(), LONG)
+
+
+def test_a_session_sees_itself_and_no_other_domain(sessions):
+    left, right = sessions
+    left.transport.announce(entity(left, Kind.NODE).token)
+    assert left.graph.wait_for(lambda graph: graph.entities(), LONG)
+    right.domain = 7
+    other = entity(right, Kind.NODE)
+    right.transport.announce(other.token)
+    assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (other,)
+
+
+@pytest.mark.parametrize("reliability", ["RELIABLE", "BEST_EFFORT"])
+@pytest.mark.parametrize("first", ["publisher", "subscriber"])
+def test_latched_messages_reach_late_ends(sessions, first, reliability):
+    left, right = sessions
+    profile = QoSProfile(
+        depth=2,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        reliability=ReliabilityPolicy[reliability],
+    )
+    received = queue.SimpleQueue()
+    if first == "subscriber":
+        right.transport.subscriber("0/a", profile, received.put)
+    publisher = left.transport.publisher("0/a", profile)
+    for number in range(5):
+        publisher.put(b"%d" % number, pack_attachment(number + 1, 2, bytes(16)))
+    if first == "publisher":
+        # messages that the router passes on are no longer on their way to it
+        pass_on(left, right)
+        right.transport.subscriber("0/a", profile, received.put)
+    payloads = [b""]
+    while payloads[-1] != b"4":
+        sample = received.get(timeout=LONG)
+        assert sample.key == "0/a"
+        assert sample.attachment == pack_attachment(int(sample.payload) + 1, 2, bytes(16))
+        payloads.append(sample.payload)
+    assert payloads[-2:] == [b"3", b"4"]
+    assert first == "subscriber" or len(payloads) == 3
+    publisher.close()
+    publisher.close()
+    with pytest.raises(RuntimeError, match="the publisher is closed"):
+        publisher.put(b"", b"")
+    pass_on(left, right)
+    late = queue.SimpleQueue()
+    right.transport.subscriber("0/a", profile, late.put)
+    pass_on(left, right)
+    assert late.empty()  # the cache is gone, too
+
+
+def test_volatile_messages_reach_those_that_are_there(sessions):
+    left, right = sessions
+    profile = QoSProfile(depth=1)
+    received, local, remote = (queue.SimpleQueue() for _ in range(3))
+    right.transport.subscriber("0/a/*", profile, received.put)
+    left.transport.subscriber("0/a/*", profile, local.put)
+    left.transport.subscriber("0/a/*", profile, remote.put, ignore_local=True)
+    publishers = [session.transport.publisher("0/a/b", profile) for session in (left, right)]
+    sample = None
+    while sample is None:  # the declaration of a subscriber takes a moment to arrive
+        publishers[0].put(b"from left", b"")
+        try:
+            sample = received.get(timeout=0.1)
+        except queue.Empty:
+            continue
+    assert sample == ("0/a/b", b"from left", b"")
+    assert local.get(timeout=LONG).payload == b"from left"
+    while remote.empty():
+        publishers[1].put(b"from right", b"")
+        threading.Event().wait(0.01)
+    assert remote.get().payload == b"from right"
+
+
+def test_a_service_answers_at_once_or_later_or_not_at_all(sessions):
+    left, right = sessions
+    held = queue.SimpleQueue()
+
+    def answer(request):
+        if request.payload == b"drop":
+            request.drop()
+        elif request.payload == b"later":
+            held.put(request)
+        else:
+            request.reply(request.payload + b"!", request.attachment)
+
+    service = right.transport.service("0/add", answer)
+
+    def call(payload, key="0/add"):
+        replies = queue.SimpleQueue()
+        left.transport.call(key, payload, b"attached", replies.put, timeout=LONG)
+        if payload == b"later":
+            request = held.get(timeout=LONG)
+            threading.Thread(target=request.reply, args=(b"done", request.attachment)).start()
+        return [*iter(lambda: replies.get(timeout=LONG), None)]
+
+    replies = []
+    while not replies:  # the declaration of a service takes a moment to arrive
+        replies = call(b"hi")
+    assert replies == [("0/add", b"hi!", b"attached")]
+    assert call(b"later") == [("0/add", b"done", b"attached")]
+    assert call(b"drop") == []
+    assert call(b"hi", "0/nobody") == []
+    service.close()
+    service.close()
+
+
+def test_a_call_ends_after_its_timeout(sessions):
+    left, right = sessions
+    requests, replies = queue.SimpleQueue(), queue.SimpleQueue()
+    right.transport.service("0/slow", requests.put)
+    while requests.empty():
+        left.transport.call("0/slow", b"hi", b"", replies.put, timeout=1)
+        assert replies.get(timeout=LONG) is None
+
+
+def test_peers_need_no_router():
+    endpoint = free_endpoint()
+    nobody = {"ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{free_endpoint()}"]'}
+    with opened(listen=[endpoint], environ=nobody) as left, opened(endpoint) as right:
+        node = entity(left, Kind.NODE)
+        left.transport.announce(node.token)
+        assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
+
+
+def test_peers_meet_at_a_router_that_starts_later():
+    endpoint = free_endpoint()
+    environ = {"ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{endpoint}"]', "ROS_DOMAIN_ID": "3"}
+    with open_session(environ=environ) as left, open_session(environ=environ) as right:
+        assert left.domain == 3
+        node = entity(left, Kind.NODE)
+        left.transport.announce(node.token)
+        with open_router([endpoint], environ={}):
+            assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
+
+
+def test_a_lost_connection_comes_back():
+    router, endpoint = start_router()
+    with opened(endpoint) as left, opened(endpoint) as right:
+        node = entity(left, Kind.NODE)
+        left.transport.announce(node.token)
+        assert right.graph.wait_for(lambda graph: graph.entities(), LONG)
+        router.close()
+        assert right.graph.wait_for(lambda graph: not graph.entities(), LONG)
+        with open_router([endpoint], environ={}):
+            assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
+
+
+def test_the_first_endpoint_that_answers_is_taken(router):
+    def opened_second():
+        for timeout in (1, 10):  # both endpoints get this time
+            with suppress(RobotError):
+                return opened(f"{free_endpoint()},{router}", timeout=timeout)
+        return opened(f"{free_endpoint()},{router}", timeout=LONG)
+
+    with opened_second() as one, opened(router, free_endpoint()) as two:
+        node = entity(one, Kind.NODE)
+        one.transport.announce(node.token)
+        assert two.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
+
+
+def test_a_configuration_file_is_used_and_opens_nothing_more(router, tmp_path):
+    file = tmp_path / "session.json5"
+    file.write_text(f'{{mode: "peer", connect: {{endpoints: ["{router}"]}}}}')
+    environ = {"ZENOH_SESSION_CONFIG_URI": str(file)}
+    with opened(f"zenoh:{file}") as left, open_session(environ=environ) as right:
+        node = entity(left, Kind.NODE)
+        left.transport.announce(node.token)
+        assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
+        assert {address for address in listening() if not address.startswith("127.")} == set()
+
+
+def listening():
+    """Yield the addresses on which this process accepts connections (Linux; elsewhere none)."""
+    folder, tables = Path("/proc/self/fd"), Path("/proc/self/net")
+    sockets = set()
+    for descriptor in folder.iterdir() if tables.exists() else ():
+        with suppress(OSError):
+            sockets.add(str(descriptor.readlink()))
+    for table in tables.glob("tcp*"):
+        for line in table.read_text().splitlines()[1:]:
+            words = line.split()
+            if words[3] == "0A" and f"socket:[{words[9]}]" in sockets:
+                address = bytes.fromhex(words[1].partition(":")[0])
+                yield ".".join(map(str, address[::-1]))
+
+
+@pytest.mark.parametrize(
+    ("addresses", "environ", "message"),
+    [
+        (["tcp/robot"], {}, "`tcp/robot` is not an endpoint (write `tcp/robot:7447`)"),
+        (["tcp/"], {}, "`tcp/` is not an endpoint (write `tcp/localhost:7447`)"),
+        (["robot:7447"], {}, "`robot:7447` is not an endpoint (write `tcp/localhost:7447`)"),
+        (["tcp/a:1,"], {}, "`` is not an endpoint (write `tcp/localhost:7447`)"),
+        (["tcp/a\nb:1"], {}, "`tcp/a␊b:1` is not an endpoint"),
+        (["zenoh:no.json5"], {}, "`no.json5` is not a configuration of Zenoh: No such file"),
+        (["zenoh:a", "tcp/a:1"], {}, "`zenoh:a` cannot be combined with other addresses"),
+        ([], {"ZENOH_SESSION_CONFIG_URI": "x"}, "`x` is not a configuration of Zenoh"),
+        ([], {"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is `x` (set it to a number such as 0)"),
+        ([], {"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is `-1`"),
+        (
+            [],
+            {"ZENOH_CONFIG_OVERRIDE": "no/such=1"},
+            "ZENOH_CONFIG_OVERRIDE has `no/such=1`: unknown key",
+        ),
+        ([], {"ZENOH_CONFIG_OVERRIDE": "mode"}, "ZENOH_CONFIG_OVERRIDE has `mode`: expected"),
+        ([], {"ZENOH_CONFIG_OVERRIDE": "mode=x"}, "ZENOH_CONFIG_OVERRIDE has `mode=x`: expected"),
+    ],
+)
+def test_what_cannot_be_opened_is_one_sentence(addresses, environ, message):
+    with pytest.raises(RobotError) as caught:
+        open_session(*addresses, environ=environ)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+    assert ".rs" not in str(caught.value)
+
+
+def test_a_robot_that_does_not_answer_is_one_sentence():
+    endpoint = free_endpoint()
+    with pytest.raises(RobotError) as caught:
+        opened(endpoint, timeout=0.3)
+    assert caught.value.message.startswith(f"`{endpoint}` does not answer: ")
+    assert "idlc waited 0.3 s" in caught.value.hint
+    assert ".rs" not in str(caught.value)
+
+
+def test_a_missing_zenoh_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    with pytest.raises(
+        RobotError, match=r"eclipse-zenoh is required: .*pip install \"idlc\[zenoh\]\""
+    ):
+        open_session("tcp/127.0.0.1:1")
+
+
+def test_a_path_that_exists_is_no_robot(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["tcp/robot:7447", "tls/[::1]:7447", "tcp/robot", "zenoh:x.json5"]
+    assert [*map(is_address, words)] == [True] * 4
+    assert [*map(is_address, ["robot:7447", "rec.mcap", "tcp", "interfaces/tcp/x"])][::2] == [
+        False
+    ] * 2
+    (tmp_path / "tcp").mkdir()
+    (tmp_path / "tcp/robot:7447").touch()
+    assert not is_address("tcp/robot:7447")
+
+
+def test_two_routers_cannot_have_one_port(router):
+    with pytest.raises(RobotError, match=r"no router can listen on .*: .*another router"):
+        open_router([router], environ={})
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_router_command_runs_until_it_is_stopped(number):
+    endpoint = free_endpoint()
+    command = [sys.executable, "-m", "idlc", "robot", "router", "--listen", endpoint]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == f"listening on {endpoint}; press Ctrl-C to stop\n"
+            opened(endpoint).close()
+            process.send_signal(number)
+            assert process.wait(LONG) == 0
+        finally:
+            process.kill()
+
+
+def test_the_router_command_reports_a_bad_endpoint(capsys):
+    assert main(["robot", "router", "--listen", "tcp/robot"]) == 2
+    assert capsys.readouterr().err == (
+        "error: `tcp/robot` is not an endpoint\n  = hint: write `tcp/robot:7447`\n"
+    )
+
+
+def test_nothing_of_zenoh_is_imported_before_it_is_used():
+    code = "import sys, idlc.robot as r; r.QoSProfile; r.Session; r.Graph; r.open_session; "
+    code += "print('zenoh' in sys.modules, sorted(dir(r))[:2])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[0] == "False"
