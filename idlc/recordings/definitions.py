@@ -42,7 +42,8 @@ class RecordedDefinition(NamedTuple):
 
     `name` may be derived from the `interface`; both are `None` for types that are not of ROS 2.
     `recording` is the recording's name in reports. Of repeated definitions the first counts, and
-    the others are in `repeated`.
+    the others are in `repeated`. `origin` is the recording in words, or a robot, and `problem` the
+    reason why a robot has no definition.
     """
 
     recording: str
@@ -51,6 +52,8 @@ class RecordedDefinition(NamedTuple):
     interface: ir.TypeName | None
     texts: dict[ir.TypeName, Source]
     repeated: tuple[tuple[ir.TypeName, Source], ...] = ()
+    origin: str = "the recording"
+    problem: str = ""
 
 
 #: The texts recorded with topics, by definition and interface.

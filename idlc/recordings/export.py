@@ -23,6 +23,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model.ir import DUMMY_FIELD
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
+from idlc.recordings.preview import Preview
 from idlc.recordings.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.recordings.types import BORROWED, NAMED
 
@@ -174,6 +175,8 @@ def _groups(batches: Iterator[pa.RecordBatch]) -> Iterator[list[pa.RecordBatch]]
 #: The placeholder in OUT for the name of a topic.
 MARK = "{topic}"
 STDOUT = "-"
+#: The style of a preview, which no file has.
+TEXT = "text"
 
 
 #: Called with a topic, the number of messages done, and of all.
@@ -199,11 +202,12 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
 
 
 class WrittenFile(NamedTuple):
-    """A file that was written, with the messages of a topic."""
+    """A file that was written, with the messages of a topic, or a preview in its place."""
 
     topic: str
     path: str
     rows: int
+    preview: Preview | None = None
 
 
 class Job(NamedTuple):
@@ -276,7 +280,9 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
     paths = [] if options.force else [job.path for job in jobs if job.path != STDOUT]
     taken = [path for path in paths if os.path.lexists(path)]
     for path in taken:
-        report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint="--force replaces it"))
+        report.add(
+            codes.EXISTING_FILE.of(path, f"`{path}` exists", hint="add --force to replace it")
+        )
     return () if taken else jobs
 
 
@@ -287,7 +293,7 @@ def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     name = re.sub(r"[^\w.-]", "_", dotted, flags=re.ASCII) or "_"
     suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
-        return Job(topic, out, options.style or "arrow")
+        return Job(topic, out, options.style or (TEXT if sys.stdout.isatty() else "arrow"))
     if MARK in out:
         return Job(topic, out.replace(MARK, name), options.style or suffix or "")
     if out.endswith("/") or Path(out).is_dir() or (many and not suffix):
@@ -299,17 +305,22 @@ def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
 def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | None:
     """Return why columns cannot be written, and a hint."""
     if not all(job.style for job in jobs):
-        hint = f"--format, or one of {', '.join(STYLES)}"
-        return f"`{options.out}` does not say which format is meant", hint
-    paths = [job.path for job in jobs]
+        hint = f"add --format, or one of the extensions {', '.join(STYLES)}"
+        return f"`{options.out}` has no extension of a known format", hint
+    if any(job.style == TEXT and job.path != STDOUT for job in jobs):
+        return "`--format text` writes no file", "omit `-o`, or choose another format"
+    paths = [job.path for job in jobs if job.style != TEXT]
     twice = next((path for path, count in Counter(paths).items() if count > 1), None)
     if twice is not None:
         what = "standard output" if twice == STDOUT else f"`{twice}`"
         several = [job.topic.topic.name for job in jobs if job.path == twice]
-        hint = f"name a folder, or a file for each, such as `-o 'out/{MARK}.parquet'`"
+        hint = f"give a folder, or a pattern such as `-o 'out/{MARK}.parquet'`"
         return f"{', '.join(several)} cannot all go to {what}", hint
     if STDOUT in paths and sys.stdout.isatty():
-        return "what a terminal shows is text", "name a file with -o, or use a pipe"
+        return (
+            "a terminal shows only text",
+            "omit --format, give a file with -o, or use a pipe",
+        )
     return None
 
 
@@ -318,7 +329,7 @@ def _written(
 ) -> Iterator[WrittenFile]:
     """Write the columns of one topic, unless it has no such fields."""
     name, rows = job.topic.topic.name, 0
-    flat = job.style == "csv" or not options.nested
+    flat = job.style in ("csv", TEXT) or not options.nested
     try:
         reader = job.topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
     except ValueError as error:
@@ -333,6 +344,12 @@ def _written(
             progress(name, rows, job.topic.topic.count)
             yield batch
 
+    if job.style == TEXT:
+        preview = Preview(f"{name}  {job.topic.topic.type}", reader.schema.names)
+        for batch in counted():
+            preview.add(batch, plain)
+        yield WrittenFile(name, job.path, rows, preview)
+        return
     stdout = nullcontext(sys.stdout.buffer)
     with stdout if job.path == STDOUT else whole_file(job.path) as file:
         write(counted(), reader.schema, file, job.style)

@@ -10,16 +10,20 @@ from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS
 from idlc.project.root import MANIFEST, Root
 from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
+from idlc.robot.session import is_address
 
 #: Cannot be read, which opening it reports.
 ROS_1 = ".bag"
 
 
 def is_recording(word: str, root: Root) -> bool:
-    """Return whether a path means a recording: an .mcap or .db3 file, or the folder of a bag.
+    """Return whether a word means a recording: an .mcap or .db3 file, or the folder of a bag.
 
-    A folder is that of a bag if it has a metadata.yaml, or recordings and no interfaces.
+    The address of a robot stands for a recording, too. A folder is that of a bag if it has a
+    metadata.yaml, or recordings and no interfaces.
     """
+    if is_address(word):
+        return True
     path = Path(root.path(word))
     if not is_folder(path):
         return path.name.endswith((*SUFFIXES, *COMPRESSED, ROS_1))
@@ -48,13 +52,14 @@ def split_recordings(words: Iterable[str], root: Root) -> tuple[list[str], list[
 
 def files(words: Iterable[str], root: Root) -> list[Path]:
     """Return the files of the recordings among words."""
-    paths = [Path(root.path(word)) for word in words if is_recording(word, root)]
+    recordings = (word for word in words if is_recording(word, root) and not is_address(word))
+    paths = [Path(root.path(word)) for word in recordings]
     return [file for path in paths for file in (path.iterdir() if is_folder(path) else [path])]
 
 
 def expand(word: str) -> list[str]:
     """Return the paths that a word means, which may be a pattern such as `bags/*.mcap`."""
-    if has_magic(word) and not is_there(word):
+    if has_magic(word) and not is_there(word) and not is_address(word):
         return sorted(glob(word, recursive=True))  # noqa: PTH207 - keeps what was typed
     return [word]
 

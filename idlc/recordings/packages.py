@@ -43,9 +43,9 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
 def check_versions(groups: Sequence[Version], report: Report) -> None:
     """Report IDL653 for each name with several definitions."""
     for name, first, second in contradictions(groups):
-        message = f"this defines `{name}` in another way"
-        other = Label(Span(first, 0, 0), "this is the other")
-        hint = "choose topics that agree, or one recording after the other"
+        message = f"conflicting definition of `{name}`"
+        other = Label(Span(first, 0, 0), "first definition")
+        hint = "select topics with the same definition, or compile the recordings separately"
         here = Span(second, 0, 0)
         report.add(codes.SEVERAL_DEFINITIONS.at(here, message, labels=(other,), hint=hint))
 
@@ -57,8 +57,8 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
         if topic.hash and hash_ and topic.hash != hash_:
             yield codes.RECORDED_HASH_DIFFERS.of(
                 f"{typed.recorded.recording}: topic {topic.name}",
-                f"the definition of `{typed.name}` is not that of what was recorded",
-                hint=f"{including('DIR')} with the files that the publisher used",
+                f"the definition of `{typed.name}` differs from the publisher's type",
+                hint=f"{including('DIR')}, where DIR contains the publisher's files",
                 place=typed.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )
@@ -101,7 +101,7 @@ def recorded_packages(
         names = {package: set(types.library.interfaces(package)) for package in names}
     if not names:
         recordings = " or ".join(f"`{path}`" for path in paths)
-        message = f"no topic of {recordings} has a type that is known"
+        message = f"no topic of {recordings} has a known type"
         report.add(codes.NO_INTERFACES.of(paths[0], message))
     # packages that are installed here with more interfaces than were recorded
     hidden = [
@@ -113,8 +113,8 @@ def recorded_packages(
     ]
     if hidden:
         report.notes.append(
-            f"{first_few(hidden, NAMED)}: installed here with more than was recorded, which "
-            "programs do not see where what is written comes first on Python's path"
+            f"{first_few(hidden, NAMED)}: the installed package has more types than the "
+            "recording; the generated package hides them if it comes first on Python's path"
         )
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
     home = scope.root.absolute(paths[0])

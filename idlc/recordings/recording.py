@@ -14,13 +14,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, unread_reason
-from idlc.recordings.containers.messages import ALWAYS, Messages, Raw, Window, join_messages
+from idlc.recordings.containers.messages import (
+    ALWAYS,
+    Messages,
+    Raw,
+    Window,
+    join_messages,
+)
 from idlc.recordings.containers.source import RecordingError
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
     import pyarrow as pa
 
     from idlc.recordings.load import TopicType
+    from idlc.upgrading.library import Upgrade
 
 SECOND = 10**9
 #: A plain number below this counts seconds from the start of the recording, one above is a time of
@@ -45,7 +54,7 @@ _PART = re.compile(rf"({NUMBER})([hms])", re.ASCII)
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 _FRACTION = re.compile(r"(T\d\d:\d\d:\d\d|\s\d\d:\d\d:\d\d)\.(\d{1,9})")
 
-HINT = "write `10`, `1m30s`, a time of ROS such as `1700000000.5`, or a date in UTC"
+HINT = "write `10`, `1m30s`, a ROS time such as `1700000000.5`, or a UTC date"
 
 
 def moment(value: Any, start: Callable[[], int]) -> int:
@@ -113,13 +122,30 @@ def _text(text: str, start: Callable[[], int]) -> int:
         date = datetime.fromisoformat(re.sub(r"[zZ]$", "+00:00", plain))
         return _nanoseconds(date) + int(digits or 0)
     except (ValueError, OverflowError):
-        raise RecordingError(f"`{text}` is no time", HINT) from None
+        raise RecordingError(f"`{text}` is not a time", HINT) from None
 
 
 def _nanoseconds(date: datetime) -> int:
     """Return the nanoseconds since 1970; a date without a zone is in UTC."""
     date = date if date.tzinfo else date.replace(tzinfo=timezone.utc)
     return (date - _EPOCH) // timedelta(microseconds=1) * 1000
+
+
+class Reading(NamedTuple):
+    """A class that messages of earlier versions are read as, and the rules to run for it."""
+
+    kind: Any
+    rules: Any = None
+
+
+def readings(as_: Any, rules: Any) -> dict[str, Reading]:
+    """Return the class for each type's name, of one class or several."""
+    kinds = (as_,) if isinstance(as_, type) else tuple(as_)
+    if not kinds:
+        return {}
+    from idlc.runtime.typeinfo import structure_of
+
+    return {structure_of(kind).name: Reading(kind, rules) for kind in kinds}
 
 
 Kind = TypeVar("Kind")
@@ -153,16 +179,43 @@ class Selection:
 
     They are of the type that was recorded, compiled when it is first needed, unless a class that
     idlc generated is given; that must be of the same type as the recorded one. `include` are
-    folders in which types are looked for that the recording does not define.
+    folders in which types are looked for that the recording does not define. With `reading`, they
+    are converted to another version of the type first.
     """
 
-    def __init__(self, topic: Topic, include: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, topic: Topic, include: tuple[str, ...] = (), reading: Reading | None = None
+    ) -> None:
         self.topic = topic
         self.include = include
+        self.reading = reading
 
-    def batches(self) -> Iterator[Messages]:
+    def recorded(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
         raise NotImplementedError
+
+    def batches(self) -> Iterator[Messages]:
+        """Yield the messages, many at a time, in the version that they are read as."""
+        done = 0
+        for batch in self.recorded():
+            yield self._read_as(batch, done)
+            done += len(batch)
+
+    def _read_as(self, batch: Messages, first: int = 0) -> Messages:
+        """Return messages in the version that they are read as."""
+        if self.reading is None or self._upgrade.plan.same:
+            return batch
+        from idlc.upgrading.columns import Upgraded
+
+        times = batch.log_times, batch.publish_times
+        return Upgraded(*times, batch, self._upgrade, self.topic.name, first)
+
+    @cached_property
+    def _upgrade(self) -> Upgrade:
+        from idlc.upgrading.library import upgrade
+
+        assert self.reading is not None
+        return upgrade(self._type.kind, *self.reading)
 
     @cached_property
     def _type(self) -> TopicType:
@@ -172,14 +225,19 @@ class Selection:
 
     @property
     def kind(self) -> Any:
-        """The class of the messages, compiled from what was recorded."""
-        return self._type.kind
+        """The class of the messages, compiled from what was recorded unless it was given."""
+        return self._type.kind if self.reading is None else self.reading.kind
 
     def _source(self, kind: Any) -> Any:
         """Return what columns are read by: `kind` if it is of the recorded type, or that type."""
         if self.topic.encoding != CDR:
             what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
             raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+        if self.reading is not None:
+            if kind not in (None, self.reading.kind):
+                what = f"`{self.topic.name}` is read as {self.reading.kind.__name__}"
+                raise RecordingError(what, "omit the class")
+            return self.reading.kind
         if kind is None:
             return self._type.structure
         from idlc.recordings.load import check_class
@@ -217,16 +275,28 @@ class Selection:
         from idlc.recordings.columns import to_columns
 
         source = self._source(kind)
-        batch = join_messages(list(self.batches()))
-        with _at(self.topic, batch.views):
-            table = to_columns(source, batch, fields, True, datetimes)
+        recorded = join_messages(list(self.recorded()))
+        batch = self._read_as(recorded)
+        with _at(self.topic, recorded.views):
+            table = to_columns(source, batch, fields, True)
         times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
-        columns = {
-            name: values.view("M8[ns]") if datetimes else values
-            for name, values in times
-            if values is not None
-        }
-        return type(table)({**columns, **dict(table)}, len(table))
+        columns = {name: values for name, values in times if values is not None}
+        codes = {**dict.fromkeys(columns, "M8[ns]"), **table.times}
+        result = type(table)({**columns, **dict(table)}, len(table), codes)
+        return result.dated() if datetimes else result
+
+    def to_pandas(self, kind: Any = None, *, fields: Iterable[str] | None = None) -> pd.DataFrame:
+        """Return a table of pandas with columns such as "header.stamp" or "pose.position.x".
+
+        Times are datetime64[ns], in UTC but without a time zone; durations are timedelta64[ns].
+        """
+        frame: pd.DataFrame = self.to_columns(kind, fields=fields).to_pandas()
+        return frame
+
+    def to_polars(self, kind: Any = None, *, fields: Iterable[str] | None = None) -> pl.DataFrame:
+        """Return the same as a table of polars."""
+        frame: pl.DataFrame = self.to_columns(kind, fields=fields).to_polars()
+        return frame
 
     def to_arrow(self, kind: Any = None, **options: Any) -> pa.Table:
         """Return a table of Arrow: log_time, publish_time and the fields of the messages.
@@ -247,9 +317,9 @@ class Selection:
 
     def _tables(self, source: Any, options: Any) -> Iterator[pa.Table]:
         done = 0
-        for batch in self.batches():
+        for batch in self.recorded():
             with _at(self.topic, batch.views, done):
-                table = _table(source, options, batch)
+                table = _table(source, options, self._read_as(batch, done))
             yield table
             done += len(batch)
 
@@ -318,20 +388,22 @@ class Part(Selection):
         pieces: tuple[Any, ...],
         window: Window,
         include: tuple[str, ...] = (),
+        reading: Reading | None = None,
     ) -> None:
-        super().__init__(topic, include)
+        super().__init__(topic, include, reading)
         self.place = place
         self.ids = ids
         self.pieces = pieces
         self.window = window
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Part, (self.topic, self.place, self.ids, self.pieces, self.window, self.include)
+        where = self.place, self.ids, self.pieces, self.window
+        return Part, (self.topic, *where, self.include, self.reading)
 
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
 
-    def batches(self) -> Iterator[Messages]:
+    def recorded(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
         with closing(open_pieces(self.place)) as file:
             yield from file.messages(self.ids, self.pieces, self.window)
@@ -348,12 +420,21 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
     recording, a URL of an .mcap file that fsspec can open, or a file object. `notes` says what is
     unusual about it. Without `index`, summary and indexes of MCAP files are not used. `check`
     compares checksums. `include` are folders in which types are looked for that the recording does
-    not define, as those of ROS 2 Humble do not.
+    not define, as those of ROS 2 Humble do not. `as_` is a class, or several, that earlier versions
+    of its type are read as; `rules` are files and folders of rules that this runs.
     """
 
     def __init__(
-        self, path: Any, *, index: bool = True, check: bool = False, include: Iterable[str] = ()
+        self,
+        path: Any,
+        *,
+        index: bool = True,
+        check: bool = False,
+        include: Iterable[str] = (),
+        as_: Any = (),
+        rules: Any = None,
     ) -> None:
+        self._readings = readings(as_, rules)
         self._include = tuple(map(str, include))
         self._container: Container = open_recording(path, index=index, check=check)
         self._topics: dict[str, list[Topic]] = {}
@@ -380,7 +461,8 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         if len(topics) > 1:
             kinds = ", ".join(sorted({topic.type for topic in topics}))
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
-        return RecordedTopic(self._container, topics[0], ALWAYS, self._include)
+        reading = self._readings.get(topics[0].type)
+        return RecordedTopic(self._container, topics[0], ALWAYS, self._include, reading)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -412,9 +494,14 @@ class RecordedTopic(Selection):
     """The messages of one topic of an open recording."""
 
     def __init__(
-        self, container: Container, topic: Topic, window: Window, include: tuple[str, ...]
+        self,
+        container: Container,
+        topic: Topic,
+        window: Window,
+        include: tuple[str, ...],
+        reading: Reading | None = None,
     ) -> None:
-        super().__init__(topic, include)
+        super().__init__(topic, include, reading)
         self._container = container
         self._window = window
 
@@ -432,9 +519,9 @@ class RecordedTopic(Selection):
             None if time is None else moment(time, self._container.start) for time in (start, end)
         )
         window = self._window.narrowed(first, last)
-        return RecordedTopic(self._container, self.topic, window, self.include)
+        return RecordedTopic(self._container, self.topic, window, self.include, self.reading)
 
-    def batches(self) -> Iterator[Messages]:
+    def recorded(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
         return self._container.messages(self.topic, self._window)
 
@@ -443,8 +530,9 @@ class RecordedTopic(Selection):
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
+        how = self._window, self.include, self.reading
         return [
-            Part(self.topic, file.place, tuple(numbers), pieces, self._window, self.include)
+            Part(self.topic, file.place, tuple(numbers), pieces, *how)
             for file, numbers, _ in self._container.places(self.topic)
             for pieces in file.parts(numbers, self._window, size)
         ]

@@ -28,6 +28,7 @@ from idlc.recordings.containers.file import UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
+from idlc.robot.session import is_address
 from idlc.wire.layout import oversized
 
 #: The number of versions that a topic is compared with.
@@ -56,6 +57,11 @@ def read_topics(
     Reports name it by `path`, as the user wrote it. With `check`, topics that cannot be read are in
     `unread`.
     """
+    if is_address(path):
+        from idlc.robot.live.types import read_robot
+
+        robot = read_robot(path, report)
+        return None if robot is None else RecordingTopics(robot)
     place = root.path(path) if is_local(path) else path
     if not is_there(place):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
@@ -88,7 +94,7 @@ def topics_of(
     missing = [name for name in selected if name not in names]
     for name in missing:
         near = did_you_mean(name, names) or did_you_mean(f"/{name}", names)
-        hint = near or "`idlc show` lists the topics of a recording"
+        hint = near or "`idlc show` lists the topics"
         message = f"no topic `{name}` in {' or '.join(f'`{path}`' for path in paths)}"
         report.add(codes.NO_SUCH_TOPIC.of("", message, hint=hint))
     if missing:
@@ -162,10 +168,11 @@ class Contents:
 #: Names that are listed in a sentence.
 NAMED = 5
 #: The hint where a local definition is used instead of the recording's.
-BORROWED = "see to it that it is what was recorded, or point -I to it"
+BORROWED = "check that the local type equals the recorded type, or add the right folder with -I"
 #: Reasons why a definition is not the recording's.
-ABSENT, UNREADABLE = "there is no definition of", "there are errors in the definition of"
-WRONG = "the recorded hash is not that of the definition of"
+ABSENT, UNREADABLE = "the recording does not define", "there are errors in the definition of"
+WRONG = "the recorded hash does not match the definition of"
+_RECORDERS = "the recorder and the publisher used different versions of the interface files"
 
 
 class DefinedTopic(NamedTuple):
@@ -279,28 +286,31 @@ class RecordedTypes:
         for topic in version.topics:
             recorded, name, interface = topic.topic, topic.name, topic.interface
             schema = recorded.schema
+            reason = f" ({topic.problem})" if topic.problem else ""
             if not recorded.type:
-                why = "it has no type of ROS 2"
+                why = "its type is not a ROS 2 type"
             elif name is None or interface is None:
                 encoding = schema.encoding if schema else ""
-                what = f", but of {encoding}" if encoding not in ENCODINGS else ""
-                why = f"`{recorded.type}` is no type of ROS 2{what}"
+                what = f"; its encoding is {encoding}" if encoding not in ENCODINGS else ""
+                why = f"`{recorded.type}` is not a ROS 2 type{what}"
             elif interface not in self.texts and self._local.library.source(interface) is None:
-                why = f"there is no definition of `{interface}`"
+                why = f"{topic.origin} does not define `{interface}`{reason}"
             elif (
                 interface not in self.texts
                 and recorded.hash
                 and recorded.hash != self._local.hash(name, interface)
             ):
-                why = f"there is no definition of `{interface}`, and the one known here is another"
+                why = f"{topic.origin} does not define `{interface}`{reason}"
+                why += ", and the local type differs"
             else:
                 yield DefinedTopic(topic, name, interface)
                 continue
             missing.setdefault((topic.recording, why), []).append(recorded.name)
         for (recording, why), names in missing.items():
             listed = first_few((f"`{name}`" for name in names), NAMED)
-            hint = None if "no type of" in why else f"{including('DIR')} with the package's sources"
-            message = f"{listed} is left out: {why}"
+            advice = f"{including('DIR')}, where DIR contains the package's sources"
+            hint = None if "no type of" in why else advice
+            message = f"idlc skips {listed}: {why}"
             report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
 
     def _substitutions(self) -> Iterator[Diagnostic]:
@@ -318,10 +328,11 @@ class RecordedTypes:
                     doubtful.setdefault((typed.recorded.recording, why, sure), set()).add(name)
         for (recording, why, sure), undefined in doubtful.items():
             names = first_few((f"`{name}`" for name in sorted(undefined)), NAMED)
-            which = "has the recorded hash and" if sure else "by that name"
+            which = "the recorded hash" if sure else "the same name"
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
-            message = f"{why} {names}; what is known here {which} is used"
-            yield code.of(recording, message, hint=None if sure else BORROWED)
+            message = f"{why} {names}; idlc uses the local type, which has {which}"
+            hint = _RECORDERS if why == WRONG else None
+            yield code.of(recording, message, hint=hint if sure else BORROWED)
 
     def names_of(self, topic: DefinedTopic) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of, without those that ROS 2 adds."""

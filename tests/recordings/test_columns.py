@@ -8,6 +8,7 @@ import subprocess
 import sys
 from base64 import b64decode
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
@@ -106,7 +107,7 @@ def test_a_name_may_stand_for_topics_of_several_types(here, capfd):
 def test_a_folder_of_bags_is_none(here, capfd):
     made.by_rosbags(here / "bags/first", MESSAGES, "db3")
     assert run("bags", "/imu", "-o", "a.csv") == 1
-    assert "name a bag in it, such as `bags/first`" in capfd.readouterr().err
+    assert "pass a bag in it, such as `bags/first`" in capfd.readouterr().err
     assert run("nothing_*.mcap", "-o", "a.csv") == 1
     assert "`nothing_*.mcap` cannot be read" in capfd.readouterr().err
 
@@ -146,10 +147,10 @@ def test_several_topics_go_to_a_folder_or_to_names_of_their_own(recording, here)
     ("words", "status", "said"),
     [
         (["/im", "-o", "a.csv"], 2, "did you mean `/imu`?"),
-        (["/imu", "-o", "a.txt"], 2, "does not say which format is meant"),
+        (["/imu", "-o", "a.txt"], 2, "has no extension of a known format"),
         (["/imu", "/joints", "-o", "a.csv"], 2, "/imu, /joints cannot all go to `a.csv`"),
         (["/imu", "/joints"], 2, "cannot all go to standard output"),
-        (["/imu", "--from", "soon", "-o", "a.csv"], 1, "`soon` is no time"),
+        (["/imu", "--from", "soon", "-o", "a.csv"], 1, "`soon` is not a time"),
         (["/imu", "--fields", "nothing", "-o", "a.csv"], 2, "Imu has no field 'nothing'"),
         (["/imu", "-o", "rec.mcap/a.csv"], 1, "cannot be written"),
     ],
@@ -259,3 +260,159 @@ def test_a_topic_that_cannot_be_read_does_not_keep_others_from_being_written(her
         "camera.image.parquet",
         "joints.parquet",
     }
+
+
+# previews
+
+
+def floats(topic, numbers, type_="std_msgs/msg/Float64", step=made.SECOND // 10):
+    return [
+        made.Recorded(topic, type_, time, time, bytes(made.STORE.serialize_cdr(message, type_)))
+        for index, number in enumerate(numbers)
+        for time in [made.START + index * step]
+        for message in [made.kind(type_)(number)]
+    ]
+
+
+def shown(capfd, *words):
+    assert run(*words, "--format", "text") == 0
+    captured = capfd.readouterr()
+    assert captured.err == ""
+    return captured.out
+
+
+def test_a_preview_has_first_rows_and_a_chart_of_each_number(recording, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    text = shown(capfd, recording, "/imu")
+    lines = text.splitlines()
+    assert lines[0] == "/imu  sensor_msgs/msg/Imu  20 messages in 5.7 s"
+    assert max(map(len, lines)) <= 80
+    frame = table(recording, "/imu").to_pandas()
+    rows = {line.split()[0]: line for line in lines if line}
+    turned = frame["angular_velocity.z"]
+    *stats, chart = rows["angular_velocity.z"].split()[1:]
+    assert stats == [f"{value:.5g}" for value in (turned.min(), turned.mean(), turned.max())]
+    assert len(chart) == 10
+    assert set(chart) <= set("▁▂▃▄▅▆▇█")
+    first = next(line for line in lines if line.startswith("angular_velocity.z"))
+    assert first.split()[1] == f"{turned[0]},"
+    assert "orientation_covariance" not in text.partition("numbers over time")[2]
+
+
+def test_a_single_column_of_numbers_has_a_larger_chart(here, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    rising = made.by_mcap(here / "rec.mcap", floats("/x", [number / 7 for number in range(1000)]))
+    text = shown(capfd, rising, "/x")
+    bars = text.splitlines()[-9:-1]
+    heights = [sum(line[at : at + 1] in {*"▁▂▃▄▅▆▇█"} for line in bars) for at in range(60)]
+    assert heights == sorted(heights)
+    assert (heights[0], heights[-1]) == (1, 8)
+    assert text.splitlines()[-1].split() == ["0", "99.9", "s"]
+    assert "0, 0.14285714285714285, 0.285714" in text
+
+
+@pytest.mark.parametrize("size", [1, 7, 400])
+def test_a_chart_of_recordings_that_come_in_another_order(size, here, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    rising = floats("/x", range(1200))
+    parts = [rising[at : at + size] for at in range(0, len(rising), size)]
+    backwards = [message for part in reversed(parts) for message in part]
+    for name, messages in {"sorted": rising, "other": backwards}.items():
+        made.by_mcap(here / f"{name}.mcap", messages, chunk_size=1000)
+    text = shown(capfd, "other.mcap", "/x")
+    assert text.startswith("/x  std_msgs/msg/Float64  1,200 messages in 119.9 s\n")
+    heights = [
+        sum(line[at : at + 1] in {*"▁▂▃▄▅▆▇█"} for line in text.splitlines()[-9:-1])
+        for at in range(60)
+    ]
+    assert heights == sorted(heights)
+    assert (heights[0], heights[-1]) == (1, 8)
+
+
+def test_a_preview_fits_a_narrow_terminal(recording, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
+    first, _, rest = shown(capfd, recording, "/imu").partition("\n")
+    rows = rest.partition("numbers")[0].splitlines()[2:]
+    assert max(map(len, rows)) == 20
+    assert first.startswith("/imu  sensor_msgs/msg/Imu  20 messages")
+
+
+INF, NAN = float("inf"), float("nan")
+
+
+@pytest.mark.parametrize(
+    ("numbers", "expected"),
+    [
+        ([NAN, INF, -INF, 5.0], "5          5          5  3 not finite"),
+        ([1e308, -1e308, 1.7e308, -1.7e308], "-1.7e+308"),
+        ([5e-324, 0.0], "4.9407e-324"),
+        ([-1.2345e-300, -2.3456e-300], "-2.3456e-300 -1.79e-300 -1.2345e-300"),
+        ([3.0], "3          3          3"),
+        ([3.0] * 50, "3          3          3"),
+    ],
+)
+def test_a_chart_of_odd_numbers(numbers, expected, here, capfd):
+    text = shown(capfd, made.by_mcap(here / "rec.mcap", floats("/x", numbers)), "/x")
+    assert expected in text
+    assert "▁" in text
+
+
+def test_numbers_that_are_never_finite_and_topics_without_messages(here, capfd):
+    made.by_mcap(here / "nan.mcap", floats("/x", [NAN, INF]))
+    assert "numbers over time" not in shown(capfd, "nan.mcap", "/x")
+    recorded_text.write("none.mcap", "@ /x a_msgs/msg/A\nint8 a\n")
+    text = shown(capfd, "none.mcap", "/x")
+    assert text.startswith("/x  a_msgs/msg/A  0 messages\n")
+
+
+def test_a_preview_of_integers_bools_and_times_that_go_astray(here, capfd):
+    messages = [
+        *floats("/int", [2**63 - 1, -(2**63)], "std_msgs/msg/Int64"),
+        *floats("/bool", [True, False, True, True], "std_msgs/msg/Bool"),
+    ]
+    times = [0, 2**63 - 1, 5, made.START]
+    messages[2:] = [
+        each._replace(log_time=time) for each, time in zip(messages[2:], times, strict=True)
+    ]
+    made.by_mcap(here / "rec.mcap", messages)
+    assert "9223372036854775807, -9223372036854775808" in shown(capfd, "rec.mcap", "/int")
+    text = shown(capfd, "rec.mcap", "/bool")
+    assert "4 messages in 9.22337e+09 s" in text
+    assert "0.75" in text
+
+
+def test_a_preview_shows_no_control_characters(here, capfd):
+    text = "\x1b[31m\r\n\u202e日本" * 30
+    name = "/\x1b]0;title\x07"
+    made.by_mcap(here / "rec.mcap", floats(name, [text], "std_msgs/msg/String"))
+    output = shown(capfd, "rec.mcap")
+    assert not {*output} & {*"\x1b\r\x07\u202e"}
+    assert output.startswith("/␛]0;title␇  std_msgs/msg/String  1 message\n")
+
+
+def test_a_preview_goes_to_a_terminal_and_not_to_a_file(recording, capfd):
+    pty = pytest.importorskip("pty")
+    leader, follower = pty.openpty()
+    command = [sys.executable, "-m", "idlc", "columns", str(recording), "/imu", "/joints"]
+    done = subprocess.run(command, stdout=follower, stderr=subprocess.PIPE, check=True)
+    os.close(follower)
+    received = os.read(leader, 1 << 16).decode()
+    os.close(leader)
+    assert received.startswith("/imu  sensor_msgs/msg/Imu  20 messages in 5.7 s\r\n")
+    assert "/joints  sensor_msgs/msg/JointState" in received
+    assert not done.stderr
+    assert run(recording, "/imu", "--format", "text", "-o", "a.txt") == 2
+    assert "`--format text` writes no file" in capfd.readouterr().err
+
+
+def test_a_preview_shows_bytes_and_durations_with_their_units(here, capfd):
+    letters = np.arange(97, 113, dtype=np.uint8)
+    identifiers = floats("/id", [letters], "unique_identifier_msgs/msg/UUID")
+    type_, none = "trajectory_msgs/msg/JointTrajectoryPoint", np.zeros(0)
+    wait = made.kind("builtin_interfaces/msg/Duration")(sec=1, nanosec=500_000_000)
+    point = made.kind(type_)(none, none, none, none, time_from_start=wait)
+    data = bytes(made.STORE.serialize_cdr(point, type_))
+    points = [made.Recorded("/point", type_, made.START, made.START, data)]
+    made.by_mcap(here / "rec.mcap", [*identifiers, *points])
+    assert "0x6162636465666768696a6b6c6d6e6f70" in shown(capfd, "rec.mcap", "/id")
+    assert "1.5 s" in shown(capfd, "rec.mcap", "/point")

@@ -81,7 +81,7 @@ def test_a_bag_has_the_files_that_its_metadata_names(tmp_path):
     bag = made.by_rosbags(tmp_path / "bag", MESSAGES, "mcap")
     shutil.copy(bag / "bag.mcap", bag / "other.mcap")
     with open_recording(bag) as container:
-        assert container.notes == ("`other.mcap` is not named in metadata.yaml and left out",)
+        assert container.notes == ("idlc skips `other.mcap`: metadata.yaml does not list it",)
     expected(topics(bag), hashes=False)
 
 
@@ -106,11 +106,11 @@ def test_a_truncated_file_is_read_to_its_last_whole_chunk_and_says_so(compressio
     ("content", "message"),
     [
         (b"", "is empty"),
-        (b"\x89MC", "is no recording"),
-        (b"#ROSBAG V2.0\n", "is no recording"),
-        (b"\x28\xb5\x2f\xfd....", "is no recording"),
+        (b"\x89MC", "is not an MCAP or .db3 recording"),
+        (b"#ROSBAG V2.0\n", "is not an MCAP or .db3 recording"),
+        (b"\x28\xb5\x2f\xfd....", "is not an MCAP or .db3 recording"),
         (b"SQLite format 3\0", "cannot be read"),
-        (b"hello", "is no recording"),
+        (b"hello", "is not an MCAP or .db3 recording"),
     ],
 )
 def test_other_files_are_refused(content, message, tmp_path):
@@ -123,16 +123,16 @@ def test_other_files_are_refused(content, message, tmp_path):
 def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(RecordingError, match="No such file"):
         open_recording(tmp_path / "a.mcap")
-    with pytest.raises(RecordingError, match="holds no recording"):
+    with pytest.raises(RecordingError, match="contains no recording"):
         open_recording(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("statement", "message"),
     [
-        ("CREATE VIEW v AS SELECT 1", "holds a view"),
-        ("CREATE TRIGGER t AFTER INSERT ON topics BEGIN SELECT 1; END", "holds a trigger"),
-        ("CREATE VIRTUAL TABLE t USING fts5(a)", "holds a virtual table"),
+        ("CREATE VIEW v AS SELECT 1", "contains a view"),
+        ("CREATE TRIGGER t AFTER INSERT ON topics BEGIN SELECT 1; END", "contains a trigger"),
+        ("CREATE VIRTUAL TABLE t USING fts5(a)", "contains a virtual table"),
         ("ALTER TABLE messages ADD COLUMN a AS (zeroblob(1000000000))", "are computed"),
         ("ALTER TABLE messages ADD COLUMN RowId INTEGER", "is called rowid"),
         ("DROP TABLE messages", "no table of messages"),
@@ -213,15 +213,15 @@ def test_metadata_in_every_style_of_yaml(names, version, style, tmp_path):
     path.write_bytes(yaml.dump(meta, **style).encode("utf-16" if version == 9 else "utf-8"))
     with open_recording(path.parent) as container:
         assert [Path(one.name).name for one in container.files] == names
-        assert container.notes == ("`other.mcap` is not named in metadata.yaml and left out",)
+        assert container.notes == ("idlc skips `other.mcap`: metadata.yaml does not list it",)
 
 
 @pytest.mark.parametrize(
     ("text", "note"),
     [
-        (yaml.dump({"shared": NAMES[:3], **information(NAMES[:3])}), "not named"),
-        ("{[\nrosbag2", "` is not YAML: all files of the folder are read"),
-        ("a: &a [" + "[" * 5000, "nests more than 100 levels"),
+        (yaml.dump({"shared": NAMES[:3], **information(NAMES[:3])}), "not list it"),
+        ("{[\nrosbag2", "` is not YAML; idlc reads all files in the folder"),
+        ("a: &a [" + "[" * 500, "nests more than 100 levels"),
         ("a: \udcff", "is not YAML"),
         ("%YAML 9.9\n---\n", ""),
         ("a: !!python/object/apply:os.system [exit]", ""),

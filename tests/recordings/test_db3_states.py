@@ -166,7 +166,7 @@ def test_a_hot_journal_is_an_error_that_says_what_to_do(how, tmp_path, capsys):
         assert main([words[0], str(path), *words[1:]]) != 0
         said = "".join(capsys.readouterr())
         assert "IDL651" in said
-        assert "its writer stopped in the middle of a transaction" in said
+        assert "its writer stopped within a transaction" in said
         assert "sqlite3 " in said
     path.parent.chmod(0o700)
     assert not (tmp_path / "x.csv").exists()
@@ -184,7 +184,7 @@ def test_a_writer_at_work(journal, tmp_path, monkeypatch):
         if journal == "WAL":
             assert found == list(range(60))
         else:
-            assert "is locked by the program that writes it" in found.message
+            assert "is locked by the program that is writing it" in found.message
         database.execute("COMMIT")
         assert read(path) == [-1] * 60
 

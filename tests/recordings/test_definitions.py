@@ -286,14 +286,17 @@ RIGHT = recorded_text.right_hash("std_msgs/msg/String")
 
 
 @pytest.mark.parametrize("encoding", ["ros2msg", "ros2idl"])
-@pytest.mark.parametrize(("hash_", "said"), [(RIGHT, "has the recorded hash"), (None, "by that")])
+@pytest.mark.parametrize(("hash_", "said"), [(RIGHT, "the recorded hash"), (None, "the same name")])
 def test_what_has_errors_is_what_is_known_here(encoding, hash_, said):
     types, report = types_of(topic("std_msgs/msg/String", BROKEN, encoding, hash_))
     assert types.hash(types.topics[0]) == RIGHT
     assert not types.errors.had_errors
     (told,) = report
     assert told.code == "IDL652"
-    assert "errors in the definition of `std_msgs/msg/String`; what is known here" in told.message
+    assert (
+        "errors in the definition of `std_msgs/msg/String`; idlc uses the local type"
+        in told.message
+    )
     assert said in told.message
 
 

@@ -174,16 +174,16 @@ def test_a_recording_goes_with_other_inputs(tmp_path, monkeypatch):
 def test_topics_are_those_of_recordings(tmp_path, capsys):
     (tmp_path / "A.msg").write_text("int8 a\n", encoding="utf-8")
     assert main(["gen", str(tmp_path), "-o", str(tmp_path / "out"), "--topic", "/x"]) == 2
-    assert "--topic is for recordings" in capsys.readouterr().err
+    assert "--topic needs a recording" in capsys.readouterr().err
     assert main(["show", "std_msgs/msg/Header", "/x"]) == 2
-    assert "is no recording" in capsys.readouterr().err
+    assert "is not a recording" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [["a.mcap"], ["std_msgs/msg/Header"], ["std_msgs", "a.mcap"]])
 def test_what_has_a_name_gets_no_other(words, here, capsys):
     recorded_text.write("a.mcap", "@ /x a_msgs/msg/A\nint8 a\n")
     assert main(["gen", *words, "-o", "out", "--package", "other"]) == 2
-    assert "--package is for files, and none was given" in capsys.readouterr().err
+    assert "--package applies to files, but" in capsys.readouterr().err
     assert not (here / "out").exists()
     (here / "msg").mkdir()
     (here / "msg/B.msg").write_text("std_msgs/Header a\n", encoding="utf-8")

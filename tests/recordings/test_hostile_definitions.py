@@ -5,7 +5,9 @@ import json
 from pathlib import Path
 
 import pytest
+from mcap.writer import Writer
 
+import idlc
 from idlc.cli.main import main
 from tests.support import recorded_text
 from tests.support.generated import class_of, importable
@@ -156,3 +158,34 @@ def test_a_bag_of_ros_1_is_told_from_others(tmp_path, capsys):
     path.write_bytes(b"#ROSBAG V2.0\n" + bytes(100))
     assert main(["show", str(path)]) == 1
     assert "rosbags-convert" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("fields", "values"),
+    [
+        ("float64 sec\nfloat64 nanosec", {"sec": 0.0, "nanosec": 0.0}),
+        ("uint32 nanosec\nint32 sec", {"nanosec": 0, "sec": 0}),
+        ("uint64 sec\nuint64 nanosec", {"sec": 0, "nanosec": 0}),
+        ("string sec\nuint32 nanosec", {"sec": "", "nanosec": 0}),
+        ("int32 sec\nuint32 nanosec\nint32 more", {"sec": 0, "nanosec": 0, "more": 0}),
+    ],
+)
+def test_other_types_of_the_name_of_times_are_no_times(fields, values, tmp_path, capsys):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        end = f"\n{'=' * 80}\nMSG: builtin_interfaces/Time\n"
+        schema = writer.register_schema(
+            "a/msg/A", "ros2msg", f"builtin_interfaces/Time t{end}{fields}\n".encode()
+        )
+        channel = writer.register_channel("/x", "cdr", schema)
+        writer.add_message(channel, 0, b"\0\1" + bytes(18), 0)
+        writer.finish()
+    with idlc.Recording(path) as recording:
+        frame = recording["/x"].to_pandas()
+    assert frame.iloc[:, 2:].to_dict("records") == [
+        {f"t.{name}": value for name, value in values.items()}
+    ]
+    assert main(["columns", str(path), "/x", "--format", "text"]) == 0
+    assert "t.nanosec" in capsys.readouterr().out

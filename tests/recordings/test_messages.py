@@ -159,7 +159,7 @@ def test_an_index_that_leaves_messages_out_is_a_lie(tmp_path):
     chunk.content[at : at + 8] = pack("<Q", told - 16)
     path.write_bytes(mcap_mutations.joined(parts, up_to_date=True))
     for window in ((None, None), (None, made.START), (made.START, None)):
-        what = "20 messages of `/imu` are counted, and there are 19"
+        what = "the index lists 20 messages of `/imu`, but the file has 19"
         with pytest.raises(RecordingError, match=what):
             read(path, "/imu", window)
     assert read(path, "/imu", index=False) == recorded("/imu")

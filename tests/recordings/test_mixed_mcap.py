@@ -203,7 +203,7 @@ def test_an_id_that_is_defined_in_two_ways_is_an_error(what, chunked, tmp_path):
     else:
         file.data += DEFINED.replace(*changed)
     path.write_bytes(file.data)
-    with pytest.raises(RecordingError, match=f"{what} is defined in two ways"):
+    with pytest.raises(RecordingError, match=f"{what} has two different definitions"):
         open_recording(path)
 
 

@@ -169,15 +169,15 @@ def test_what_a_recording_does_not_define_is_looked_for_and_that_is_said(tmp_pat
     """As with recordings of Humble, in which there are no definitions and no hashes."""
     path = recorded_text.write(tmp_path / "a.mcap", "@ /x own_msgs/msg/Pair unknown\n", {"/x": 2})
     assert main(["columns", str(path), "-o", str(tmp_path / "a.csv")]) == 1
-    assert "there is no definition of `own_msgs/msg/Pair`" in capfd.readouterr().err
+    assert "the recording does not define `own_msgs/msg/Pair`" in capfd.readouterr().err
     (tmp_path / "own_msgs" / "msg").mkdir(parents=True)
     (tmp_path / "own_msgs" / "msg" / "Pair.msg").write_text("int8 a", encoding="utf-8")
     words = ("-I", str(tmp_path / "own_msgs"))
     assert main(["columns", str(path), "-o", str(tmp_path / "a.csv"), *words]) == 0
-    assert "warning[IDL652]: `/x`: there is no definition" in capfd.readouterr().err
+    assert "warning[IDL652]: `/x`: the recording does not define" in capfd.readouterr().err
     with idlc.Recording(path, include=[tmp_path]) as opened:
         (part,) = opened["/x"].parts()
-        with pytest.warns(UserWarning, match="no definition of `own_msgs/msg/Pair`"):
+        with pytest.warns(UserWarning, match="not define `own_msgs/msg/Pair`"):
             assert pickle.loads(pickle.dumps(part)).to_arrow().num_rows == 2
     with (
         idlc.Recording(path, include=["nowhere"]) as opened,

@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
 def run(folder, *words):
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     env = {**os.environ, "PYTHONPATH": path, "DO_NOT_TRACK": "1", "DAFT_ANALYTICS_ENABLED": "0"}
-    env["MPLBACKEND"] = "agg"
+    env |= {"MPLBACKEND": "agg", "COLUMNS": "88"}
     command = [sys.executable, *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, env=env)
     assert done.returncode == 0, done.stderr
@@ -44,7 +44,10 @@ def run(folder, *words):
 
 def test_commands_and_programs_do_what_the_page_says(folder):
     for command in COMMANDS:
-        run(folder, "-m", *command.split())
+        if command.startswith("idlc columns") and "-o" not in command:
+            assert run(folder, "-m", *command.split(), "--format", "text") in PAGE
+        else:
+            run(folder, "-m", *command.split())
     described, read, counted, loaded, averaged = (
         run(folder, "-c", code + AT_ONCE * ("daft" in code)) for code in ALONE
     )
@@ -85,6 +88,35 @@ def test_a_cluster_that_loses_a_worker_finds_what_one_process_finds(folder):
     assert marker.exists()
     assert pa.concat_tables(tables).equals(pa.concat_tables(alone))
     assert pa.concat_tables(tables).num_rows == 300
+
+
+def test_parts_on_a_cluster_are_read_as_the_new_type(folder):
+    """As in one process, with the class from a folder that each worker loads."""
+    from dask.distributed import Client
+
+    package = folder / "sensor_msgs"
+    (package / "msg").mkdir(parents=True)
+    text = "int8 added 5\nstd_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
+    (package / "msg" / "Imu.msg").write_text(text, encoding="utf-8")
+    new = idlc.load(str(package)).Imu
+    made.by_mcap(folder / "old.mcap", made.messages(300), chunk_size=20_000)
+    with idlc.Recording(folder / "old.mcap", as_=new) as recording:
+        topic = recording["/imu"]
+        parts, whole = topic.parts(5_000), topic.to_arrow()
+        added = topic.to_columns(fields=["added", "orientation.x"])
+    assert len(parts) >= 4
+    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+        client.run(sys.path.insert, 0, str(ROOT))
+        tables = client.gather(client.map(to_arrow, parts, pure=False))
+    assert pa.concat_tables(tables).equals(whole)
+    assert added["added"].tolist() == [5] * 100
+    assert added["orientation"]["x"].tolist() == [
+        row["x"] for row in whole["orientation"].to_pylist()
+    ]
+
+
+def to_arrow(part):
+    return part.to_arrow()
 
 
 #: The program for Ray, over two files, while a worker of two dies with a part.

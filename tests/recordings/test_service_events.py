@@ -65,7 +65,7 @@ def test_the_same_interfaces_break_nothing(said):
         words = ["breaking", FOLDER / "kit_msgs", "--package", "kit_msgs", "--against", BAG, *level]
         status, text = said(*words)
         assert status == 0, text
-        assert "nothing breaks" in text
+        assert "no breaking changes" in text
 
 
 def test_check_gen_and_columns_of_all_topics(said, tmp_path):
@@ -87,7 +87,7 @@ def test_a_definition_of_another_hash_gives_way_to_the_known_type(said, tmp_path
     path = rewritten(tmp_path / "a.mcap", without_idl)
     with idlc.Recording(path, include=[str(FOLDER)]) as recording, idlc.Recording(BAG) as sound:
         with pytest.warns(
-            UserWarning, match="the recorded hash is not that of the definition of `kit"
+            UserWarning, match="the recorded hash does not match the definition of `kit"
         ):
             found = recording[ASK].to_arrow()
         assert found.equals(sound[ASK].to_arrow())
@@ -103,16 +103,16 @@ def test_a_definition_of_another_hash_gives_way_to_the_known_type(said, tmp_path
     ]
     status, text = said(*words)
     assert status == 0, text
-    assert "nothing breaks" in text
+    assert "no breaking changes" in text
     _, text = said("check", path, "-I", FOLDER)
     assert "IDL654" in text
-    assert "what is known here has the recorded hash and is used" in text
+    assert "idlc uses the local type, which has the recorded hash" in text
 
 
 def test_an_empty_definition_within_another_gives_way_to_the_known_type(said, tmp_path):
     path = rewritten(tmp_path / "a.mcap", without_idl, hashes=False)
     with idlc.Recording(path, include=[str(FOLDER)]) as recording, idlc.Recording(BAG) as sound:
-        with pytest.warns(UserWarning, match="there is no definition of `kit_msgs/msg/Branch`"):
+        with pytest.warns(UserWarning, match="the recording does not define `kit_msgs/msg/Branch`"):
             found = recording[ASK].to_arrow()
         assert found.equals(sound[ASK].to_arrow())
 
@@ -121,7 +121,7 @@ def test_a_definition_of_another_hash_is_told_where_nothing_else_is_known(said, 
     path = rewritten(tmp_path / "a.mcap", without_idl)
     _, text = said("check", path)
     assert "IDL654" in text
-    assert "add `-I DIR` with the files that the publisher used" in text
+    assert "add `-I DIR`, where DIR contains the publisher's files" in text
 
 
 def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path):
@@ -132,15 +132,15 @@ def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path)
     with idlc.Recording(path, include=[str(FOLDER)]) as recording:
         assert recording["/empty"].to_arrow().column_names == ["log_time", "publish_time"]
     _, text = said("show", path, "/empty")
-    assert "`/empty` is left out: there is no definition of `kit_msgs/msg/Empty`" in text
-    assert "add `-I DIR` with the package's sources" in text
-    no_definition = pytest.raises(RecordingError, match="there is no definition")
+    assert "idlc skips `/empty`: the recording does not define `kit_msgs/msg/Empty`" in text
+    assert "add `-I DIR`, where DIR contains the package's sources" in text
+    no_definition = pytest.raises(RecordingError, match="the recording does not define")
     with idlc.Recording(path) as recording, no_definition:
         recording["/empty"].to_arrow()
     path = rewritten(tmp_path / "b.mcap", lambda text: "" if "float" in text else text)
     with idlc.Recording(path) as recording:
         assert recording["/empty"].to_arrow().num_rows == 15
-        with pytest.raises(RecordingError, match="there is no definition"):
+        with pytest.raises(RecordingError, match="the recording does not define"):
             recording["/plain"].to_arrow()
 
 

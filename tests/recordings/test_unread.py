@@ -12,14 +12,14 @@ from tests.recordings.test_containers import LEAVES_OUT
 from tests.support import recordings as made
 
 SENTENCES = {
-    **dict.fromkeys(["0002", "0003"], "are written as PL_CDR (XCDR1)"),
-    **dict.fromkeys(["0006", "0007"], "are written as PLAIN_CDR2 (XCDR2)"),
-    **dict.fromkeys(["0008", "0009"], "are written as DELIMITED_CDR2 (XCDR2)"),
-    **dict.fromkeys(["000a", "000b"], "are written as PL_CDR2 (XCDR2)"),
-    "04224d18": "are each compressed with lz4",
-    "1f8b0800": "are each compressed with gzip",
-    "425a6839": "are each compressed with bzip2",
-    "fd377a585a00": "are each compressed with xz",
+    **dict.fromkeys(["0002", "0003"], "are encoded as PL_CDR (XCDR1)"),
+    **dict.fromkeys(["0006", "0007"], "are encoded as PLAIN_CDR2 (XCDR2)"),
+    **dict.fromkeys(["0008", "0009"], "are encoded as DELIMITED_CDR2 (XCDR2)"),
+    **dict.fromkeys(["000a", "000b"], "are encoded as PL_CDR2 (XCDR2)"),
+    "04224d18": "are compressed with lz4",
+    "1f8b0800": "are compressed with gzip",
+    "425a6839": "are compressed with bzip2",
+    "fd377a585a00": "are compressed with xz",
 }
 OTHERS = ["", "00", "0001", "0000", "0004", "04224d17", "28b52ffd"]
 
@@ -50,7 +50,7 @@ def test_topics_that_cannot_be_read_are_noted(start, notes, tmp_path):
     path = made.by_mcap(tmp_path / "a.mcap", messages(start), chunk_size=3000)
     for command in ("show", "check"):
         (note,) = notes(path, command)
-        assert f": messages of `/imu` {SENTENCES[start]}, and idlc reads only" in note
+        assert f": messages of `/imu` {SENTENCES[start]}, but idlc reads only" in note
 
 
 def test_the_page_of_the_code_shows_the_warning(tmp_path, capsys, monkeypatch):

@@ -110,17 +110,10 @@ class Numbers(NamedTuple):
 
 
 class Struct(NamedTuple):
-    """Columns by name."""
+    """Columns by name; `times` has numpy's code of those that are times or durations."""
 
     fields: dict[str, Node]
-
-
-class Instant(NamedTuple):
-    """A time or duration, of which numpy makes one number."""
-
-    code: str
-    seconds: Numbers
-    nanoseconds: Numbers
+    times: dict[str, str]
 
 
 class Lists(NamedTuple):
@@ -135,17 +128,7 @@ class Lists(NamedTuple):
     element: Node
 
 
-Node = Numbers | Text | Struct | Instant | Lists
-
-
-def flat_nodes(node: Node, name: str = "") -> dict[str, Node]:
-    """Return all nodes that are no Struct, by names such as "header.stamp.sec"."""
-    if not isinstance(node, Struct):
-        return {name: node}
-    result: dict[str, Node] = {}
-    for field, inner in node.fields.items():
-        result |= flat_nodes(inner, f"{name}.{field}" if name else field)
-    return result
+Node = Numbers | Text | Struct | Lists
 
 
 # the plan of a type
@@ -159,13 +142,21 @@ NOTHING: dict[str, Any] = {}
 
 #: Times that can become numpy's: by their type, what numpy calls the result.
 INSTANTS = {"builtin_interfaces/msg/Time": "M8[ns]", "builtin_interfaces/msg/Duration": "m8[ns]"}
+#: Their fields, with type ids: a recording may define something else by these names.
+_SECONDS = [("sec", 6), ("nanosec", 7)]
+
+
+def _code_of_time(structure: Structure) -> str | None:
+    """Return numpy's code of a time or duration, `None` for other types."""
+    fields = [(field.name, field.type_id) for field in structure.fields]
+    return INSTANTS.get(structure.name) if fields == _SECONDS else None
 
 
 @lru_cache(maxsize=64)
-def plan_of(structure: Structure, fields: tuple[str, ...] | None, datetimes: bool) -> Level:
+def plan_of(structure: Structure, fields: tuple[str, ...] | None) -> Level:
     """Return the plan of a type; raise ValueError for a field that it does not have."""
     wanted = None if fields is None else _selection(structure, fields)
-    builder = _Builder(count(), datetimes, aligned=8)
+    builder = _Builder(count(), aligned=8)
     level = builder.level
     level.node = builder.structure(structure, wanted)
     # what comes after the last column matters to nobody
@@ -201,9 +192,8 @@ class _Builder:
     The next value begins at `at` modulo `aligned`; nothing more is known of its position.
     """
 
-    def __init__(self, keys: Any, datetimes: bool, aligned: int = 1) -> None:
+    def __init__(self, keys: Any, aligned: int = 1) -> None:
         self.keys = keys
-        self.datetimes = datetimes
         self.level = Level(next(keys))
         self.segment: Segment | None = None
         self.aligned = aligned
@@ -214,12 +204,16 @@ class _Builder:
         if not structure.fields:
             self.place(1, 1)
         nodes: dict[str, Node] = {}
+        times: dict[str, str] = {}
         for field in structure.fields:
             inner = None if wanted is None else wanted.get(field.name, NOTHING)
             node = self.field(field, inner)
             if inner != NOTHING:
                 nodes[field.name] = node
-        return Struct(nodes)
+            code = _code_of_time(field.nested) if inner is None and field.nested else None
+            if code:
+                times[field.name] = code
+        return Struct(nodes, times)
 
     def field(self, field: FieldInfo, wanted: Wanted) -> Node:
         """Plan a field."""
@@ -227,7 +221,7 @@ class _Builder:
             return self.element(field, wanted)
         if field.primitive is not None and field.size is not None:
             return self.numbers(field, wanted, field.size)
-        inside = _Builder(self.keys, self.datetimes)
+        inside = _Builder(self.keys)
         level = inside.level
         level.node = inside.element(field, wanted)
         packed = level.packed
@@ -246,11 +240,7 @@ class _Builder:
     def element(self, field: FieldInfo, wanted: Wanted) -> Node:
         """Plan a single value."""
         if field.nested:
-            struct = self.structure(field.nested, wanted)
-            code = INSTANTS.get(field.nested.name)
-            if code is None or not self.datetimes or wanted is not None:
-                return struct
-            return Instant(code, *struct.fields.values())  # type: ignore[arg-type]
+            return self.structure(field.nested, wanted)
         if field.primitive is not None:
             return self.numbers(field, wanted)
         text = Text(None if wanted == NOTHING else next(self.keys), field.wide)

@@ -20,6 +20,7 @@ from idlc.recordings.columns.scan import (
 )
 from idlc.recordings.columns.source import Flat, Pieces, Source
 from idlc.recordings.columns.table import Elements, Table
+from idlc.recordings.columns.values import Columns
 from idlc.runtime.cdr import order_of
 from idlc.runtime.names import DecodeError, owner_of
 from idlc.runtime.typeinfo import CarefulReader, Structure, structure_of
@@ -76,9 +77,14 @@ def to_columns(
     datetimes: bool = False,
 ) -> Any:
     """Return Columns with a row for each message, or without `ragged` what was returned before."""
-    table, top = table_of(kind, messages, fields, datetimes)
     if ragged:
-        return table.columns(top)
+        return columns_of(kind, messages, fields, datetimes)
+    table, top = _table_of(kind, messages, fields)
+
+    def columns() -> Columns:
+        every = table.columns(top)
+        return every.dated() if datetimes else every
+
     warnings.warn(
         "to_columns will return Columns: `to_columns(..., ragged=True)` does so now, "
         "and `.structured()` makes a structured array of them",
@@ -87,20 +93,32 @@ def to_columns(
     )
     table.views = True  # they are copied into the array
     try:
-        return table.columns(top).structured()
+        return columns().structured()
     except ValueError as error:
         table.views = False
         if ragged is None:
-            return table.columns(top)
+            return columns()
         raise ValueError(f"{error}; ragged=True takes it") from None
 
 
-def table_of(
+def columns_of(
     kind: type | Structure, messages: Any, fields: Iterable[str] | None, datetimes: bool
-) -> tuple[Table, Elements]:
-    """Return what is in messages, and the rows of the table; raise DecodeError."""
+) -> Columns:
+    """Return the columns of messages, which may have a way of their own; raise DecodeError."""
     wanted = (fields,) if isinstance(fields, str) else fields
-    plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted), datetimes)
+    if hasattr(messages, "columns"):
+        columns: Columns = messages.columns(kind, wanted)
+    else:
+        table, top = _table_of(kind, messages, wanted)
+        columns = table.columns(top)
+    return columns.dated() if datetimes else columns
+
+
+def _table_of(
+    kind: type | Structure, messages: Any, fields: Iterable[str] | None
+) -> tuple[Table, Elements]:
+    wanted = (fields,) if isinstance(fields, str) else fields
+    plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted))
     all_of_them = messages_of(messages)
     try:
         return _read(plan, all_of_them)

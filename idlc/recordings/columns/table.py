@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from idlc.recordings.columns.plan import Instant, Level, List, Node, Numbers, Segment, Struct, Text
+from idlc.recordings.columns.plan import Level, List, Node, Numbers, Segment, Struct, Text
 from idlc.recordings.columns.scan import ScanResult, joined
 from idlc.recordings.columns.source import Place, Source, narrow_texts, offsets_of, wide_texts
 from idlc.recordings.columns.values import Columns, Ragged
@@ -70,25 +70,20 @@ class Table:
             if node.wide:
                 return wide_texts(self.source, starts, sizes, self.order, elements.big)
             return narrow_texts(self.source, starts, sizes)
-        if isinstance(node, Instant):
-            seconds, nanoseconds = (
-                self.column(part, count, elements, numbers, depth)
-                for part in (node.seconds, node.nanoseconds)
-            )
-            return (seconds.astype(np.int64) * 1_000_000_000 + nanoseconds).view(node.code)
         if isinstance(node, Struct):
             columns = {
                 name: self.column(inner, count, elements, numbers, depth)
                 for name, inner in node.fields.items()
             }
-            return Columns(columns, count)
+            return Columns(columns, count, node.times)
         if node.step is not None:
             offsets, elements, numbers = self.inside(elements, node.step)
-            return Ragged(offsets, self.column(node.element, elements.total, elements, numbers))
+            inner = self.column(node.element, elements.total, elements, numbers)
+            return Ragged(offsets, inner, node.size)
         assert node.size is not None
         every = count * node.size
         inner = self.column(node.element, every, elements, numbers, depth + 1)
-        return Ragged(np.arange(count + 1) * node.size, inner)
+        return Ragged(np.arange(count + 1) * node.size, inner, node.size)
 
     def inside(self, around: Elements, step: List) -> tuple[Any, Elements, dict[int, Any]]:
         """Return the offsets of a column of sequences, their elements, and the numbers in these."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
@@ -34,13 +35,17 @@ class Column:
 
 
 class _Sliced(Column):
-    """Elements that are slices of `values`, from each of `offsets` to the next one."""
+    """Elements that are slices of `values`, from each of `offsets` to the next one.
 
-    __slots__ = ("offsets", "values")
+    `size` is that of every element if the type has a fixed one.
+    """
 
-    def __init__(self, offsets: Any, values: Any) -> None:
+    __slots__ = ("offsets", "size", "values")
+
+    def __init__(self, offsets: Any, values: Any, size: int | None = None) -> None:
         self.offsets = offsets
         self.values = values
+        self.size = size
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -59,7 +64,7 @@ class _Sliced(Column):
             raise ValueError("a slice of this column cannot have a step")
         offsets = self.offsets[first : max(first, last) + 1]
         values = self.values[offsets[0] : offsets[-1]]
-        return type(self)(offsets - offsets[0], values)
+        return type(self)(offsets - offsets[0], values, self.size)
 
 
 class Texts(_Sliced):
@@ -117,11 +122,15 @@ class Ragged(_Sliced):
 class Columns(Column):
     """Columns by name, with a row for each message or element."""
 
-    __slots__ = ("_columns", "_count")
+    __slots__ = ("_columns", "_count", "_times")
 
-    def __init__(self, columns: dict[str, Any], count: int) -> None:
+    def __init__(
+        self, columns: dict[str, Any], count: int, times: Mapping[str, str] | None = None
+    ) -> None:
+        """Name times and durations in `times`, with numpy's code, such as "M8[ns]"."""
         self._columns = columns
         self._count = count
+        self._times = times or {}
 
     def __len__(self) -> int:
         return self._count
@@ -137,7 +146,7 @@ class Columns(Column):
             raise KeyError(f"no column {place!r}, but {', '.join(self._columns)}")
         if isinstance(place, slice):
             columns = {name: column[place] for name, column in self._columns.items()}
-            return Columns(columns, len(range(self._count)[place]))
+            return Columns(columns, len(range(self._count)[place]), self._times)
         index = self._index(place)
         return self[index : index + 1].to_list()[0]
 
@@ -169,6 +178,11 @@ class Columns(Column):
         _fill(result, self)
         return result
 
+    @property
+    def times(self) -> Mapping[str, str]:
+        """The columns that are times and durations, with numpy's code of each."""
+        return self._times
+
     def flat(self) -> dict[str, Any]:
         """Return all columns that are no Columns, by names such as "header.stamp.sec"."""
         result: dict[str, Any] = {}
@@ -178,6 +192,105 @@ class Columns(Column):
             else:
                 result[name] = column
         return result
+
+    def flattened(self) -> Columns:
+        """Return the columns of `flat()`."""
+        return Columns(self.flat(), self._count)
+
+    def dated(self) -> Columns:
+        """Return the columns with times as datetime64 and durations as timedelta64."""
+        columns = {
+            name: _dated(column, self._times.get(name)) for name, column in self._columns.items()
+        }
+        return Columns(columns, self._count)
+
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame` with the columns of `flat()`, and times as datetime64[ns]."""
+        with needing("pandas", "to_pandas"):
+            import pandas  # noqa: F401 # pyarrow would not say how to install it
+        with needing("pyarrow", "to_pandas"):
+            return record_batch(self.dated().flattened()).to_pandas()
+
+    def to_polars(self) -> Any:
+        """Return a `polars.DataFrame` with the columns of `flat()`, and times as Datetime."""
+        with needing("polars", "to_polars"):
+            import polars
+        with needing("pyarrow", "to_polars"):
+            return polars.from_arrow(record_batch(self.dated().flattened()))
+
+
+def _dated(column: Any, code: str | None) -> Any:
+    """Return a column as `dated` has it; `code` is numpy's if it has times."""
+    if isinstance(column, Ragged):
+        return Ragged(column.offsets, _dated(column.values, code), column.size)
+    if isinstance(column, Columns) and code:
+        seconds, nanoseconds = dict(column).values()
+        column = seconds.astype(np.int64) * 1_000_000_000 + nanoseconds
+    if isinstance(column, Columns):
+        return column.dated()
+    return column.view(code) if code else column
+
+
+# tables of Arrow
+
+
+@contextmanager
+def needing(library: str, method: str) -> Iterator[None]:
+    """Say how to install a library that a method imports."""
+    try:
+        yield
+    except ImportError as error:
+        what = f"{method} needs {library}, which cannot be imported ({error})"
+        raise ImportError(f"{what}: pip install {library}", name=library) from error
+
+
+def record_batch(columns: Columns, dictionary: bool = False) -> Any:
+    """Return a `pyarrow.RecordBatch` with the buffers of columns.
+
+    With `dictionary`, texts are dictionary-encoded.
+    """
+    import pyarrow
+
+    return pyarrow.RecordBatch.from_struct_array(_arrow(pyarrow, columns, dictionary))
+
+
+#: The constructors of times in Arrow, by the kind of their dtype.
+TIMES = {"M": "timestamp", "m": "duration"}
+
+
+def _arrow(pa: Any, column: Any, dictionary: bool) -> Any:
+    """Return the array of a column. `pa.array` would import pandas."""
+
+    def of_buffers(type_: Any, *buffers: Any, children: Any = None) -> Any:
+        every = [None, *map(pa.py_buffer, buffers)]
+        return pa.Array.from_buffers(type_, len(column), every, children=children)
+
+    if isinstance(column, Columns):
+        arrays = {name: _arrow(pa, inner, dictionary) for name, inner in dict(column).items()}
+        type_ = pa.struct([pa.field(name, array.type) for name, array in arrays.items()])
+        return of_buffers(type_, children=[*arrays.values()])
+    if isinstance(column, Texts):
+        texts = of_buffers(pa.large_string(), column.offsets, column.values)
+        return texts.dictionary_encode() if dictionary else texts
+    if isinstance(column, Ragged):
+        values = column.values
+        is_numbers = isinstance(values, np.ndarray) and values.ndim == 1
+        if is_numbers and values.dtype == np.uint8:
+            return of_buffers(pa.large_binary(), column.offsets, values)
+        inner = _arrow(pa, values, dictionary)
+        if column.size is not None:
+            return of_buffers(pa.list_(inner.type, column.size), children=[inner])
+        return of_buffers(pa.large_list(inner.type), column.offsets, children=[inner])
+    if column.ndim > 1 and column.dtype == np.uint8:
+        return of_buffers(pa.binary(column.shape[1]), column)
+    if column.ndim > 1:
+        inner = _arrow(pa, column.reshape(-1), dictionary)
+        return pa.FixedSizeListArray.from_arrays(inner, column.shape[1])
+    if column.dtype.kind in TIMES:
+        return of_buffers(getattr(pa, TIMES[column.dtype.kind])("ns"), column.view(np.int64))
+    if column.dtype == np.bool_:
+        return of_buffers(pa.bool_(), np.packbits(column, bitorder="little"))
+    return of_buffers(pa.from_numpy_dtype(column.dtype), column)
 
 
 # structured arrays

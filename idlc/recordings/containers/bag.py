@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ SUFFIXES = (".mcap", ".db3")
 #: Files that rosbag2 compressed as a whole.
 COMPRESSED = (".mcap.zstd", ".db3.zstd")
 METADATA = "metadata.yaml"
+TYPE_KEYS = ("type", "type_description_hash")
 #: No recorder writes more, or deeper.
 MOST_OF_METADATA = 1 << 23
 DEEPEST = 100
@@ -31,34 +33,98 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
             paths = _names(metadata)
         except RecordingError as error:
             paths = []
-            notes.append(f"{error.message}: all files of the folder are read")
+            notes.append(f"{error.message}; idlc reads all files in the folder")
         named = dict.fromkeys(path if path in present else _own_name(path) for path in paths)
         missing = [name for name in named if name not in present]
         others = [name for name in present if name not in named]
-        notes += [f"`{name}` is named in {METADATA} and missing" for name in missing]
+        notes += [f"`{name}` is missing, although {METADATA} lists it" for name in missing]
         if any(name in present for name in named):
-            notes += [f"`{name}` is not named in {METADATA} and left out" for name in others]
+            notes += [f"idlc skips `{name}`: {METADATA} does not list it" for name in others]
             present = {name: present[name] for name in named if name in present}
     if not present:
         inside = min((path.parent for path in folder.glob(f"*/{METADATA}")), default=None)
-        hint = f"name a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
-        raise RecordingError(f"`{folder}` holds no recording", hint)
+        hint = f"pass a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
+        raise RecordingError(f"`{folder}` contains no recording", hint)
     for name in present:
         if name.endswith(COMPRESSED):
             hint = f"zstd -d {folder / name}"
-            raise RecordingError(f"`{name}` is compressed as a whole", hint)
+            raise RecordingError(f"the whole file `{name}` is compressed", hint)
     return list(present.values()), notes
+
+
+def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | None:
+    """Return a metadata.yaml with the types and type hashes of some topics, by their names.
+
+    The rest stays as it is. Returns None if idlc cannot read the file.
+    """
+    try:
+        data = _read(metadata)
+        root = _root(data)
+    except RecordingError:
+        return None
+    text, at, parts = data.decode(), 0, list[str]()
+    edits: list[tuple[int, int, str]] = []
+    expected = []
+    for topic in _topics(root):
+        own = _type_of(topic)
+        name = own.get("name", "")
+        new = dict(zip(TYPE_KEYS, types[name], strict=True)) if name in types else {}
+        expected.append({key: new.get(key, value) for key, value in own.items()})
+        for key in new.keys() & own.keys():
+            (old, *_) = _values([topic], key)
+            edits.append((old.start_mark.index, old.end_mark.index, new[key] or '""'))
+    for start, end, value in sorted(edits):
+        parts += text[at:start], " " * (text[start - 1] != " "), value
+        at = end
+    text = "".join((*parts, text[at:]))
+    try:  # an alias may be lost, or change the type of another topic, too
+        is_done = list(map(_type_of, _topics(_root(text.encode())))) == expected
+    except RecordingError:
+        is_done = False
+    if not is_done:
+        raise RecordingError(f"the types in `{metadata}` cannot be changed")
+    return text.encode()
+
+
+def _type_of(topic: Any) -> dict[str, str]:
+    """Return the name of a topic, and what there is of its type."""
+    keys = ("name", *TYPE_KEYS)
+    values = {key: value for key in keys for value in _values([topic], key)[:1]}
+    return {key: value.value for key, value in values.items() if value.id == "scalar"}
+
+
+def _topics(root: Any) -> list[Any]:
+    """Return the nodes that describe topics."""
+    lists = _values(_values([root], "rosbag2_bagfile_information"), "topics_with_message_count")
+    topics = [topic for own in lists if own.id == "sequence" for topic in own.value]
+    return _values(topics, "topic_metadata")
 
 
 def _names(metadata: Path) -> list[str]:
     """Return the names in `relative_file_paths`; raise RecordingError if they cannot be read."""
-    import yaml
+    information = _values([_root(_read(metadata))], "rosbag2_bagfile_information")
+    return [
+        str(node.value)
+        for paths in _values(information, "relative_file_paths")
+        if paths.id == "sequence"
+        for node in paths.value
+        if node.id == "scalar"
+    ]
 
+
+def _read(metadata: Path) -> bytes:
+    """Return the bytes of a metadata.yaml, or too many."""
     try:
         with metadata.open("rb") as file:
-            text = file.read(MOST_OF_METADATA + 1)
+            return file.read(MOST_OF_METADATA + 1)
     except OSError as error:
         raise RecordingError(f"`{METADATA}` cannot be read: {error.strerror}") from None
+
+
+def _root(text: bytes) -> Any:
+    """Return the node of a metadata.yaml; raise RecordingError if it is none."""
+    import yaml
+
     if len(text) > MOST_OF_METADATA:
         raise RecordingError(f"`{METADATA}` is larger than {MOST_OF_METADATA >> 20} MiB")
     # only the nodes of the file are needed: no objects are constructed, and nothing is merged
@@ -70,25 +136,18 @@ def _names(metadata: Path) -> list[str]:
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > DEEPEST:
                 raise RecordingError(f"`{METADATA}` nests more than {DEEPEST} levels deep")
-        root = yaml.compose(text, loader)
+        return yaml.compose(text, loader)
     except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise RecordingError(f"`{METADATA}{where}` is not YAML") from None
-    return [
-        str(node.value)
-        for information in _values(root, "rosbag2_bagfile_information")
-        for paths in _values(information, "relative_file_paths")
-        if isinstance(paths, yaml.SequenceNode)
-        for node in paths.value
-        if isinstance(node, yaml.ScalarNode)
-    ]
 
 
-def _values(node: Any, key: str) -> list[Any]:
-    """Return the nodes at a key of a mapping, which may be there twice."""
-    pairs = node.value if getattr(node, "id", "") == "mapping" else ()
-    return [value for name, value in pairs if name.value == key]
+def _values(nodes: Iterable[Any], key: str) -> list[Any]:
+    """Return the nodes at a key of mappings, each node once; a mapping may have it twice."""
+    mappings = {id(node): node for node in nodes if getattr(node, "id", "") == "mapping"}
+    pairs = (pair for node in mappings.values() for pair in node.value)
+    return list({id(value): value for name, value in pairs if name.value == key}.values())
 
 
 def _own_name(path: str) -> str:

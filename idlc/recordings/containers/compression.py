@@ -1,4 +1,7 @@
-"""Decompression, bounded by what a chunk declares, by libraries that it alone imports."""
+"""Compression, and decompression bounded by what a chunk declares.
+
+It alone imports the libraries.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,7 @@ class Room:
         self._bytes -= size
         if self._bytes < 0:
             what = f"more than {MOST_GROWTH:,} times as much as the file"
-            raise RecordingError(f"what is compressed in it holds {what}")
+            raise RecordingError(f"the compressed data expands to {what}")
 
     def records(self) -> Iterator[None]:
         """Yield for each record for which there is room; raise RecordingError after the last."""
@@ -54,7 +57,7 @@ def decompress(data: memoryview, compression: str, target: memoryview) -> None:
     elif compression == "lz4":
         size = _lz4(data, target)
     elif compression:
-        raise RecordingError(f"the compression `{compression}` is not known, only zstd and lz4")
+        raise RecordingError(f"unknown compression `{compression}`; idlc reads zstd and lz4")
     else:
         size = len(data)
         target[:size] = data[: len(target)]
@@ -126,6 +129,20 @@ def _lz4(data: memoryview, target: memoryview) -> int:
     except (RuntimeError, ValueError, EOFError) as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
     return done
+
+
+def compress(data: Any, compression: str) -> bytes:
+    """Compress a chunk, or a message by itself, which then declares its size."""
+    compressed: bytes
+    if compression == "zstd":
+        compressed = _zstandard()[0].ZstdCompressor().compress(data)
+    elif compression == "lz4":
+        from lz4 import frame
+
+        compressed = frame.compress(data)
+    else:
+        compressed = bytes(data)
+    return compressed
 
 
 def missing(library: str, why: str) -> RecordingError:

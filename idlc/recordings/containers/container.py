@@ -22,6 +22,7 @@ from idlc.recordings.containers.file import (
 )
 from idlc.recordings.containers.mcap import McapFile
 from idlc.recordings.containers.source import RecordingError, first_bytes, is_local, of_file
+from idlc.robot.session import is_address
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
@@ -112,6 +113,9 @@ def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Con
         return Container(", ".join(container.name for container in opened), files, ())
     if not is_local(path):
         return Container(str(path), [McapFile(path, index, check)], ())
+    if is_address(str(path)):
+        hint = f"record it first: `idlc record {path} -o robot.mcap`"
+        raise RecordingError(f"`{path}` is the address of a robot", hint)
     path = Path(path)
     if not path.is_dir():
         return Container(str(path), [_open_file(path, index, check)], ())
@@ -135,23 +139,25 @@ def _all_or_none(places: Iterable[Any], opened: Callable[[Any], Opened]) -> list
 
 
 def _open_file(path: Path, index: bool, check: bool) -> File:
-    """Open one file, by its first bytes."""
+    return Db3File(path) if is_db3(path) else McapFile(path, index, check)
+
+
+def is_db3(path: Path) -> bool:
+    """Return whether a file is .db3, not MCAP; raise RecordingError if it is neither."""
     hint: str | None = None
     if path.name == bag.METADATA:
-        hint = f"name the folder: `{path.parent}`"
-        raise RecordingError(f"`{path}` describes a recording and is none", hint)
+        hint = f"give the folder: `{path.parent}`"
+        raise RecordingError(f"`{path}` is the metadata of a recording, not a recording", hint)
     start = first_bytes(path)
-    if start.startswith(db3.MAGIC):
-        return Db3File(path)
-    if start.startswith(records.MAGIC):
-        return McapFile(path, index, check)
+    if start.startswith((db3.MAGIC, records.MAGIC)):
+        return start.startswith(db3.MAGIC)
     if not start:
         raise RecordingError(f"`{path}` is empty")
     if start.startswith(b"#ROSBAG"):
-        hint = "`rosbags-convert` reads those of ROS 1"
+        hint = "`rosbags-convert` converts ROS 1 recordings"
     if start.startswith(ZSTD_MAGIC):
-        hint = f"it is compressed as a whole: zstd -d {path}"
-    raise RecordingError(f"`{path}` is no recording: neither MCAP nor .db3", hint)
+        hint = f"the whole file is compressed: zstd -d {path}"
+    raise RecordingError(f"`{path}` is not an MCAP or .db3 recording", hint)
 
 
 def _merged(files: list[File]) -> Iterator[tuple[Topic, tuple[list[Channel], list[Channel]]]]:

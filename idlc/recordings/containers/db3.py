@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 import sqlite3
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,6 +30,11 @@ WRITES_A_LOG = 2
 PATIENCE = 5.0
 #: Messages are yielded together until they have so many bytes.
 GROUP = 1 << 25
+#: A copy is made of so many pages at a time, between which others may write.
+PAGES = 4096
+#: Results of a step of a copy: SQLITE_BUSY and SQLITE_LOCKED, SQLITE_IOERR and SQLITE_FULL.
+BUSY = (5, 6)
+UNWRITTEN = {10: "disk I/O error", 13: "No space left on device"}
 #: SQLite has no other integers.
 SMALLEST, LARGEST = -(1 << 63), (1 << 63) - 1
 
@@ -54,8 +59,8 @@ class Db3File:
         self._state = self._path.stat()
         self.notes: list[str] = []
         if self._lone:
-            why = f"it was written by way of `{self._log.name}`, which is not there"
-            missing = f"{why}: if that was left behind, the last messages are missing"
+            why = f"it was written with `{self._log.name}`, which is missing"
+            missing = f"{why}: without that file, the last messages are missing"
             self.notes.append(f"{self._path.name}: {missing}")
         with self._errors():
             location = f"file:{quote(str(self._path))}?mode=ro{'&immutable=1' * self._lone}"
@@ -64,11 +69,11 @@ class Db3File:
             for pragma in "trusted_schema=OFF query_only=ON cell_size_check=ON mmap_size=0".split():
                 self._db.execute(f"PRAGMA {pragma}")
         try:
-            columns = self._tables()
+            self.columns = self._tables()
             ((page,),) = self._rows("PRAGMA page_size")
             if rest := self._path.stat().st_size % page:  # which SQLite fills with zeros
                 raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
-            self.topics = list(self._topics(columns)) if read else []
+            self.topics = list(self._topics(self.columns)) if read else []
         except RecordingError:
             self._db.close()
             raise
@@ -76,6 +81,31 @@ class Db3File:
     def close(self) -> None:
         """Close the file."""
         self._db.close()
+
+    def copy_to(
+        self, target: sqlite3.Connection, name: str, progress: Callable[[int, int], object]
+    ) -> None:
+        """Copy all pages as of one moment to a database, whose name is for errors."""
+        left = LARGEST
+
+        def step(status: int, remaining: int, total: int) -> None:
+            nonlocal left
+            status &= 0xFF  # the rest says more
+            if status in BUSY:
+                raise sqlite3.OperationalError("database is locked")
+            if status in UNWRITTEN:
+                raise RecordingError(f"`{name}` cannot be written: {UNWRITTEN[status]}")
+            if remaining >= left:  # SQLite begins anew
+                raise RecordingError(
+                    f"`{self.name}` was changed while it was read", "read it again"
+                )
+            left = remaining
+            progress(total - remaining, total)
+
+        with self._errors():
+            self._db.backup(target, pages=PAGES, progress=step)
+        if self._lone:
+            self._check_unchanged()
 
     def _is_in_use(self) -> bool:
         """Return whether a journal or log has something that the file has not, or may have."""
@@ -91,11 +121,11 @@ class Db3File:
         except (sqlite3.Error, OSError, OverflowError, UnicodeError) as error:
             what, hint = str(error), None
             if "readonly" in what:  # it would have to write to roll back
-                why = "is not whole: its writer stopped in the middle of a transaction"
+                why = "is incomplete: its writer stopped within a transaction"
                 hint = f"SQLite undoes it: sqlite3 {shlex.quote(self.name)} .schema"
             elif "locked" in what:
-                why = "is locked by the program that writes it"
-                hint = "try again when that has ended"
+                why = "is locked by the program that is writing it"
+                hint = "try again after the program exits"
             elif "unable to open" in what and self._is_in_use():
                 why = f"cannot be read with its `{self._log.name}`, which needs a file beside it"
                 hint = "copy both to a folder of your own"
@@ -126,7 +156,9 @@ class Db3File:
                 continue
             if kind != "table" or str(text).split()[1:2] != ["TABLE"]:
                 what = f"a {kind if kind != 'table' else 'virtual table'}, `{name}`"
-                raise RecordingError(f"`{self.name}` holds {what}, as no recording does")
+                raise RecordingError(
+                    f"`{self.name}` contains {what}, which recordings never contain"
+                )
             quoted = '"' + str(name).replace('"', '""') + '"'
             columns = list(self._rows(f"PRAGMA table_xinfo({quoted})"))
             if any(column[6] in COMPUTED for column in columns):
@@ -138,7 +170,9 @@ class Db3File:
         required = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "data"}}
         for table, needed in required.items():
             if not needed <= tables.get(table, set()):
-                raise RecordingError(f"`{self.name}` is no recording: it has no table of {table}")
+                raise RecordingError(
+                    f"`{self.name}` is not a recording: it has no table of {table}"
+                )
         return tables
 
     def _topics(self, columns: dict[str, set[str]]) -> Iterator[tuple[Topic, int]]:

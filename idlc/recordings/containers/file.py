@@ -56,8 +56,8 @@ def recorded_schema(schema: Schema) -> Schema | None:
 def check_count(topic: str, counted: int, actual: int) -> None:
     """Raise RecordingError if the number of messages is not the counted one."""
     if counted != actual:
-        hint = "--no-index, or Recording(path, index=False), reads without what the file counts"
-        what = f"{counted:,} messages of `{topic}` are counted, and there are {actual:,}"
+        hint = "--no-index, or Recording(path, index=False), ignores the counts in the file"
+        what = f"the index lists {counted:,} messages of `{topic}`, but the file has {actual:,}"
         raise RecordingError(what, hint)
 
 
@@ -90,10 +90,10 @@ def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:
     """Return why messages that begin so cannot be read, or None if no such reason is known."""
     kind = _ENCAPSULATIONS.get(bytes((start[0], start[1] & ~1))) if len(start) > 1 else None
     if kind:
-        what = f"messages of `{topic}` are written as {kind}, and idlc reads only plain CDR"
+        what = f"messages of `{topic}` are encoded as {kind}, but idlc reads only plain CDR"
         return UnreadTopic(what, "record them from a publisher whose data representation is XCDR1")
     name = next((name for magic, name in _COMPRESSIONS.items() if start.startswith(magic)), None)
     if name is None:
         return None
-    what = f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
+    what = f"messages of `{topic}` are compressed with {name}, but idlc reads only zstd"
     return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")

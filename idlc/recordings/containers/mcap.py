@@ -62,10 +62,12 @@ class Facts(msgspec.Struct):
     """The content of a file; `start` is the time of the first message.
 
     `counts` is by channel; so is `loose`, of messages outside of chunks in a file with a summary.
+    `raws` has the contents of records by their kind and number, as they were first defined.
     """
 
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
+    raws: dict[tuple[int, int], bytes] = {}
     chunks: list[Chunk] = []
     counts: dict[int, int] = {}
     loose: dict[int, int] | None = None
@@ -81,7 +83,8 @@ class Facts(msgspec.Struct):
             text = str(fields.read(fields.number(4)), "utf-8", "replace")
             schema = Schema(name, encoding, text)
             if self.schemas.setdefault(number, schema) != schema:
-                raise RecordingError(f"schema {number} is defined in two ways")
+                raise RecordingError(f"schema {number} has two different definitions")
+            self.raws.setdefault((op, number), bytes(data))
         elif op == records.CHANNEL_OP:
             fields = Fields(data, "a channel")
             number, schema_number = fields.number(2), fields.number(2)
@@ -91,7 +94,8 @@ class Facts(msgspec.Struct):
                 metadata[key] = part.name()
             channel = Channel(schema_number, topic, encoding, metadata)
             if self.channels.setdefault(number, channel) != channel:
-                raise RecordingError(f"channel {number} is defined in two ways")
+                raise RecordingError(f"channel {number} has two different definitions")
+            self.raws.setdefault((op, number), bytes(data))
 
     def count(self, channel: int, messages: int, first: int) -> None:
         """Count messages of a channel, none of which came before the first time."""
@@ -106,8 +110,8 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> Facts
     `check` compares the summary's checksum.
     """
     if source.size < len(MAGIC) or source.view(0, len(MAGIC)) != MAGIC:
-        raise RecordingError(f"`{source.name}` is no MCAP file: it begins with other bytes")
-    reason = "its index is not used"
+        raise RecordingError(f"`{source.name}` is not an MCAP file: it begins with other bytes")
+    reason = "idlc does not use its index"
     if index:
         try:
             return _summary(source, check)
@@ -185,7 +189,7 @@ def _check_summary(facts: Facts, statistics: memoryview | None) -> None:
     if not needed <= facts.schemas.keys():
         raise RecordingError("its summary does not name all schemas")
     if messages != sum(facts.counts.values()):
-        raise RecordingError("its summary counts messages in two ways")
+        raise RecordingError("its summary contains two different message counts")
 
 
 def _add_loose(source: Source, facts: Facts, start: int) -> None:
@@ -198,7 +202,7 @@ def _add_loose(source: Source, facts: Facts, start: int) -> None:
     ranges = [(chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks]
     for at, following in (*ranges, (start, start)):
         if at < end:
-            raise RecordingError("its summary names chunks that are not there")
+            raise RecordingError("its summary lists chunks that do not exist")
         for op, place, size in heads(source, end, at):
             if op == records.CHUNK_OP:
                 raise RecordingError("its summary does not name all chunks")
@@ -317,7 +321,7 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
     walk.end_of_chunk()
     walk.end_of_loose()
     left = source.size - end
-    rest = f", {left:,} bytes are left out" if left else ""
+    rest = f", {left:,} bytes are skipped" if left else ""
     extent = "from its records" if ended else f"to its last whole record{rest}"
     walk.facts.notes.append(f"{reason}: read {extent}")
     return walk.facts

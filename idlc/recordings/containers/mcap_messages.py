@@ -69,7 +69,9 @@ def _heads(source: Source, chunks: Iterable[Chunk], room: Room) -> Iterator[Head
             continue
         start = source.view(chunk.at, HEAD.size)
         if HEAD.unpack(start) != (records.CHUNK_OP, chunk.size - HEAD.size):
-            raise RecordingError(f"there is no chunk at byte {chunk.at}, where an index has one")
+            raise RecordingError(
+                f"there is no chunk at byte {chunk.at}, although an index lists one"
+            )
         head = records.read_chunk_head(source, chunk.at, chunk.size)
         if head.compression:
             room.reserve(head.size)

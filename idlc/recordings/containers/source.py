@@ -138,6 +138,15 @@ class Source:
                 f"`{self.name}`: {size} bytes expected at byte {start}, the file has {self.size}"
             )
 
+    def check_unchanged(self) -> None:
+        """Raise RecordingError if a local file is not as it was when it was first opened."""
+        if self._path is None or self._identity is None:
+            return
+        with self._errors():
+            now, then = self._path.stat(), self._identity
+        if (now.st_mtime_ns, now.st_size) != (then.st_mtime_ns, then.st_size):
+            raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
+
     def close(self) -> None:
         """Release the file; views stay valid."""
         if not self.is_local:

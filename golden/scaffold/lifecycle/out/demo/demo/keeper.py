@@ -77,7 +77,7 @@ class Keeper(LifecycleNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start to work: timers, subscriptions and services."""
+        """Start the timers, subscriptions and services."""
         self.activation = object()
         self.undo_activate.callback(self.wake)
         self.beat_timer = self.create_timer(
@@ -132,7 +132,7 @@ class Keeper(LifecycleNode):
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop working and destroy everything, whatever the state was."""
+        """Stop working and destroy everything, in any state."""
         self.undo_activate.close()
         self.undo_configure.close()
         return super().on_shutdown(state)

@@ -40,6 +40,8 @@ def activate(node: Any, observer: Node) -> None:
 
 def offered(observer: Node) -> set[str]:
     """Return the topics, services and actions that the node has now."""
+    if 'keeper' not in observer.get_node_names():
+        return set()  # not discovered yet
     ask = (
         observer.get_publisher_names_and_types_by_node,
         observer.get_subscriber_names_and_types_by_node,

@@ -25,7 +25,7 @@ class Station(Node):
     """
     The node station.
 
-    It works on goals for dock.
+    It executes goals of dock.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class Station(Node):
         )
 
     def accept_dock_goal(self, goal: Dock.Goal) -> GoalResponse:
-        """Accept a goal for dock, or reject one that cannot be reached."""
+        """Accept a goal for dock, or reject an unreachable one."""
         return GoalResponse.ACCEPT
 
     def begin_dock_goal(self, goal_handle: ServerGoalHandle) -> None:
@@ -64,7 +64,7 @@ class Station(Node):
         self,
         goal_handle: ServerGoalHandle,
     ) -> Dock.Result:
-        """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
+        """Execute a goal step by step, until it succeeds, is cancelled or is aborted."""
         goal: Dock.Goal = goal_handle.request
         result = Dock.Result(
             docked=False,

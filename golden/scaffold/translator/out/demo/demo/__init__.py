@@ -1,0 +1,1 @@
+"""Nodes and interfaces of demo."""

@@ -1,0 +1,84 @@
+"""The new types of recorded topics, and the payloads of messages under them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, TypeAlias
+
+from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, compress, zstd_frame
+from idlc.recordings.containers.file import CDR, START, Schema, unread_reason
+from idlc.recordings.containers.messages import Raw
+from idlc.recordings.containers.source import RecordingError
+
+#: Payloads are converted together until they have so many bytes.
+BATCH = 1 << 24
+
+
+class Conversion(NamedTuple):
+    """The new type of a recorded topic.
+
+    `definition` is the schema's text with all dependencies, `encoding` its encoding, and
+    `type_hash` the RIHS01 hash. `convert` takes payloads of a topic and their log times in
+    nanoseconds, and returns as many payloads; without it, payloads are copied as they are.
+    """
+
+    type: str
+    encoding: str
+    definition: str
+    type_hash: str
+    convert: Callable[[Sequence[Raw], Sequence[int]], Sequence[bytes]] | None = None
+
+
+class RewrittenTopic(NamedTuple):
+    """The number of messages of a topic, the bytes of their payloads, and their fate."""
+
+    messages: int
+    size: int
+    converted: bool
+
+
+#: A type's name, and its definition where a recording has one.
+Recorded: TypeAlias = tuple[str, Schema | None]
+
+
+def check(
+    topic: str,
+    encoding: str,
+    definition: Recorded,
+    conversion: Conversion,
+    recorded: dict[str, Recorded],
+) -> None:
+    """Raise RecordingError if one conversion cannot be that of all messages of a topic.
+
+    `recorded` has the definitions of topics that were checked before, and is added to.
+    """
+    if conversion.convert and encoding != CDR:
+        what = f"messages of `{topic}` are written as `{encoding}`"
+        raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+    kind, schema = definition
+    if schema is not None and schema.is_blank:
+        schema = None
+    other_kind, other = recorded.get(topic, definition)
+    if kind != other_kind or (schema and other and schema != other):
+        raise RecordingError(f"`{topic}` is recorded with two different definitions")
+    recorded[topic] = kind, schema or other
+
+
+def converted(
+    topic: str, conversion: Conversion, raws: Sequence[Raw], times: Sequence[int], room: Room
+) -> Iterator[bytes]:
+    """Yield new payloads; those that are compressed by themselves remain so."""
+    assert conversion.convert
+    plain: list[Raw] = []
+    size = done = 0
+    for index, raw in enumerate(raws, 1):
+        plain.append(zstd_frame(raw, room) if raw[:4] == ZSTD_MAGIC else raw)
+        size += len(plain[-1])
+        if size < BATCH and index < len(raws):
+            continue
+        if why := unread_reason(topic, bytes(plain[0][:START])):
+            raise RecordingError(*why)
+        new = conversion.convert(plain, times[done:index])
+        for was, payload in zip(raws[done:index], new, strict=True):
+            yield compress(payload, "zstd") if was[:4] == ZSTD_MAGIC else payload
+        plain, size, done = [], 0, index

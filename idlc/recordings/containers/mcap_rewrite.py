@@ -1,0 +1,364 @@
+"""An MCAP file with topics of other types: chunks without these are copied as they are compressed.
+
+Definitions may be anywhere in a chunk, so all are decompressed, and their messages indexed anew.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from struct import Struct
+from typing import Any, BinaryIO, TypeAlias
+
+import numpy as np
+
+from idlc.recordings.containers import records
+from idlc.recordings.containers.compression import MOST_IN_A_CHUNK, Room, compress, decompress
+from idlc.recordings.containers.conversion import (
+    Conversion,
+    Recorded,
+    RewrittenTopic,
+    check,
+    converted,
+)
+from idlc.recordings.containers.file import Schema, check_count, full_name
+from idlc.recordings.containers.mcap import Facts, read_facts
+from idlc.recordings.containers.mcap_messages import MESSAGE
+from idlc.recordings.containers.mcap_writer import (
+    Content,
+    McapWriter,
+    channel,
+    record,
+    schema,
+)
+from idlc.recordings.containers.messages import Raw
+from idlc.recordings.containers.records import (
+    CHANNEL_OP,
+    FOOTER,
+    HEAD,
+    MAGIC,
+    MESSAGE_OP,
+    SCHEMA_OP,
+    Fields,
+    heads,
+)
+from idlc.recordings.containers.source import RecordingError, Source, of_file
+
+#: Numbers of schemas end before.
+MOST_SCHEMAS = 1 << 16
+#: The key of a channel's metadata that has the hash of its type.
+HASH = b"topic_type_hash"
+#: What is made anew.
+DERIVED = {
+    *(records.MESSAGE_INDEX_OP, records.CHUNK_INDEX_OP, records.ATTACHMENT_INDEX_OP),
+    *(records.METADATA_INDEX_OP, records.STATISTICS_OP, records.SUMMARY_OFFSET_OP),
+    records.DATA_END_OP,
+}
+#: Attachments are copied by so many bytes.
+BLOCK = 1 << 20
+
+
+class _UnlistedError(Exception):
+    """A summary does not list all definitions."""
+
+
+class Plan:
+    """The definitions that take the place of others."""
+
+    def __init__(
+        self, facts: Facts, conversions: Mapping[str, Conversion], recorded: dict[str, Recorded]
+    ) -> None:
+        self.changed = {
+            number: conversions[own.topic]
+            for number, own in facts.channels.items()
+            if own.topic in conversions
+        }
+        self._check(facts, recorded)
+        #: By kind and number: contents of records.
+        self.contents = dict(facts.raws)
+        #: By channel, for those that change.
+        self.schemas: dict[int, int] = {}
+        users = {number: own.schema for number, own in facts.channels.items()}
+        numbers = {own: number for number, own in reversed(facts.schemas.items())}
+        new = {
+            number: Schema(full_name(own.type), own.encoding, own.definition)
+            for number, own in self.changed.items()
+        }
+        kept = {own for number, own in users.items() if number not in new}
+        kept |= {numbers[own] for own in new.values() if own in numbers}
+        taken = {*facts.schemas, *users.values()}
+        unused = (number for number in range(1, MOST_SCHEMAS) if number not in taken)
+        for number, own in new.items():
+            if own not in numbers:
+                was = users[number]
+                numbers[own] = was if was and was not in kept else next(unused, 0)
+                if not numbers[own]:
+                    raise RecordingError("it has no number for another schema")
+                kept.add(numbers[own])
+                content = schema(numbers[own], own.name, own.encoding, own.text)
+                self.contents[SCHEMA_OP, numbers[own]] = content
+            self.schemas[number] = numbers[own]
+            raw, digest = facts.raws[CHANNEL_OP, number], self.changed[number].type_hash
+            self.contents[CHANNEL_OP, number] = _retyped(raw, numbers[own], digest)
+        #: The schemas that no channel refers to anymore.
+        self.gone = {users[number] for number in new} - kept
+
+    def _check(self, facts: Facts, recorded: dict[str, Recorded]) -> None:
+        for number, conversion in self.changed.items():
+            own = facts.channels[number]
+            definition = facts.schemas.get(own.schema)
+            kind = definition.name if definition else ""
+            check(own.topic, own.encoding, (kind, definition), conversion, recorded)
+
+
+def _retyped(raw: bytes, schema_number: int, digest: str) -> bytes:
+    """Return the content of a channel's record with another type."""
+    fields = Fields(memoryview(raw), "a channel")
+    number, _ = fields.number(2), fields.number(2)
+    topic, encoding = bytes(fields.part().data), bytes(fields.part().data)
+    part, metadata = fields.part(), dict[bytes, bytes]()
+    while part.more():
+        key = bytes(part.part().data)
+        metadata[key] = bytes(part.part().data)
+    metadata[HASH] = digest.encode()
+    if not digest:
+        del metadata[HASH]
+    return channel(number, schema_number, topic, encoding, metadata)
+
+
+#: A part of records, from one offset to another, and what takes its place.
+Edit: TypeAlias = tuple[int, int, bytes]
+
+
+class Rewriting:
+    """One pass over a file; `room` bounds what is decompressed."""
+
+    def __init__(
+        self, source: Source, facts: Facts, plan: Plan, write: Callable[[Raw], object]
+    ) -> None:
+        self.source = source
+        self.facts = facts
+        self.plan = plan
+        self.room = Room(source.size)
+        #: The schemas that are defined outside of chunks.
+        self.known: set[int] = set()
+        self.writer = McapWriter(write, _has_checksum(source))
+
+    def run(self, progress: Callable[[int], object]) -> None:
+        """Write the whole file."""
+        start = end = len(MAGIC)
+        ended = False
+        first = next(heads(self.source, start, self.source.size), None)
+        if first is None or first[0] != records.HEADER_OP:
+            self.writer.write(record(records.HEADER_OP, bytes(8)))
+        for op, at, size in heads(self.source, end, self.source.size):
+            progress(at)
+            is_loose = op == MESSAGE_OP or (op in (SCHEMA_OP, CHANNEL_OP) and not ended)
+            if start < end and (not is_loose or at + size - start > records.GROUP):
+                self._loose(start, end)
+                start = end = at
+            if is_loose:
+                start, end = (start if start < end else at), at + size
+                continue
+            if op == records.FOOTER_OP:
+                if self.facts.loose is None:  # as a walk ends; a summary is at the end anyway
+                    break
+                continue
+            ended |= op == records.DATA_END_OP
+            if op == records.CHUNK_OP:
+                self._chunk(at, size)
+            elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
+                self._other(op, at, size)
+        if start < end:
+            self._loose(start, end)
+        for number in self.facts.channels:
+            self._define(CHANNEL_OP, number)
+        for number in self.facts.schemas:
+            self._define(SCHEMA_OP, number)
+        self.writer.close()
+        progress(self.source.size)
+
+    def check(self, facts: Facts) -> None:
+        """Raise RecordingError if other numbers of messages were written than are counted."""
+        for number, own in facts.channels.items():
+            count = self.writer.counts.get(number, 0)
+            check_count(own.topic, facts.counts.get(number, 0), count)
+
+    def topics(self) -> dict[str, RewrittenTopic]:
+        """Return the fate of each topic."""
+        topics: dict[str, RewrittenTopic] = {}
+        for number, own in self.facts.channels.items():
+            count, size = (by.get(number, 0) for by in (self.writer.counts, self.writer.sizes))
+            before = topics.get(own.topic, RewrittenTopic(0, 0, False))
+            change = self.plan.changed.get(number)
+            done = bool(change and change.convert)
+            topics[own.topic] = RewrittenTopic(before.messages + count, before.size + size, done)
+        return topics
+
+    def _loose(self, start: int, end: int) -> None:
+        """Write records outside of chunks."""
+        self._check_size(end - start)
+        content = Content(self.source.view(start, end - start), self.room)
+        self._define_channels(content)
+        edits = self._edits(content, self.known)
+        self.writer.add(Content(_edited(content.data, edits)) if edits else content)
+
+    def _chunk(self, at: int, size: int) -> None:
+        """Write a chunk, compressed anew only if something in it changes."""
+        head = records.read_chunk_head(self.source, at, size)
+        self.room.reserve(max(head.size, head.stored))
+        stored = data = self.source.view(head.start, head.stored)
+        if head.compression or head.size != head.stored:
+            data = memoryview(bytearray(head.size))
+            decompress(stored, head.compression, data)
+        content, crc = Content(data, self.room), head.crc
+        self._define_channels(content)
+        edits = self._edits(content, set())
+        if edits:
+            if crc and zlib.crc32(data) != crc:
+                raise RecordingError(f"the checksum of the chunk at byte {at} is wrong")
+            new = _edited(data, edits)
+            self._check_size(len(new))
+            content, crc = Content(new), zlib.crc32(new)
+            stored = memoryview(compress(new, head.compression))
+        self.writer.add_chunk(content, head.compression, stored, crc)
+
+    def _other(self, op: int, at: int, size: int) -> None:
+        """Copy a record, of any size."""
+        if op in (records.ATTACHMENT_OP, records.METADATA_OP):
+            length = size - HEAD.size
+            head = self.source.view(at + HEAD.size, min(length, BLOCK))
+            self.writer.index_other(op, head, length)
+        for start in range(at, at + size, BLOCK):
+            self.writer.write(self.source.view(start, min(BLOCK, at + size - start)))
+
+    def _check_size(self, size: int) -> None:
+        if size > MOST_IN_A_CHUNK:
+            what = f"messages that are together take {size:,} bytes, more than {MOST_IN_A_CHUNK:,}"
+            raise RecordingError(what)
+
+    def _define_channels(self, content: Content) -> None:
+        """Write definitions that only come later, or only the summary has."""
+        inside = {own.number for own in content.definitions if own.op == CHANNEL_OP}
+        for number in content.by_channel.keys() - inside:
+            self._define(CHANNEL_OP, number)
+
+    def _define(self, op: int, number: int) -> None:
+        """Write a definition, unless there is one already, or it is gone."""
+        content = self.plan.contents.get((op, number))
+        is_gone = op == SCHEMA_OP and number in self.plan.gone
+        if content is None or is_gone or (op, number) in self.writer.definitions:
+            return
+        if op == CHANNEL_OP:
+            self._define(SCHEMA_OP, int.from_bytes(content[2:4], "little"))
+        else:
+            self.known.add(number)
+        self.writer.add(Content(record(op, content)))
+
+    def _edits(self, content: Content, known: set[int]) -> list[Edit]:
+        """Return the changes of records; `known` are the schemas that need no definition."""
+        edits: list[Edit] = []
+        for op, at, number, data in content.definitions:
+            if (op, number) not in self.facts.raws:
+                raise _UnlistedError
+            self.facts.add(op, data)
+            new = self._definition(op, number, known)
+            end = at + HEAD.size + len(data)
+            if new is not None and new != content.data[at:end]:
+                edits.append((at, end, new))
+        edits += self._messages(content)
+        return sorted(edits)
+
+    def _definition(self, op: int, number: int, known: set[int]) -> bytes | None:
+        """Return what takes the place of a definition, None if it stays."""
+        plan = self.plan
+        if op == SCHEMA_OP:
+            if number in plan.gone:
+                return b""
+            known.add(number)
+            is_new = plan.contents[op, number] != self.facts.raws[op, number]
+            return record(op, plan.contents[op, number]) if is_new else None
+        if number not in plan.changed:
+            return None
+        new, own = record(op, plan.contents[op, number]), plan.schemas[number]
+        if own not in known:
+            known.add(own)
+            is_new = plan.contents[SCHEMA_OP, own] != self.facts.raws.get((SCHEMA_OP, own))
+            if is_new or (SCHEMA_OP, own) not in self.writer.definitions:
+                new = record(SCHEMA_OP, plan.contents[SCHEMA_OP, own]) + new
+        return new
+
+    def _messages(self, content: Content) -> Iterator[Edit]:
+        """Yield the messages with new payloads."""
+        by_topic: dict[str, list[Any]] = {}
+        for number, mine in content.by_channel.items():
+            if number in self.plan.changed and self.plan.changed[number].convert:
+                by_topic.setdefault(self.facts.channels[number].topic, []).append(mine)
+        for topic, parts in by_topic.items():
+            mine = np.sort(np.concatenate(parts))
+            starts, times = content.places[mine], content.heads["log"][mine].tolist()
+            stops = (starts + HEAD.size + content.heads["size"][mine].astype(np.int64)).tolist()
+            places, data = starts.tolist(), content.data
+            pairs = zip(places, stops, strict=True)
+            raws = [data[place + MESSAGE.itemsize : stop] for place, stop in pairs]
+            number = int(content.heads["channel"][mine[0]])
+            payloads = converted(topic, self.plan.changed[number], raws, times, self.room)
+            for place, stop, payload in zip(places, stops, payloads, strict=True):
+                size = MESSAGE.itemsize - HEAD.size + len(payload)
+                head = data[place + HEAD.size : place + MESSAGE.itemsize]
+                yield place, stop, b"".join((HEAD.pack(MESSAGE_OP, size), head, payload))
+
+
+def _edited(data: memoryview, edits: list[Edit]) -> bytes:
+    parts: list[Raw] = []
+    at = 0
+    for start, stop, new in edits:
+        parts += data[at:start], new
+        at = stop
+    return b"".join((*parts, data[at:]))
+
+
+def _has_checksum(source: Source) -> bool:
+    """Return whether the data section of a file has a checksum."""
+    end = source.size - FOOTER.size - len(MAGIC)
+    if end < len(MAGIC):
+        return False
+    start = FOOTER.unpack(source.view(end, FOOTER.size))[2] or end
+    at = start - HEAD.size - 4
+    if not len(MAGIC) <= at <= end:
+        return False
+    op, size, crc = Struct("<BQI").unpack(source.view(at, HEAD.size + 4))
+    return (op, size) == (records.DATA_END_OP, 4) and crc != 0
+
+
+def rewrite_mcap(
+    place: Path,
+    file: BinaryIO,
+    conversions: Mapping[str, Conversion],
+    recorded: dict[str, Recorded],
+    index: bool,
+    progress: Callable[[int, int], object],
+) -> dict[str, RewrittenTopic]:
+    """Write an MCAP file with conversions of topics; `index` is that of `read_facts`.
+
+    `recorded` has what other files of the recording have of a topic, and is added to.
+    """
+    source = Source(place)
+    every: list[Facts] = []
+    with of_file(source.name), source.opened():
+        for use_index in dict.fromkeys((index, False)):
+            facts = read_facts(source, use_index)
+            every.append(facts)
+            file.seek(0)
+            file.truncate()
+            rewriting = Rewriting(source, facts, Plan(facts, conversions, recorded), file.write)
+            try:
+                rewriting.run(lambda done: progress(done, source.size))
+            except _UnlistedError:
+                continue
+            source.check_unchanged()
+            for earlier in every:
+                rewriting.check(earlier)
+            return rewriting.topics()
+        raise RecordingError("it was changed while it was read", "read it again")

@@ -1,0 +1,325 @@
+"""The pipeline of `idlc upgrade`: recordings, and the plan of each topic whose type changed."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from idlc.check.compiler import stage
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Label, Report
+from idlc.documents.schemas import MCAP_LINE, mcap
+from idlc.model import ir
+from idlc.project.files import is_folder
+from idlc.project.find import RULES
+from idlc.project.root import Root
+from idlc.project.settings import Scope
+from idlc.recordings.containers.conversion import Conversion
+from idlc.recordings.containers.file import MSG
+from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.definitions import interface_of
+from idlc.recordings.types import (
+    DefinedTopic,
+    LocalTypes,
+    RecordedTypes,
+    recorded_types,
+    topics_of,
+    versions,
+)
+from idlc.upgrading.convert import Payloads, RunRules
+from idlc.upgrading.library import Runner, UpgradeError
+from idlc.upgrading.plan import Finding, Plan, Version, make_plan
+from idlc.upgrading.rules import Known, Rules, read_rules, rule_files
+from idlc.upgrading.targets import Target, compiled, target_of
+
+#: Called with a recording, and how much of it is done.
+Progress = Callable[[str, int, int], None]
+
+
+class UpgradeOptions(msgspec.Struct, frozen=True):
+    """The options of `idlc upgrade`; `again` is the command without those of rules and output."""
+
+    recordings: tuple[str, ...]
+    scope: Scope
+    out: str | None = None
+    to: str | None = None
+    topics: tuple[str, ...] = ()
+    rules: tuple[str, ...] = ()
+    write_rules: str | None = None
+    dry_run: bool = False
+    allow_loss: bool = False
+    again: str = "idlc upgrade"
+
+
+class TopicPlan(NamedTuple):
+    """A recorded topic, and the plan of its messages; without a plan, the type was removed."""
+
+    recording: str
+    topic: str
+    type: str
+    plan: Plan | None
+
+    @property
+    def findings(self) -> list[Finding]:
+        """The fate of each field that changed."""
+        if self.plan is None:
+            reason = f"type `{self.type}` was removed: its messages do not change"
+            return [Finding("lost", "", self.type, "", reason)]
+        return self.plan.findings()
+
+    @property
+    def fate(self) -> str:
+        """The worst fate of any field."""
+        return "lost" if self.plan is None else self.plan.fate
+
+
+class Result(NamedTuple):
+    """The plans of changed topics, the recordings that were written, and new files of rules."""
+
+    plans: list[TopicPlan]
+    written: list[tuple[str, str, Any]]
+    stubs: list[str]
+
+
+def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progress) -> Result:
+    """Plan the upgrade of recordings, and write them unless something is in the way of it."""
+    result = Result([], [], [])
+    with target_of(options.to, options.scope, report) as target:
+        named = _read(rule_files(options.rules, options.scope.root), options.scope.root, report)
+        if options.topics:
+            topics_of(options.recordings, options.topics, options.scope.root, report)
+        if target is None or report.had_errors:
+            return result
+        found = _found(target, named, options.scope.root)
+        local = LocalTypes(options.scope, report)
+        for recording in options.recordings:
+            result.plans.extend(_plans(recording, options, target, local, Known(named), report))
+        if report.errors:
+            return result
+        if options.write_rules is not None:
+            from idlc.upgrading.stubs import write_stubs
+
+            plans = [each.plan for each in result.plans if each.plan is not None]
+            result.stubs.extend(write_stubs(plans, options.write_rules, options.scope.root, report))
+            return result
+        _judge(result.plans, options, target, Known(named), found, report)
+        if not (options.dry_run or report.had_errors or options.out is None):
+            run = Runner({rules.path: rules.file for rules in named})
+            _write(result, options, run, report, progress)
+    return result
+
+
+def _read(files: Iterable[Path], root: Root, report: Report) -> list[Rules]:
+    rules, bad = read_rules(files, root, report)
+    report.extend(codes.BAD_RULES.at(error.span, str(error)) for error in bad)
+    return rules
+
+
+def _found(target: Target, named: Sequence[Rules], root: Root) -> list[Rules]:
+    """Return the rules beside the target's messages that were not named."""
+    folders = [str(home / RULES) for home in target.homes.values() if is_folder(home / RULES)]
+    used = {rules.file.resolve() for rules in named}
+    files = (file for file in rule_files(folders, root) if file.resolve() not in used)
+    return read_rules(files, root, Report())[0]
+
+
+def _plans(
+    recording: str,
+    options: UpgradeOptions,
+    target: Target,
+    local: LocalTypes,
+    rules: Known,
+    report: Report,
+) -> Iterator[TopicPlan]:
+    """Yield the plan of each topic of a recording whose type is another one in the target."""
+    topics = topics_of([recording], (), options.scope.root, report)
+    if topics is None:
+        return
+    selected = set(options.topics)
+    for version in versions(topics):
+        version = msgspec.structs.replace(
+            version,
+            topics=[t for t in version.topics if not selected or t.topic.name in selected],
+        )
+        if not version.topics:
+            continue
+        types = recorded_types(version, local, report)
+        report.extend(types.errors)
+        with stage("plan", recording):
+            yield from _of_types(recording, types, target, rules, report)
+
+
+def _of_types(
+    recording: str, types: RecordedTypes, target: Target, rules: Known, report: Report
+) -> Iterator[TopicPlan]:
+    compiler = target.compiler(types.texts)
+    known: list[tuple[DefinedTopic, Version, ir.TypeName]] = []
+    for topic in types.topics:
+        if topic.name not in types.models[topic.name.package].messages:
+            continue
+        old = Version(types.models, topic.name)
+        name = _name_in(compiler.library, old, rules)
+        if name is not None:
+            known.append((topic, old, name))
+        elif target.defines(topic.name.package):
+            yield TopicPlan(recording, topic.recorded.topic.name, str(topic.name), None)
+    models = compiled(compiler, {interface_of(name) for *_, name in known}, report)
+    if models is None:
+        return
+    plans: dict[tuple[ir.TypeName, ir.TypeName], Plan | None] = {}
+    for topic, old, name in known:
+        if (topic.name, name) not in plans:
+            new = Version(models, name)
+            is_same = old.key == new.key and not _differs(old, new, target)
+            plans[topic.name, name] = None if is_same else make_plan(old, new, rules)
+        plan = plans[topic.name, name]
+        if plan is not None:
+            yield TopicPlan(recording, topic.recorded.topic.name, str(topic.name), plan)
+
+
+def _name_in(library: Any, old: Version, rules: Known) -> ir.TypeName | None:
+    """Return the name of a type in the target: its own, or the one that rules lead to."""
+    if library.source(interface_of(old.name)) is not None:
+        return old.name
+    keys = [old.key]
+    for key in keys:
+        for file in rules.starting(key):
+            name = ir.TypeName.parse(file.new.type)
+            if library.source(interface_of(name)) is not None:
+                return name
+            keys += [file.new] if file.new not in keys else []
+    return None
+
+
+def _differs(old: Version, new: Version, target: Target) -> bool:
+    """Return whether types of one hash differ in comments or constants that the user wrote.
+
+    The definitions of other packages stay as they were recorded.
+    """
+    before, after = (
+        {
+            name: ir.meaning(interface)
+            for reached in ({interface_of(each) for each in version.reached},)
+            for model in version.models.values()
+            for name, interface in model.interfaces.items()
+            if target.owns(name.package) and name in reached
+        }
+        for version in (old, new)
+    )
+    return before != after
+
+
+def _judge(
+    plans: Sequence[TopicPlan],
+    options: UpgradeOptions,
+    target: Target,
+    rules: Known,
+    found: Sequence[Rules],
+    report: Report,
+) -> None:
+    """Report the fields that need a rule, the data that is lost, and rules that were not named."""
+    folders = sorted({options.scope.root.shown(each.file.parent) for each in found})
+    words = [options.again, *(f"--rules {shlex.quote(folder)}" for folder in folders)]
+    running = " ".join([*words, "--dry-run"] if options.out is None else words)
+    every = Known((*rules.files, *found))
+    useful: set[str] = set()
+    for entry in plans:
+        if entry.plan is None:
+            if not options.allow_loss:
+                hint = "--allow-loss keeps these messages under their old type"
+                message = f"`{entry.topic}`: type `{entry.type}` was removed"
+                report.add(codes.DATA_LOST.of(entry.recording, message, hint=hint))
+            continue
+        if found:
+            planned = make_plan(entry.plan.old, entry.plan.new, every)
+            used = {part.rules.path for part in planned.walk() if part.rules}
+            useful |= used & {each.path for each in found}
+        for finding in entry.plan.missing:
+            package = finding.type.partition("/")[0]
+            home = target.homes.get(package)
+            place = options.scope.root.shown(home / RULES) if home else RULES
+            covered = folders and not make_plan(entry.plan.old, entry.plan.new, every).missing
+            if covered:
+                hint = f"run the rules: `{running}`"
+            else:
+                hint = f"write a rule: `{options.again} --write-rules {shlex.quote(place)}`"
+            message = f"`{entry.topic}` needs a rule for `{finding.path}`: {finding.reason}"
+            labels = (Label(finding.old, "recorded version"),) if finding.old else ()
+            span = finding.span
+            report.add(codes.RULE_NEEDED.at(span, message, hint=hint, labels=labels))
+    if useful and not report.had_errors:
+        listed = ", ".join(f"`{path}`" for path in sorted(useful))
+        report.notes.append(f"idlc did not run the rules in {listed}; run them with `{running}`")
+
+
+def definition_of(version: Version) -> str:
+    """Return the text that a recorder writes for a type: its file, and those that it refers to."""
+    model = version.models[version.name.package]
+    interface = model.interfaces[interface_of(version.name)]
+    text = mcap(interface, model)
+    if isinstance(interface, ir.Message):
+        return text
+    kind = interface.name.kind.upper()
+    return f"{MCAP_LINE}\n{kind}: {interface.name}\n{text}"
+
+
+def _write(
+    result: Result, options: UpgradeOptions, run: RunRules, report: Report, progress: Progress
+) -> None:
+    """Write each recording; report those that cannot be, and go on with the others."""
+    from idlc.recordings.rewrite import rewrite
+
+    root = options.scope.root
+    out = Path(root.path(options.out or "."))
+    targets: dict[str, str] = {}
+    for recording in options.recordings:
+        name = Path(os.path.normpath(root.path(recording))).name
+        shown = f"{str(options.out).rstrip('/')}/{name}"
+        if os.path.lexists(out / name) or shown in targets.values():
+            what = "is the name of two recordings" if shown in targets.values() else "exists"
+            hint = "choose another folder with -o"
+            report.add(codes.EXISTING_FILE.of(shown, f"`{shown}` {what}", hint=hint))
+        targets[recording] = shown
+    if report.errors:
+        return
+    for recording, shown in targets.items():
+        plans = [each for each in result.plans if each.recording == recording]
+        try:
+            summary = rewrite(
+                root.path(recording), root.path(shown), _conversions(plans, run), progress
+            )
+        except (RecordingError, UpgradeError) as error:
+            advice = getattr(error, "hint", None)
+            report.add(codes.CONVERSION_FAILED.of(recording, str(error), hint=advice))
+        else:
+            result.written.append((recording, shown, summary))
+
+
+def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Conversion]:
+    """Return the conversion of each topic; raise UpgradeError if rules cannot be run."""
+    conversions: dict[str, Conversion] = {}
+    ways: dict[int, Payloads] = {}
+    for entry in plans:
+        plan = entry.plan
+        if plan is None:
+            continue
+        convert = None
+        if not plan.same:
+            way = ways[id(plan)] = ways.get(id(plan)) or Payloads.of(plan, run)
+            convert = partial(converted, way, entry.topic)
+        definition, new = definition_of(plan.new), plan.new.key
+        conversions[entry.topic] = Conversion(new.type, MSG, definition, new.hash, convert)
+    return conversions
+
+
+def converted(
+    way: Payloads, topic: str, payloads: Sequence[Any], times: Sequence[int]
+) -> list[bytes]:
+    """Return new payloads; errors name the topic and the time of the message."""
+    return way.many(payloads, lambda number: f"`{topic}` at {times[number]} ns")

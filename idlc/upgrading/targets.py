@@ -1,0 +1,132 @@
+"""The types of `--to`: a folder, a git revision, a distribution, or those of this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from idlc.check.compiler import Compiler, sources_of
+from idlc.compare.breaking import GIT
+from idlc.compare.distribution import PREFIX, is_distro
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.model import catalog, derive, ir
+from idlc.model.distros import BY_NAME, Distro, unknown_distro
+from idlc.project import inputs
+from idlc.project.find import InterfaceFile, find
+from idlc.project.git import checked_out
+from idlc.project.library import Library, Texts
+from idlc.project.settings import Scope
+from idlc.wire.layout import oversized
+
+
+class _NewTypes(Library):
+    """The types of a target, and of a recording for the packages that the target lacks."""
+
+    def __init__(self, target: Target, recorded: Texts, *place: Any, **options: Any) -> None:
+        super().__init__(*place, **options)
+        self._target = target
+        self._recorded = recorded
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface, or `None` if it was removed or is nowhere."""
+        target = self._target
+        if name == derive.SERVICE_EVENT_INFO:  # events have it where a distribution has not
+            return super().source(name)
+        if name in target.texts or target.defines(name.package):
+            own = target.texts.get(name)
+            standard = target.distro and catalog.source(name, target.distro)
+            return own or standard or None
+        if target.distro:  # the packages of others are not a part of it
+            return self._recorded.get(name) or super().source(name)
+        return super().source(name) or self._recorded.get(name)
+
+
+class Target:
+    """The types to upgrade to.
+
+    `texts` are those of its own packages, whose folders are `homes`; `distro` is the distribution
+    that it is. Without both it is this machine's types.
+    """
+
+    def __init__(
+        self,
+        scope: Scope,
+        texts: Texts,
+        homes: Mapping[str, Path],
+        whole: frozenset[str] = frozenset(),
+        distro: Distro | None = None,
+    ) -> None:
+        self.scope = scope
+        self.texts = texts
+        self.homes = homes
+        self.distro = distro
+        self._whole = whole
+
+    def defines(self, package: str) -> bool:
+        """Return whether the target has all interfaces of a package, so that others are gone."""
+        return package in self._whole or bool(self.distro and catalog.is_standard(package))
+
+    def owns(self, package: str) -> bool:
+        """Return whether a package is one of the folder or revision that was named."""
+        return any(name.package == package for name in self.texts)
+
+    def compiler(self, recorded: Texts) -> Compiler:
+        """Return a compiler that finds the target's types, and recorded ones where it has none."""
+        scope = self.scope
+        library = _NewTypes(
+            self,
+            recorded,
+            scope.include,
+            scope.root,
+            Report(),
+            own={} if self.texts else inputs.nearby_packages(scope.root),
+            exclude=scope.exclude,
+            distro=self.distro or scope.distro,
+        )
+        return Compiler(library)
+
+
+@contextmanager
+def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[Target | None]:
+    """Give the types that `--to` means; `None` after an error."""
+    if to is None:
+        folders = inputs.nearby_packages(scope.root)
+        homes = {package: places[0] for package, places in folders.items() if places}
+        yield Target(scope, {}, homes)
+    elif is_distro(to):
+        name = to.removeprefix(PREFIX)
+        if name not in BY_NAME:
+            message = f"no such distribution: `{name}`"
+            report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
+        yield Target(scope, {}, {}, distro=BY_NAME[name]) if name in BY_NAME else None
+    elif to.startswith(GIT):
+        paths = scope.paths or (".",)
+        with checked_out(to.removeprefix(GIT), paths[0], scope.root, report) as revision:
+            files = revision.files(paths, scope.exclude, report) if revision else ()
+            yield _of_files(files, scope, report) if revision else None
+    else:
+        yield _of_files(find([to], scope.root, report, scope.exclude), scope, report)
+
+
+def _of_files(files: tuple[InterfaceFile, ...], scope: Scope, report: Report) -> Target | None:
+    packages = inputs.packages(files, scope, report)
+    texts = {name: source for package in packages for name, source in sources_of(package, report)}
+    if report.had_errors:
+        return None
+    whole = frozenset(package.package for package in packages if package.is_whole(scope.root))
+    homes = {package.package: (package.folders or (package.home,))[0] for package in packages}
+    return Target(scope, texts, homes, whole)
+
+
+def compiled(compiler: Compiler, names: set[ir.TypeName], report: Report) -> Any:
+    """Return the models of interfaces by package; `None` after errors, which are reported."""
+    problems = Report()
+    models = compiler.models(compiler.reached(names), problems)
+    if not problems.had_errors:
+        problems.extend(oversized(*models.values()))
+    report.extend(problems.errors)
+    return None if problems.had_errors else models
