@@ -1,26 +1,17 @@
-"""The function that setup.py calls: it compiles interfaces before a package is built."""
+"""The functions that setup.py and setuptools call, so that a build compiles interfaces.
+
+setuptools imports this module in every build, so it imports little.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
-from idlc.build.setup_command import distribution_class
-from idlc.check.compiler import models_of
-from idlc.check.package.facts import home_of
-from idlc.cli import output
-from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import without_options
-from idlc.generate.gen import GenOptions, gen
-from idlc.generate.prefix import libraries_of, shared
-from idlc.project.files import is_file, read_bytes
-from idlc.project.find import list_files
-from idlc.project.inputs import packages
-from idlc.project.lock import load_lock
-from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import load_settings, scope
 
 
 def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  # noqa: ARG001
@@ -46,6 +37,44 @@ def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  #
     distribution.run_commands = run_commands
 
 
+def compile_library_at_build(distribution: Any) -> None:
+    """Have setuptools compile the interfaces of a library that has no setup.py for it.
+
+    setuptools calls this function, by its entry point, in every build of an environment with idlc.
+    It has an effect if pyproject.toml names idlc in `requires` and has a table `[tool.idlc]`.
+    """
+    if hasattr(distribution, "generated") or getattr(distribution, "idlc_interfaces", False):
+        return  # setup.py compiles them
+    try:
+        text = Path("pyproject.toml").read_text(encoding="utf-8")
+        if not _TABLE.search(text):
+            return
+        from idlc.project.settings import toml
+
+        document = toml(text)
+        requires = document["build-system"]["requires"]
+        concerned = "idlc" in document["tool"] and any(map(_REQUIREMENT.match, requires))
+    except (OSError, ValueError, LookupError, TypeError):
+        return  # setuptools reports what is wrong
+
+    def run_commands() -> None:
+        from idlc.build.library_command import build_command
+
+        del distribution.run_commands
+        build = distribution.get_command_class("build")
+        commands = {"sub_commands": [*build.sub_commands, ("build_idlc", None)]}
+        distribution.cmdclass["build"] = type("build", (build,), commands)
+        distribution.cmdclass["build_idlc"] = build_command()
+        distribution.run_commands()
+
+    if concerned:
+        distribution.run_commands = run_commands
+
+
+_TABLE = re.compile(r"""\btool["']?\s*\.\s*["']?idlc\b|\bidlc["']?\s*[.=](?!=)""")
+_REQUIREMENT = re.compile(r"\s*idlc(?![\w.-])", re.IGNORECASE)
+
+
 def compile_interfaces(package: str, base: type | None = None) -> dict[str, type]:
     """Bring the package's classes up to date, and install what rosidl installs beside them.
 
@@ -59,37 +88,12 @@ def compile_interfaces(package: str, base: type | None = None) -> dict[str, type
     """
     if "--dry-run" in sys.argv:
         return {}  # colcon asks setup.py for the package's name whatever it is to do, to test too
+    from idlc.build.setup_command import compiled_class
+
     working_folder, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
         with without_options():
-            return {"distclass": _compiled(package, base)}
+            return {"distclass": compiled_class(package, base)}
     finally:
         os.chdir(working_folder)
-
-
-def _compiled(package: str, base: type | None) -> type:
-    """Compile the package in the working folder; return a class for setup(distclass=...)."""
-    report = Report()
-    settings = load_settings(Root.here(), report)
-    where = scope(settings, package)
-    inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
-    if not inputs:
-        return distribution_class(package, {}, base=base)
-    home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
-    runtime, vendoring = settings.runtime, settings.vendoring
-    gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
-    manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
-    if report.had_errors:
-        output.show(report, "text", sys.stderr)
-        raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
-    ((_, model),) = models_of(inputs, where, Report())
-    libraries = libraries_of(model)
-    files = shared(model, manifest, libraries, report)
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    lock = load_lock(where.root.base / home, home, Report())
-    modules = (PurePosixPath(package, path) for path in (lock.outputs if lock else ()))
-    folders = {module.parent for module in modules if module.suffix == ".py"}
-    generated = tuple(sorted(".".join(folder.parts) for folder in folders))
-    return distribution_class(package, files, generated, libraries.build_tag, base)

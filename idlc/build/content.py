@@ -20,7 +20,7 @@ from idlc.project.inputs import packages
 from idlc.project.lock import load_lock
 from idlc.project.prefixes import INDEX, Distribution
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import SETTINGS_FILE, TableLocation, load_settings, scope
+from idlc.project.settings import SETTINGS_FILE, Config, TableLocation, load_settings, scope
 
 
 class Options(NamedTuple):
@@ -44,17 +44,13 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
     """
     root = Root.here()
     config = load_settings(root, report)
-    if config.source:
+    refuse_beside(config, report)
+    if config.source and config.package not in ("", name):
         place = TableLocation(config.source, "tool.idlc", "[tool.idlc]")
-        if config.vendoring == "beside":
-            message = "`vendor-deps` is `beside`: a wheel would overwrite packages of ROS 2"
-            hint = "set it to true, so that the types that are used are in the package itself"
-            place.wrong("vendor-deps", message, report, hint)
-        if config.package not in ("", name):
-            message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
-            place.wrong("package", message, report, "remove `package` from [tool.idlc]")
+        message = f"`package` is `{config.package}`, but package.xml names the package `{name}`"
+        place.wrong("package", message, report, "remove `package` from [tool.idlc]")
     settings = scope(config, distro=options.distribution and options.distribution.name)
-    include = (*settings.include, *_required_prefixes())
+    include = (*settings.include, *required_prefixes())
     where = msgspec.structs.replace(settings, package=None, include=include)
     files = list_files((".",), root, report, where.exclude)
     if files.empty:
@@ -62,8 +58,8 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
     inputs = () if report.had_errors else packages(files.files, where, report)
     if inputs and [package.package for package in inputs] != [name]:
         others = ", ".join(f"`{package.package}`" for package in inputs)
-        message = f"the wheel is of `{name}`, and the interfaces in this folder are of {others}"
-        hint = "build each in its own folder; `exclude` in [tool.idlc] leaves files out"
+        message = f"the wheel is for `{name}`, but this folder contains interfaces of {others}"
+        hint = "build each in its own folder, or exclude files with `exclude` in [tool.idlc]"
         report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
     if report.had_errors:
         return None
@@ -73,16 +69,11 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
     own = sorted({*Path(name).rglob("*.py")} - kept)
     if own:  # the wheel would not have them
         listed = first_few((f"`{root.shown(path)}`" for path in own), 3)
-        message = f"idlc.backend builds interfaces alone, and here is {listed}"
+        message = f"idlc.backend builds only interfaces, but this folder contains {listed}"
         hint = 'use `build-backend = "setuptools.build_meta"` with the setup.py of a package'
         report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
-    generated = Report()
     runtime, vendoring = config.runtime, config.vendoring
-    request = GenOptions((".",), where, str(classes), runtime=runtime, vendoring=vendoring)
-    gen(request, generated)
-    # the environment of a build need not be able to import the package
-    unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
-    report.extend(each for each in generated if each.code != unimportable)
+    generate(GenOptions((".",), where, str(classes), runtime=runtime, vendoring=vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
     if report.had_errors or manifest is None:
         return None
@@ -90,11 +81,32 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
     if options.libraries:
         libraries = libraries_of(model, options.distribution)
     else:
-        libraries = Libraries({}, "the build was told `libraries=no`", build_tag(model))
+        libraries = Libraries({}, "the build has the setting `libraries=no`", build_tag(model))
     return Content(shared(model, manifest, libraries, report), libraries)
 
 
-def _required_prefixes() -> list[str]:
+def refuse_beside(config: Config, report: Report) -> None:
+    """Report IDL611 if packages of ROS 2 would be in the wheel."""
+    if config.source and config.vendoring == "beside":
+        message = "`vendor-deps` is `beside`: a wheel would overwrite ROS 2 packages"
+        hint = "set it to true, so that the package contains the types that it uses"
+        place = TableLocation(config.source, "tool.idlc", "[tool.idlc]")
+        place.wrong("vendor-deps", message, report, hint)
+
+
+def generate(request: GenOptions, report: Report) -> bool:
+    """Write classes, and return whether there were no errors.
+
+    The environment of a build need not be able to import what the classes import.
+    """
+    problems = Report()
+    gen(request, problems)
+    unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
+    report.extend(problem for problem in problems if problem.code != unimportable)
+    return not report.had_errors
+
+
+def required_prefixes() -> list[str]:
     """Return the folders of packages that frontends installed because pyproject.toml says so.
 
     They install what `requires` names on sys.path, and not always below sys.prefix.

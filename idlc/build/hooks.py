@@ -10,9 +10,9 @@ import importlib.util
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from idlc.check.package.manifest import names_runtime
 from idlc.cli import output
@@ -24,35 +24,43 @@ from idlc.project import prefixes, settings
 from idlc.project.files import reason
 from idlc.project.prefixes import Distribution
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import load_settings
-from idlc.version import RUNTIME
+from idlc.project.settings import Config, load_settings
+from idlc.version import RUNTIME, __version__
 
 if TYPE_CHECKING:
     from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
+    from hatchling.builders.wheel import RecordFile, WheelArchive
 
     from idlc.build.content import Options
 
+_Built = TypeVar("_Built")
 #: Outputs of a workspace or an earlier build in the folder.
 _NO_SOURCES = ["/build", "/dist", "/install", "/log"]
 #: Files that are needed even if version control ignores them.
 _SOURCES = ["/package.xml", "/msg/*.msg", "/srv/*.srv", "/action/*.action"]
 
 
-def finished(build: Callable[[Report], str | None]) -> str:
+def archive(build: Callable[[Report], str | None]) -> str:
     """Return the name of the archive that was built; end the process after a problem."""
-    built: list[str] = []
+    if importlib.util.find_spec("hatchling") is None:
+        sys.stderr.write(
+            "error: idlc.backend needs hatchling, which is not installed\n"
+            "  = hint: `pip install hatchling`, or build without --no-build-isolation\n"
+        )
+        raise SystemExit(2)
+    return finished(build)
+
+
+def finished(build: Callable[[Report], _Built | None]) -> _Built:
+    """Return what was built; end the process with a report after a problem."""
+    built: list[_Built] = []
 
     def command() -> int:
         report = Report()
-        if importlib.util.find_spec("hatchling") is None:
-            sys.stderr.write(
-                "Error: hatchling, which writes archives for idlc.backend, is not installed: "
-                "`pip install hatchling`, or build without --no-build-isolation\n"
-            )
-            return 2
         try:
             with without_options():
-                built.extend(filter(None, [build(report)]))
+                product = build(report)
+            built.extend(() if product is None else (product,))
         except OSError as error:
             message = f"cannot write the archive: {reason(error)}"
             report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
@@ -104,7 +112,7 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
     name = _written(PackageSdist(str(root), config=settings), directory, report)
     if outside:
         names = first_few((f"`{path}`" for path in sorted(outside)), 5)
-        report.notes.append(f"left out, because they lead out of the project: {names}")
+        report.notes.append(f"skipped, because they lead out of the project: {names}")
     return name
 
 
@@ -125,10 +133,21 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
             return None
         native, tag = content.libraries.files, content.libraries.build_tag
 
+        platform = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
+
         class PackageWheel(WheelBuilder):
             def get_default_build_data(self) -> dict[str, Any]:
-                platform = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
                 return {**super().get_default_build_data(), "tag": platform}
+
+            @staticmethod
+            def write_archive_metadata(
+                archive: WheelArchive, records: RecordFile, build_data: dict[str, Any]
+            ) -> None:
+                """Write WHEEL with the build tag, which hatchling does not know."""
+                lines = ["Wheel-Version: 1.0", f"Generator: idlc {__version__}"]
+                lines += [f"Root-Is-Purelib: {str(build_data['pure_python']).lower()}"]
+                lines += [f"Build: {tag}"] * bool(tag) + [f"Tag: {platform}", ""]
+                records.write(archive.write_metadata("WHEEL", "\n".join(lines)))
 
         for path, data in content.prefix.items():
             (prefix / path).parent.mkdir(parents=True, exist_ok=True)
@@ -161,18 +180,23 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
 
     config = load_settings(Root.here(), report)
     if not Path(MANIFEST).is_file():
-        message = f"there is no {MANIFEST} beside pyproject.toml"
-        hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"
+        message = f"there is no {MANIFEST} next to pyproject.toml"
+        hint = "`idlc scaffold package NAME --interfaces` creates a folder that you can build"
         report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
     if report.had_errors:
         return None
     declared = manifest.project(config.runtime, report)
     project = manifest.complete_table(declared, report) if declared else {}
-    if config.runtime == "installed" and not names_runtime(project.get("dependencies", ())):
-        message = "the classes import `idlc_runtime`, which [project] does not require"
+    require_runtime(config, project.get("dependencies", ()), report)
+    return None if report.had_errors else (declared["name"], project)
+
+
+def require_runtime(config: Config, requirements: Iterable[str], report: Report) -> None:
+    """Report IDL459 if classes import the installed runtime, which no requirement names."""
+    if config.runtime == "installed" and not names_runtime(requirements):
+        message = "the classes import `idlc_runtime`, but [project] does not require it"
         hint = f'add "{RUNTIME}" to `dependencies`'
         report.add(codes.UNDECLARED_IMPORT.of(settings.SETTINGS_FILE, message, hint=hint))
-    return None if report.had_errors else (declared["name"], project)
 
 
 def _options(settings: Mapping[str, Any], report: Report) -> Options:
@@ -187,7 +211,7 @@ def _options(settings: Mapping[str, Any], report: Report) -> Options:
             hint = did_you_mean(key, choices) or f"the settings are {', '.join(choices)}"
             report.add(codes.BAD_CONFIG.of("", message, hint=hint))
         elif value not in choices[key]:
-            message = f"the setting `{key}` is {value!r}, which idlc does not know"
+            message = f"the setting `{key}` is {value!r}, which idlc does not support"
             report.add(codes.BAD_CONFIG.of("", message, hint=f"use {', '.join(choices[key])}"))
     distro = settings.get("distro")
     distribution = Distribution(distro, f"distro={distro}") if distro else None

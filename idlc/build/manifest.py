@@ -63,12 +63,12 @@ def _texts(statements: Iterable[Statement], tag: str) -> list[str]:
 
 def _version(statements: Iterable[Statement], report: Report) -> str | None:
     """Return the version; report IDL610 if there is none, or one that ROS 2 does not know."""
-    hint = "it is three numbers, as in `<version>0.1.0</version>`"
+    hint = "write three numbers, as in `<version>0.1.0</version>`"
     for statement in statements:
         if statement.tag == "version":
             if _VERSION.fullmatch(statement.text):
                 return statement.text
-            message = f"`{statement.text}` is no version of a ROS 2 package"
+            message = f"`{statement.text}` is not a version of a ROS 2 package"
             report.add(codes.BAD_PACKAGE_XML.at(statement.span, message, hint=hint))
             return None
     report.add(codes.BAD_PACKAGE_XML.of(MANIFEST, "no version in this file", hint=hint))
@@ -126,8 +126,8 @@ def complete_table(declared: dict[str, Any], report: Report) -> dict[str, Any]:
         return {}
     for key in dynamic:
         if key not in _DYNAMIC:
-            message = f"`dynamic` in [project] names `{key}`, which no package.xml tells"
-            hint = f"it may name {', '.join(f'`{name}`' for name in _DYNAMIC)}"
+            message = f"`dynamic` in [project] names `{key}`, which package.xml does not contain"
+            hint = f"it can name {', '.join(f'`{name}`' for name in _DYNAMIC)}"
             report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
         elif key in table:
             message = f"`{key}` is both in [project] and in its `dynamic`"

@@ -7,21 +7,33 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
-from pathlib import Path, PurePath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
+from idlc.check.compiler import models_of
+from idlc.check.package.facts import home_of
+from idlc.cli import output
+from idlc.diagnostics.report import Report
+from idlc.generate.gen import GenOptions, gen
+from idlc.generate.prefix import libraries_of, shared
 from idlc.project import prefixes
 from idlc.project.atomic import write_whole
-from idlc.project.files import is_file, reason
+from idlc.project.files import is_file, read_bytes, reason
+from idlc.project.find import list_files
+from idlc.project.inputs import packages
+from idlc.project.lock import load_lock
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import load_settings, scope
 
 #: The commands of setup.py that pip runs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
 _BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
 _NOT_INSTALLED = """\
-{package}: setup() is given `packages` without {absent}, so that the classes of the interfaces \
-would not be installed; write `packages=find_packages(exclude=['test'])`, or run \
+{package}: `packages` in the call of setup() omits {absent}, so the build would not install the \
+interface classes; write `packages=find_packages(exclude=['test'])`, or run \
 `idlc check --fix`"""
 _COMMAND = re.compile(r"\s*([\w.-]+)\s*=")
 _LAUNCHER = """\
@@ -31,6 +43,36 @@ exec "$(dirname "$0")/../../bin/{name}" "$@"
 """
 #: An entry of `data_files` in setup(): a file for the prefix, or a folder in it and its files.
 _DataFile: TypeAlias = str | tuple[str, Iterable[str]]
+
+
+def compiled_class(package: str, base: type | None) -> type:
+    """Compile the package in the working folder; return a class for setup(distclass=...).
+
+    `base` is the class of distributions to extend, setuptools' own by default.
+    """
+    report = Report()
+    settings = load_settings(Root.here(), report)
+    where = scope(settings, package)
+    inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
+    if not inputs:
+        return distribution_class(package, {}, base=base)
+    home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
+    runtime, vendoring = settings.runtime, settings.vendoring
+    gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
+    manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
+    if report.had_errors:
+        output.show(report, "text", sys.stderr)
+        raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
+    ((_, model),) = models_of(inputs, where, Report())
+    libraries = libraries_of(model)
+    files = shared(model, manifest, libraries, report)
+    output.show(report, "text", sys.stderr)
+    output.notes(report, sys.stderr)
+    lock = load_lock(where.root.base / home, home, Report())
+    modules = (PurePosixPath(package, path) for path in (lock.outputs if lock else ()))
+    folders = {module.parent for module in modules if module.suffix == ".py"}
+    generated = tuple(sorted(".".join(folder.parts) for folder in folders))
+    return distribution_class(package, files, generated, libraries.build_tag, base)
 
 
 def distribution_class(

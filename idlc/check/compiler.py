@@ -181,7 +181,7 @@ def sound_models(
         left_out += sorted(package.names - {interface.name for interface in mine})
     if left_out:
         listed = first_few((f"`{name}`" for name in left_out), 5)
-        report.notes.append(f"left out, because of errors: {listed}")
+        report.notes.append(f"idlc skipped these interfaces because of errors: {listed}")
     return sound_packages
 
 

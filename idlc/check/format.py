@@ -33,4 +33,4 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
         return new
     if problems.had_errors:  # the meaning of a wrong definition cannot be compared reliably
         return source.text
-    raise AssertionError("the layout would change the meaning; the file was left alone")
+    raise AssertionError("formatting would change the meaning; the file was not changed")

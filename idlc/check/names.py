@@ -31,7 +31,7 @@ def interface_names(model: Model) -> Iterator[Diagnostic]:
         name, kind = interface.name.name, interface.name.kind
         like = names.message_name_like(name)
         if kind != "msg" and names.is_message_name(name):
-            hint = "this ending is kept for the parts of services and actions"
+            hint = "this suffix is reserved for the sections of services and actions"
         else:
             hint = f"call it `{like}.{kind}`" if names.is_message_name(like) else names.MESSAGE_HINT
         message = f"`{name}` cannot be the name of a .{kind} file"
@@ -49,8 +49,8 @@ def unique_names(model: Model) -> Iterator[Diagnostic]:
             for element in elements:
                 earlier = first.setdefault(element.name, element)
                 if earlier is not element and earlier.name_span:
-                    text = f"a second {noun} `{element.name}`"
-                    labels = (Label(earlier.name_span, "the first is here"),)
+                    text = f"duplicate {noun} `{element.name}`"
+                    labels = (Label(earlier.name_span, "first definition"),)
                     hint = "rename or remove one of them"
                     yield code.at(element.name_span, text, hint=hint, labels=labels)
 
@@ -64,9 +64,9 @@ def unique_modules(model: Model) -> Iterator[Diagnostic]:
         if earlier is not name and interface.source:
             yield codes.SAME_PYTHON_MODULE.of(
                 ir.path_of(interface),
-                f"rosidl puts `{name.name}` and `{earlier.name}` into one Python module, "
-                f"`_{names.snake_case(name.name)}`, where one of them is lost",
-                hint="give them names that differ in more than capitals",
+                f"rosidl puts `{name.name}` and `{earlier.name}` into the same Python module, "
+                f"`_{names.snake_case(name.name)}`, and one overwrites the other",
+                hint="choose names that differ in more than upper and lower case",
             )
 
 
@@ -93,8 +93,8 @@ _PYTHON_MEMBERS = frozenset({"get_fields_and_field_types", "check_fields"})
 _PYTHON_SUFFIXES = ("_Goal", "_Result", "_Feedback")
 
 
-_NOT_COMPILED = "what rosidl generates does not compile"
-_RENAME = "rename it if C or C++ code may ever use this package"
+_NOT_COMPILED = "the code that rosidl generates does not compile"
+_RENAME = "rename it if C or C++ code uses this package"
 
 
 def reserved_field_names(model: Model) -> Iterator[Diagnostic]:
@@ -106,10 +106,10 @@ def reserved_field_names(model: Model) -> Iterator[Diagnostic]:
             hides_builtins = name == "builtins" and field is not message.fields[-1]
             clash = "a Python keyword" if keyword.iskeyword(name) else ""
             if name in _PYTHON_MEMBERS or hides_builtins:
-                clash = "used by the class itself"
+                clash = "an attribute of the class"
             if clash:
                 text = f"`{name}` is {clash}; the Python code that rosidl generates fails"
-                hint = "rename it if colcon may ever build this package; idlc's Python copes"
+                hint = "rename it if you build this package with colcon; idlc's Python code works"
                 yield codes.BREAKS_ROSIDL_PYTHON.at(field.name_span, text, hint=hint)
             languages = [word for word, names in (("C", _C), ("C++", _CPP)) if name in names]
             if languages:
@@ -135,7 +135,7 @@ def reserved_interface_names(model: Model) -> Iterator[Diagnostic]:
             text = f"`{name.name}` is a Python keyword; the Python code that rosidl generates fails"
             yield codes.BREAKS_ROSIDL_PYTHON.of(ir.path_of(interface), text, hint="rename the file")
         if name.kind == "srv" and name.name.endswith("_Goal"):
-            text = f"a service called `{name.name}` breaks the C code that rosidl generates"
+            text = f"a service named `{name.name}` breaks the C code that rosidl generates"
             yield codes.BREAKS_C.of(ir.path_of(interface), text, hint="rename the file")
 
 
@@ -143,7 +143,7 @@ def reserved_package_name(model: Model) -> Iterator[Diagnostic]:
     """The package is not called like a word of Python, C or C++."""
     path = _first_path(model)
     if keyword.iskeyword(model.package):
-        text = f"package `{model.package}` is a Python keyword; no import statement can name it"
+        text = f"package `{model.package}` is a Python keyword, so Python cannot import it"
         yield codes.BREAKS_ROSIDL_PYTHON.of(path, text, hint="rename the package")
     if model.package in _CPP or model.package == "msg":
         text = f"package `{model.package}` breaks the C++ code that rosidl generates"

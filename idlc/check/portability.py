@@ -32,7 +32,7 @@ def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> Iterator[Diag
     element = ir.element_of(type_)
     texts = value if isinstance(value, tuple) else (value,)
     if value == () and isinstance(element, ir.Primitive) and element.name not in ("bool", "byte"):
-        yield _breaks_python(span, "an empty default of a numeric sequence")
+        yield _breaks_python(span, "an empty default for a numeric sequence")
     if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in texts):
         yield _breaks_python(span, "a line break or NUL in a value")
     if isinstance(value, str):
@@ -40,11 +40,13 @@ def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> Iterator[Diag
     elif not isinstance(value, float):
         return
     elif not math.isfinite(value):
-        message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
+        message = (
+            f"`{span.text}` is not finite; the code that rosidl generates for it does not compile"
+        )
         hint = "use a large finite number, or set the value in code"
         yield codes.NON_FINITE_VALUE.at(span, message, hint=hint)
     elif element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
-        message = f"`{span.text}` is beyond what a float32 holds"
+        message = f"`{span.text}` exceeds the range of float32"
         yield codes.FLOAT32_RANGE.at(span, message, hint="use float64")
 
 
@@ -59,24 +61,26 @@ def _text_problems(value: str, span: Span) -> Iterator[Diagnostic]:
     line, column = span.source.position(span.end)
     one_sided = text[:1] in ('"', "'") and not is_closed
     if lower_types.has_comment(text) and (one_sided or lower_types.is_comment(text)):
-        message = "what looks like a comment is part of the text"
+        message = "ROS 2 reads this comment as part of the text"
         yield codes.ODD_TEXT.at(span, message, hint=lower_types.COMMENT_HINT)
     # or a `#` is to blame, see IDL109
     elif one_sided and text[0] not in span.source.line_text(line)[column - 1 :]:
-        message = f"the text is not closed by {text[0]}, which therefore is part of it"
-        yield codes.ODD_TEXT.at(span, message, hint="close the quotes, or leave them out")
+        message = f"no closing {text[0]}, so the opening quote is part of the text"
+        yield codes.ODD_TEXT.at(span, message, hint="close the quotes, or remove them")
 
 
 def _breaks_python(span: Span, subject: str) -> Diagnostic:
     message = f"{subject} breaks the Python code that rosidl generates"
-    return codes.BREAKS_ROSIDL_PYTHON.at(span, message, hint="remove it, and set the value in code")
+    return codes.BREAKS_ROSIDL_PYTHON.at(
+        span, message, hint="remove the default, and set the value in code"
+    )
 
 
 #: Pairs of brackets that a message names.
 SHOWN = 5
 #: ROS 2's replacements for removed types.
 _INSTEAD = {
-    "actionlib_msgs": "actions are defined in .action files, and ROS 2 makes messages for them",
+    "actionlib_msgs": "define the action in an .action file; ROS 2 generates the messages for it",
     "geometry_msgs/msg/Pose2D": "use `geometry_msgs/Pose`, or fields `x`, `y` and `theta`",
 }
 
@@ -86,7 +90,7 @@ def wide_strings(model: Model) -> Iterator[Diagnostic]:
     for field in own_fields(model):
         element = ir.element_of(field.type)
         if isinstance(element, ir.String) and element.wide:
-            message = "middlewares and platforms disagree on how a wstring is sent"
+            message = "the encoding of a wstring depends on the middleware and the platform"
             hint = "use `string`, which is UTF-8"
             yield codes.WIDE_STRING.at(field.type_span, message, hint=hint)
 
@@ -106,7 +110,7 @@ def chars(model: Model) -> Iterator[Diagnostic]:
             if wide:  # there is room to leave the name in its column
                 whole = Span(span.source, span.start, wide.end())
                 edit = Edit(whole, f"uint8{wide[1]}{wide[2]}")
-            text = "`char` is an unsigned number of one byte in ROS 2, not a character"
+            text = "in ROS 2, `char` is an unsigned one-byte number, not a character"
             hint = "write `uint8`; bytes, hash and code stay the same"
             yield codes.CHAR_TYPE.at(span, text, hint=hint, edits=(edit,))
 
@@ -128,8 +132,8 @@ def nested_bounds(model: Model) -> Iterator[Diagnostic]:
         element = ir.element_of(field.type)
         bound = element.bound if isinstance(element, ir.String) else None
         if bound is not None and element is not field.type:
-            message = f"no middleware enforces that each text has at most {bound} characters"
-            hint = "check the length in code; the bound still is part of the type hash"
+            message = f"no middleware checks that each string has at most {bound} characters"
+            hint = "check the length in code; the bound is still part of the type hash"
             yield codes.UNENFORCED_BOUND.at(field.type_span, message, hint=hint)
 
 
@@ -145,11 +149,11 @@ def several_units(model: Model) -> Iterator[Diagnostic]:
             shown = first_few((f"[{unit}]" for unit in contents), SHOWN)
             yield codes.SEVERAL_UNITS.at(
                 field.name_span,
-                f"`{field.name}` has no unit for ROS 2, because its comment has several "
+                f"`{field.name}` has no unit in ROS 2, because its comment contains several "
                 f"pairs of brackets: {shown}",
-                hint="write the remark with round ones, as in `ignore(IDL405)`"
+                hint="use parentheses in the `ignore` comment: `ignore(IDL405)`"
                 if REMARK.search(text)
-                else "put one unit in brackets, and what else there is in words",
+                else "keep one unit in brackets, and write the others without brackets",
             )
 
 
@@ -170,10 +174,10 @@ def changed_types(model: Model) -> Iterator[Diagnostic]:
         if other is not None:
             yield codes.CHANGED_STANDARD_TYPE.at(
                 span,
-                f"`{target}` is another message since ROS 2 {other.title}",
-                hint="nodes of older and newer distributions cannot exchange it; "
+                f"ROS 2 {other.title} changed the fields of `{target}`",
+                hint="nodes on older and newer distributions cannot exchange this message; "
                 f"`idlc breaking --distro {other.name} --against distro:{model.distro.name}` "
-                "shows what changed",
+                "shows the changes",
             )
 
 

@@ -23,19 +23,19 @@ from idlc.project.settings import Scope
 if TYPE_CHECKING:
     from idlc.model.link import Model
 
-_AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES --ament PREFIX`"
+_AGAIN = "install idlc and build the package again, or run `idlc gen SOURCES --ament PREFIX`"
 
 
 def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
     """Report each package in a prefix, or in the prefixes in a folder, that stops recorders."""
     folders = prefixes.prefixes(root.absolute(folder))
     if not folders:
-        message = f"no packages are installed in `{folder}`: there is no share/ament_index"
-        hint = "name the folder that is in AMENT_PREFIX_PATH, or colcon's `install`"
+        message = f"no packages in `{folder}`: share/ament_index is missing"
+        hint = "pass a folder from AMENT_PREFIX_PATH, or colcon's `install` folder"
         report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
     for prefix in folders:
         for package, why in prefixes.inconsistencies(prefix):
-            message = f"`{package}`, which is in ROS 2's index, {why}"
+            message = f"`{package}` {why}"
             place = root.shown(prefix / prefixes.INDEX)
             report.add(codes.INCONSISTENT_INDEX.of(place, message, hint=_AGAIN))
     files = []
@@ -49,11 +49,11 @@ def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
                 data = read_bytes(path, files[-1], Report()) if is_file(path) else None
                 why = next(_problems(data, prefix, identifier, model), "")
             if why:
-                message = f"`{name}` {why}: C++ tools fail at the types of `{package}`"
+                message = f"`{name}` {why}, so C++ tools fail on the types in `{package}`"
                 report.add(codes.UNUSABLE_LIBRARY.of(files[-1], message, hint=_AGAIN))
     if folders and not files and not len(report):
         message = f"no package with interfaces is registered in `{folder}`"
-        hint = "build one with idlc, or name the prefix in which it is installed"
+        hint = "build a package with idlc, or pass the prefix that contains it"
         report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
     return CheckResult(tuple(files), len(files))
 
@@ -79,11 +79,11 @@ def _problems(
             yield "is missing"
         return
     if not library:
-        yield "is no shared library, or a part of one"
+        yield "is not a complete shared library"
         return
     own = native.MACHINES.get(prefixes.machine())
     if own is not None and library.machine != own.number:
-        yield f"is for another processor than {prefixes.machine()}"
+        yield f"is for a different processor than {prefixes.machine()}"
     if model is None:
         return
     messages = [message for own in model.own for message in derive.messages(own)]
@@ -105,4 +105,4 @@ def _problems(
     local = prefixes.distribution((prefix, *prefixes.ament_prefixes()))
     layout = LAYOUTS.get(local.name)
     if layout is not None and library.stamp != native.identity_stamp(layout):
-        yield f"is for another distribution of ROS 2 than {local.name} ({local.why})"
+        yield f"is for a different ROS 2 distribution than {local.name} ({local.why})"

@@ -59,6 +59,7 @@ _ADVICE = (
     style.missing_units,
     style.unusual_units,
     style.constant_prefixes,
+    style.enum_marks,
     style.suffixes,
     portability.wide_strings,
     portability.chars,
@@ -98,7 +99,7 @@ def _findings(
 
 def check_package(facts: Facts, model: Model, report: Report) -> None:
     """Report all warnings about the package of a model's interfaces; the caller selects."""
-    from idlc.check.package import manifest
+    from idlc.check.package import cmake_lists, manifest
 
     rules: list[PackageRule] = [
         manifest.declared_dependencies,
@@ -106,8 +107,12 @@ def check_package(facts: Facts, model: Model, report: Report) -> None:
         manifest.interface_group,
         manifest.generators,
         manifest.declared_imports,
-        manifest.listed_dependencies,
+        cmake_lists.lists,
     ]
+    if facts.modules:
+        from idlc.check.package import arguments
+
+        rules.append(arguments.deprecated_arguments)
     if facts.setup_py or facts.setup_cfg or facts.outputs:  # what CMake builds needs no ast
         from idlc.check.package import installation
 

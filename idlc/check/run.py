@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import msgspec
 
 from idlc.check.compiler import Compiler, library_for, stage
+from idlc.check.package import cmake_lists
 from idlc.check.package.facts import facts
 from idlc.check.registry import IncrementalFindings, advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
@@ -15,10 +18,14 @@ from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import KINDS, list_files, no_interfaces
+from idlc.project.files import is_folder
+from idlc.project.find import KINDS, RULES, list_files, no_interfaces
 from idlc.project.package_xml import Facts
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
+#: Files that describe a package, which hooks name if they change.
+PACKAGE_FILES = frozenset({MANIFEST, "CMakeLists.txt", "setup.py", "setup.cfg", "pyproject.toml"})
 #: Rounds of fixes: one may depend on another, or edit the same range.
 _ROUNDS = 5
 
@@ -30,24 +37,29 @@ class CheckOptions(msgspec.Struct, frozen=True):
     scope: Scope
     selection: Selection = Selection()
     fix: bool = False
+    diff: bool = False
 
 
 class CheckResult(msgspec.Struct, frozen=True):
     """The checked files and packages, and the number of edits that were made.
 
-    `distros` are the distributions that they were checked for, if there are several.
+    `distros` are the distributions that they were checked for, if there are several. `notes` name
+    what was not compared. `texts` are the texts of edited files before and after, by name.
     """
 
     files: tuple[str, ...]
     packages: int = 0
     fixed: int = 0
     distros: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    texts: Mapping[str, tuple[str, str]] = {}
 
 
 def check(options: CheckOptions, report: Report) -> CheckResult:
     """Report the problems of the files in paths, and of their packages.
 
-    With `fix`, problems with a harmless edit are fixed, and the others reported.
+    With `fix`, problems with a safe edit are fixed, and the others reported. With `diff`, the
+    edits are made in memory only.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
         from idlc.recordings.find import split_recordings
@@ -56,31 +68,56 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         if recordings:
             return _with_recordings(recordings, others, options, report)
     fixed = 0
+    texts: dict[str, tuple[str, str]] = {}
     scope, selection = options.scope, options.selection
+    paths = _with_packages(options.paths, scope.root)
     for rounds_left in reversed(range(_ROUNDS + 1)):
         looked = Report()
-        listing = list_files(options.paths, scope.root, looked, scope.exclude)
+        listing = list_files(paths, scope.root, looked, scope.exclude)
         packages = inputs.packages(listing.files, scope, looked, listing.packages)
         for path in listing.empty:
             folder = scope.root.absolute(path)
             if not any(package.home.is_relative_to(folder) for package in packages):
                 also = "package.xml and no "
                 looked.add(no_interfaces(path, scope.root, scope.exclude, also=also))
-        problems, models = check_all(checkers(packages, scope), packages, selection)
+        checking = checkers(packages, scope)
+        problems, models = check_all(checking, packages, selection)
         edits = [change for problem in problems for change in problem.edits]
-        if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
+        fixes = (options.fix or options.diff) and edits and rounds_left
+        if not fixes or looked.had_errors or report.had_errors:
             break
-        from idlc.project.write import edit
+        from idlc.project.write import edited, rewrite
 
-        done = edit(edits, scope.root, report, keep_layout)
-        fixed += done
-        if not done:
+        root, before = scope.root, fixed
+        for name, old, new, number in edited(edits, keep_layout):
+            if options.diff or rewrite(Path(root.path(name)), name, old, new, report):
+                texts[name] = (texts.get(name, (old,))[0], new)
+                fixed += number
+        if fixed == before:
             break
+        if options.diff:
+            unsaved = {root.absolute(name): new.encode() for name, (_, new) in texts.items()}
+            scope = msgspec.structs.replace(scope, root=Root(root.base, unsaved))
     files = tuple(file.shown for file in listing.files)
     distros = tuple(models) if len(models) > 1 else ()
     report.extend((*looked, *problems))
     report.notes += looked.notes
-    return CheckResult(files, len(packages), fixed, distros)
+    first = next(iter(checking.values()))
+    looked_at = filter(None, map(first.package_facts, packages))
+    notes = tuple(filter(None, map(cmake_lists.unknown, looked_at)))
+    return CheckResult(files, len(packages), fixed, distros, notes, texts)
+
+
+def _with_packages(paths: Sequence[str], root: Root) -> tuple[str, ...]:
+    """Return paths with the package in place of each file that describes it, none elsewhere."""
+    described = []
+    for path in paths:
+        folder, name = os.path.split(path)
+        if name not in PACKAGE_FILES or not root.is_file(path):
+            described.append(path)
+        elif root.is_file(f"{folder or '.'}/{MANIFEST}"):
+            described.append(folder or ".")
+    return tuple(dict.fromkeys(described))
 
 
 def _with_recordings(
@@ -153,6 +190,12 @@ class Checker:
             if surroundings is not None:
                 with stage("check package", package.package):
                     check_package(surroundings, models[-1], report)
+            if any(is_folder(folder / RULES) for folder in package.folders):
+                from idlc.upgrading.coverage import rule_folders, rule_problems
+
+                with stage("check rules", package.package):
+                    folders = rule_folders(package.folders)
+                    report.extend(rule_problems(folders, model, self._scope.root))
         return models
 
     def package_facts(self, package: inputs.Inputs) -> Facts | None:

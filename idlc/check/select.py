@@ -13,6 +13,7 @@ from msgspec import Meta
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, Severity
 from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import closest, did_you_mean
 from idlc.language import tree
 from idlc.language.parse import parse
 from idlc.project.settings import Config, Table, Texts, command_table, read_value
@@ -21,6 +22,12 @@ from idlc.project.settings import Config, Table, Texts, command_table, read_valu
 def is_selector(word: str) -> bool:
     """Return whether a word selects any code: `all`, a category, an id, its start or a slug."""
     return any(_means(word, code) for code in codes.CODES.values())
+
+
+def similar_selector(word: str) -> str:
+    """Return the hint for a word that selects no code."""
+    known = [*codes.CATEGORIES, *(code.slug for code in codes.CODES.values())]
+    return did_you_mean(word, known) or "`idlc explain` lists the codes"
 
 
 def _means(word: str, code: codes.Code) -> bool:
@@ -70,6 +77,9 @@ class Selection(msgspec.Struct, frozen=True):
 
 # the lengths are bounded, or a long comment without an end would take forever
 REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
+_ANY_REMARK = re.compile(r"#\s{0,20}idlc:\s{0,20}(\w{1,40})(\s{0,20}(?:[\[(]|$))?")
+#: Each remark, as a hint shows it.
+_FORMS = {"enum": "idlc: enum", "ignore": "idlc: ignore[CODE] REASON"}
 
 
 class Remark(msgspec.Struct, frozen=True):
@@ -105,19 +115,40 @@ def without_ignored(
             yield diagnostic
     for at, remark in enumerate(remarks):
         if not remark.reason:
-            message = f"this does not say why `{remark.code}` is ignored"
-            hint = f"write the reason after it: `ignore[{remark.code}] REASON`"
+            message = f"the comment does not give a reason to ignore `{remark.code}`"
+            hint = f"write a reason after the code: `ignore[{remark.code}] REASON`"
             yield codes.IGNORE_WITHOUT_REASON.at(remark.span, message, hint=hint)
         elif at not in used:
             code = codes.CODES.get(remark.code)
             if code is None:
-                message = f"there is no code `{remark.code}`"
+                message = f"no such code: `{remark.code}`"
             elif code.severity is Severity.ERROR:
-                message = f"`{remark.code}` is an error, which cannot be ignored"
+                message = f"`{remark.code}` is an error, which you cannot ignore"
             else:
-                message = f"there is no `{remark.code}` here to ignore"
-            hint, edits = "remove the remark", (remark.edit,) if remark.edit else ()
+                message = f"unused `ignore` comment: idlc does not report `{remark.code}` here"
+            hint, edits = "remove the unused `ignore`", (remark.edit,) if remark.edit else ()
             yield codes.UNUSED_IGNORE.at(remark.span, message, hint=hint, edits=edits)
+    for source in sources:
+        yield from _unknown_remarks(source)
+
+
+def _unknown_remarks(source: Source) -> Iterator[Diagnostic]:
+    if "idlc:" not in source.text:
+        return
+    for line in (line for section in parse(source).sections for line in section.lines):
+        match = _ANY_REMARK.match(line.comment)
+        if not match or match[1] == "enum" or re.search(REMARK, line.comment):
+            continue
+        near = closest(match[1], _FORMS)
+        if not near and match[2] is None:
+            continue  # a sentence
+        start = line.start + len(line.code)
+        forms = [_FORMS[near]] if near else _FORMS.values()
+        yield codes.UNKNOWN_REMARK.at(
+            Span(source, start + match.start(1), start + match.end(1)),
+            f"`idlc: {match[1]}` is not a comment that idlc supports",
+            hint=f"write {' or '.join(f'`# {form}`' for form in forms)}",
+        )
 
 
 def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
@@ -190,6 +221,6 @@ def selection(config: Config, report: Report) -> Selection:
     for where, key, words in (*lists, *((paths, *entry) for entry in per_path.items())):
         for word in words:
             if not is_selector(word):
-                message = f"`{key}` in {where.shown} has `{word}`, which means no rule"
-                where.wrong(key, message, report)
+                message = f"`{key}` in {where.shown} contains `{word}`, which is not a rule"
+                where.wrong(key, message, report, similar_selector(word))
     return Selection(table.select, table.ignore, tuple(per_path.items()))

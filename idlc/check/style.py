@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic
+from idlc.diagnostics.report import Diagnostic, first_few
 from idlc.diagnostics.source import Span
+from idlc.generate.python import enums
 from idlc.model import derive, ir
 from idlc.model.comments import brackets
 from idlc.model.link import Model, own_fields, own_sections
@@ -121,9 +123,9 @@ def stamped(model: Model) -> Iterator[Diagnostic]:
         if first is None or not _is_stamp(first, model):
             yield codes.STAMPED_WITHOUT_HEADER.at(
                 (first and first.type_span) or _top(interface),
-                f"`{interface.name.name}` does not begin with a time stamp",
-                hint="make `std_msgs/Header header` the first field, where tf and message "
-                "filters look for it, or `builtin_interfaces/Time stamp`",
+                f"`{interface.name.name}` has no time stamp in its first field",
+                hint="begin with the field `std_msgs/Header header`, which tf and message filters "
+                "need, or with `builtin_interfaces/Time stamp`",
             )
 
 
@@ -144,8 +146,8 @@ def documented_interfaces(model: Model) -> Iterator[Diagnostic]:
     for interface in model.own:
         if interface.source and not any(part.comment for part in derive.sections(interface)):
             noun = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
-            message = f"nothing says what {noun} `{interface.name.name}` is for"
-            hint = "begin the file with a comment and an empty line"
+            message = f"{noun} `{interface.name.name}` has no comment that describes it"
+            hint = "begin the file with a comment, followed by an empty line"
             yield codes.UNDOCUMENTED_INTERFACE.at(_top(interface), message, hint=hint)
 
 
@@ -153,8 +155,8 @@ def documented_fields(model: Model) -> Iterator[Diagnostic]:
     """Every field has a comment or a unit."""
     for field in own_fields(model):
         if not field.comment and not unit_of(field):
-            message = f"nothing says what `{field.name}` means"
-            hint = "write a comment above or beside it"
+            message = f"`{field.name}` has neither a comment nor a unit"
+            hint = "write a comment above or beside the field"
             yield codes.UNDOCUMENTED_FIELD.at(field.name_span, message, hint=hint)
 
 
@@ -171,7 +173,7 @@ def missing_units(model: Model) -> Iterator[Diagnostic]:
         if not unit or unit_of(field):
             continue
         if unit not in re.sub(r"[()]", " ", "\n".join(field.comment)).split():
-            hint = f"write it in brackets, as in `# [{unit}]`"
+            hint = f"write a unit in brackets in the comment, as in `# [{unit}]`"
             yield codes.MISSING_UNIT.at(field.name_span, f"`{field.name}` has no unit", hint=hint)
 
 
@@ -181,8 +183,8 @@ def unusual_units(model: Model) -> Iterator[Diagnostic]:
         unit = unit_of(field)
         usual = usual_unit(unit) if unit else None
         if unit and usual and not is_known_by(field.name, unit):
-            message = f"`{field.name}` is in [{unit}]"
-            hint = f"ROS uses [{usual}] (REP 103)"
+            message = f"the unit of `{field.name}` is [{unit}]"
+            hint = f"REP 103 recommends [{usual}]"
             yield codes.UNUSUAL_UNIT.at(field.name_span, message, hint=hint)
 
 
@@ -195,9 +197,45 @@ def constant_prefixes(model: Model) -> Iterator[Diagnostic]:
         for constant in whole:
             first = constant.name.partition("_")[0]
             if firsts[first] == 1 and len(whole) > 1 and first not in names:
-                text = f"`{constant.name}` does not say what it is a value of"
-                hint = f"begin it with the name of its field, as in `MODE_{constant.name}`"
+                text = f"`{constant.name}` does not begin with the name of a field"
+                hint = f"rename it after its field, for example to `MODE_{constant.name}`"
                 yield codes.CONSTANT_WITHOUT_PREFIX.at(constant.name_span, text, hint=hint)
+
+
+def enum_marks(model: Model) -> Iterator[Diagnostic]:
+    """A field that is marked `idlc: enum` is an integer, and has the constants that it lists."""
+    for message in own_sections(model):
+        constants: dict[str, list[str]] = {}
+        for enum in enums.enums(message):
+            names = sorted(constant.name for constant in enum.members.values())
+            constants |= dict.fromkeys((field.name for field in enum.fields), names)
+        for field in message.fields:
+            listed = enums.listed(field)
+            if listed is None:
+                continue
+            if not enums.holds_integers(field.type):
+                yield codes.ENUM_WITHOUT_CONSTANTS.at(
+                    field.name_span,
+                    f"`{field.name}` cannot have an enum, because it is not an integer",
+                    hint="remove the comment `idlc: enum`",
+                )
+                continue
+            names = constants.get(field.name, [])
+            if empty := [f"`{word}`" for word in listed if not _is_used(word, names)]:
+                yield codes.ENUM_WITHOUT_CONSTANTS.at(
+                    field.name_span,
+                    f"the enum of `{field.name}` has no constants that match {first_few(empty, 5)}",
+                    hint="list integer constants of this section, as in `idlc: enum(NAME, "
+                    "PREFIX_*)`; each must fit the field and not belong to another enum",
+                )
+
+
+def _is_used(word: str, names: Sequence[str]) -> bool:
+    """Return whether one of the sorted names is `word`, or begins with it up to `_*`."""
+    beginning = word.removesuffix("*") if word.endswith("_*") else word
+    at = bisect_left(names, beginning)
+    nearest = "".join(names[at : at + 1])
+    return nearest.startswith(beginning) if beginning != word else nearest == word
 
 
 def suffixes(model: Model) -> Iterator[Diagnostic]:
@@ -206,6 +244,7 @@ def suffixes(model: Model) -> Iterator[Diagnostic]:
         name, kind = interface.name.name, interface.name.kind
         endings = (ending for ending in _SUFFIXES[kind] if name.endswith(ending) and name != ending)
         if suffix := next(endings, None):
-            message = f"`{name}.{kind}` says twice that it is a .{kind} file"
-            hint = f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use"
+            message = f"the name `{name}.{kind}` repeats the kind of the file"
+            better = f"{name.removesuffix(suffix)}.{kind}"
+            hint = f"call it `{better}`, unless programs already use the interface"
             yield codes.REDUNDANT_SUFFIX.of(ir.path_of(interface), message, hint=hint)

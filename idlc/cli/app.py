@@ -2,15 +2,46 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 
 import click
 
 from idlc.cli.exit_status import PipeClosedError, status_of
+from idlc.cli.streams import colours
 from idlc.version import __version__
+
+_EXAMPLE = re.compile("(?m)^Examples?(, [a-z ]+)?:$")
+#: Quoted text in click's sentences, but not in code.
+_QUOTED = re.compile("(`[^`]*`)|'([^']*)'")
+
+
+class _HelpFormatter(click.HelpFormatter):
+    """Colours headings and names; click removes the colours if the output has none."""
+
+    def write_usage(self, prog: str, args: str = "", prefix: str | None = None) -> None:
+        """Write the first line of the help."""
+        super().write_usage(prog, args, prefix or f"{click.style('Usage:', bold=True)} ")
+
+    def write_heading(self, heading: str) -> None:
+        """Write the heading of a section."""
+        self.write(f"{'':{self.current_indent}}{click.style(f'{heading}:', bold=True)}\n")
+
+    def write_text(self, text: str) -> None:
+        """Write paragraphs, and colour the heading of an example."""
+        super().write_text(_EXAMPLE.sub(lambda match: click.style(match[0], bold=True), text))
+
+    def write_dl(self, rows: Iterable[tuple[str, str]], *args: int, **widths: int) -> None:
+        """Write the names and descriptions of commands or options."""
+        coloured = [(click.style(name, fg="cyan"), text) for name, text in rows]
+        super().write_dl(coloured, *args, **widths)
+
+
+class _Context(click.Context):
+    formatter_class = _HelpFormatter
 
 
 class LazyGroup(click.Group):
@@ -20,6 +51,7 @@ class LazyGroup(click.Group):
     the commands that are suggested for them.
     """
 
+    context_class = _Context
     overview: Mapping[str, str]
     modules: str
     synonyms: Mapping[str, str]
@@ -33,6 +65,7 @@ class LazyGroup(click.Group):
         if cmd_name not in self.overview:
             return None
         command: click.Command = import_module(f"{self.modules}{cmd_name}").command
+        command.context_class = _Context
         return command
 
     def resolve_command(
@@ -47,7 +80,7 @@ class LazyGroup(click.Group):
             synonym = self.synonyms.get(name.lower())
             hint = f"did you mean `{synonym}`?" if synonym else did_you_mean(name, self.overview)
             hint = hint or f"the commands are {', '.join(self.overview)}"
-            raise click.UsageError(f"no such command: {name!r}; {hint}", ctx)
+            raise click.UsageError(f"no such command: `{name}`; {hint}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -58,26 +91,34 @@ class LazyGroup(click.Group):
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
 COMMANDS = {
+    "init": "Set up a package, library or workspace.",
     "gen": "Compile interface files into a Python package.",
-    "check": "Report every problem of interface files.",
-    "breaking": "Report what breaks against another version.",
-    "fmt": "Lay interface files out.",
+    "check": "Check interface files and packages.",
+    "breaking": "Compare two versions and report breaking changes.",
+    "fmt": "Format interface files.",
     "hash": "Print type hashes (RIHS01).",
-    "show": "Show an interface with the messages in it.",
-    "columns": "Write topics of a recording as Parquet, Arrow or CSV.",
-    "list": "List the packages and types that are known here.",
-    "docs": "Write a site about interfaces.",
-    "lsp": "Serve an editor.",
-    "describe": "Print a type description, as ROS 2 installs it.",
-    "scaffold": "Write packages, interfaces and nodes.",
-    "explain": "Explain a code such as IDL201.",
+    "show": "Show an interface with its nested messages.",
+    "columns": "Convert recorded topics to Parquet, Arrow or CSV.",
+    "upgrade": "Convert recordings to new versions of their types.",
+    "echo": "Print the messages of a robot's topic.",
+    "call": "Call a service of a robot.",
+    "record": "Record topics of a robot.",
+    "list": "List packages and types.",
+    "robot": "Connect programs without ROS to each other and to robots.",
+    "docs": "Generate a documentation site.",
+    "lsp": "Run the language server.",
+    "describe": "Print a type description as JSON.",
+    "scaffold": "Create packages, interfaces and nodes.",
+    "doctor": "Check the installed programs, ROS 2 and packages.",
+    "explain": "Explain a rule such as IDL201.",
 }
 
 
 #: Words of other tools, with the names of the commands here.
 SYNONYMS = {
     **dict.fromkeys(("generate", "compile", "build", "codegen", "make"), "gen"),
-    **dict.fromkeys(("new", "create", "init", "add"), "scaffold"),
+    **dict.fromkeys(("new", "create", "add"), "scaffold"),
+    **dict.fromkeys(("setup", "adopt", "start"), "init"),
     **dict.fromkeys(("lint", "validate", "verify", "test"), "check"),
     **dict.fromkeys(("format", "tidy"), "fmt"),
     **dict.fromkeys(("doc", "documentation", "html", "site"), "docs"),
@@ -85,6 +126,8 @@ SYNONYMS = {
     **dict.fromkeys(("info", "cat", "view", "print", "proto"), "show"),
     **dict.fromkeys(("ls", "packages", "types", "search", "find"), "list"),
     **dict.fromkeys(("export", "convert", "extract", "parquet", "arrow", "csv", "read"), "columns"),
+    **dict.fromkeys(("migrate", "rewrite", "update"), "upgrade"),
+    **dict.fromkeys(("zenoh", "router", "daemon"), "robot"),
     **dict.fromkeys(("rule", "rules", "why", "codes"), "explain"),
 }
 
@@ -110,7 +153,7 @@ class App(LazyGroup):
         if args[0] == "help" and len(args) > 1:
             args = [*args[1:], *([] if ctx.resilient_parsing else ["--help"])]
         elif args[0] == "help" and not ctx.resilient_parsing:
-            click.echo(ctx.get_help())
+            click.echo(ctx.get_help(), color=ctx.color)
             ctx.exit()
         return super().resolve_command(ctx, args)
 
@@ -123,7 +166,7 @@ Example:
   echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
   idlc gen demo -o out/demo
 
-Completion of commands, options, types and codes, for bash, zsh and fish:
+Complete commands, options, types and codes in bash, zsh or fish:
 
 \b
   eval "$(_IDLC_COMPLETE=bash_source idlc)"
@@ -142,7 +185,7 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
     __version__, "-V", "--version", prog_name="idlc", message="%(prog)s %(version)s"
 )
 def app() -> None:
-    """Compile ROS 2 interfaces (.msg, .srv, .action) to Python, without CMake or a compiler."""
+    """Compile ROS 2 interfaces (.msg, .srv, .action) to Python, without CMake or a C++ compiler."""
 
 
 def run(words: list[str]) -> int:
@@ -152,10 +195,27 @@ def run(words: list[str]) -> int:
 
 def _through_click(words: list[str]) -> object:
     name = "rosidlc" if Path(sys.argv[0]).stem == "rosidlc" else "idlc"
+    colour = colours(sys.stdout)
     try:
-        return app.main(words, prog_name=name, standalone_mode=False)
-    except click.ClickException as error:
+        return app.main(words, prog_name=name, standalone_mode=False, color=colour)
+    except getattr(click.exceptions, "NoArgsIsHelpError", ()) as error:  # click 8.2 or later
         error.show()
+        return 2
+    except click.ClickException as error:
+        from idlc.cli.output import usage_error
+
+        context = getattr(error, "ctx", None)
+        message, _, hint = error.format_message().partition("; ")
+        if isinstance(error, click.NoSuchOption) and error.possibilities:
+            message, hint = error.message, f"did you mean `{error.possibilities[0]}`?"
+        command = context.command_path if context else " ".join((name, *words[:1]))
+        hint = hint or f"`{command} --help` lists the arguments and options"
+        if message[1:2].islower():  # click begins its sentences with a capital letter
+            message = f"{message[0].lower()}{message[1:].rstrip('.')}"
+        message = re.sub(
+            r"got unexpected extra (arguments? )\((.*)\)", r"unexpected \1`\2`", message
+        )
+        usage_error(_QUOTED.sub(lambda match: match[1] or f"`{match[2]}`", message), hint)
         return 2
     except click.Abort as error:
         raise KeyboardInterrupt from error

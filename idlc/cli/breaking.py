@@ -14,34 +14,51 @@ if TYPE_CHECKING:
     from idlc.compare.breaking import Verdict
     from idlc.compare.recording import RecordedVerdict
     from idlc.compare.running import GraphVerdict
+    from idlc.diagnostics.report import Report
 GRAPH = "graph"
 PATIENCE = 5.0
 
 
-def _summary(verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...]) -> str:
-    """Return the last line of the text, with what was not compared or not shown."""
+#: For each broken level, the worst first, the consequence: for nodes, and for recordings.
+_CONSEQUENCES = {
+    "wire": ("nodes built from different versions cannot talk", "the recordings are misread"),
+    "hash": ("nodes built from different versions cannot talk", "the type hashes differ"),
+    "source": ("code that uses the old version fails",) * 2,
+    "behaviour": ("the same code behaves differently",) * 2,
+}
+
+
+def _summary(
+    verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...], report: Report
+) -> str:
+    """Return the last line of the text: changes, consequence, omissions and the next version."""
     from idlc.compare.breaking import Verdict
+    from idlc.compare.recording import RecordedVerdict
     from idlc.diagnostics.report import first_few
     from idlc.diagnostics.terminal import counted
 
-    parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
-    text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
+    broken = {level: number for level, number in verdict.levels.items() if number}
+    text = "no breaking changes"
+    if broken:
+        parts = ", ".join(f"{number} {level}" for level, number in broken.items())
+        number = sum(bool(problem.levels) for problem in report)
+        consequence = _CONSEQUENCES[next(iter(broken))][isinstance(verdict, RecordedVerdict)]
+        text = f"{counted(number, 'breaking change')} ({parts}): {consequence}"
     if verdict.hidden:
-        at = "" if parts else f" at level {', '.join(levels)}"
+        at = "" if broken else f" at level {', '.join(levels)}"
         text += f"{at}; --level hides {counted(verdict.hidden, 'change')}"
     if isinstance(verdict, Verdict) and verdict.not_compared:
-        within = "" if parts or verdict.hidden else " in what was compared"
-        text += f"{within}; not compared: {len(verdict.not_compared)}"
+        text += f"; {len(verdict.not_compared)} not compared"
     if verdict.allowed:
-        text += f"; allowed: {verdict.allowed}"
+        text += f"; {verdict.allowed} allowed"
     if not isinstance(verdict, Verdict):
         seen = [counted(number, noun) for noun, number in verdict.seen.items()]
-        text += f"; looked at {', '.join(seen)}"
+        text += f"; compared {', '.join(seen)}"
         facts = verdict._asdict()
         if silent := facts.get("silent"):
-            text += f"; without type hash: {silent}"
+            text += f"; {counted(silent, 'endpoint')} without a type hash"
         if others := facts.get("others"):
-            text += f"; {counted(others, 'change')} that no reader sees; --level shows them"
+            text += f"; hidden: {counted(others, 'change')} without effect on readers (see --level)"
         return text
     if verdict.added:
         text += f"; added: {first_few(verdict.added, 5)}"
@@ -50,7 +67,7 @@ def _summary(verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[st
         same = not any((*numbers, verdict.added, verdict.not_compared))
         return f"{text}; the versions are the same" if same else text
     if verdict.next_version:
-        return f"{text}; the next version after {verdict.version} is {verdict.next_version}"
+        return f"{text}; suggested version: {verdict.next_version} (now {verdict.version})"
     return f"{text}; raise the {verdict.part} version"
 
 
@@ -73,25 +90,28 @@ EPILOG += "\n" + options.example(
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--against",
-    metavar="DIR|git:REF|idlc.lock|REC|distro:NAME|graph",
-    help="The version to compare with: a folder, a git revision, the type hashes in a lock, "
-    "recordings (a pattern such as 'bags/*.mcap' means several), the standard interfaces of a "
-    "distribution, or what the nodes of the running ROS 2 graph use (a folder of that name is "
-    "./graph).",
+    metavar="DIR|git:REF|idlc.lock|REC|distro:NAME|graph|ADDRESS",
+    help="The version to compare with: a folder, a git revision, the type hashes in idlc.lock, a "
+    "recording, or the standard interfaces of a distribution. For several recordings, write a "
+    "pattern, such as 'bags/*.mcap'. To compare with running nodes, write the word "
+    "'graph', or the address of a robot, such as tcp/robot:7447. For a folder named graph, write "
+    "./graph.",
 )
 @click.option(
     "--timeout",
     metavar="SECONDS",
     type=click.FloatRange(min=0, min_open=True),
-    help="How long to wait for news from the graph, and for its nodes' answers.  [default: 5]",
+    help="With --against graph or ADDRESS, stop waiting for nodes and replies after this time.  "
+    "[default: 5]",
 )
 @click.option(
     "--level",
     "levels",
     multiple=True,
     type=click.Choice(("wire", "hash", "source", "behaviour")),
-    help="Only report what breaks this. May be repeated; otherwise all, or against recordings what "
-    "readers of them would notice.",
+    help="Report only changes with this level. May be repeated. By default, idlc reports all "
+    "changes. If you compare with recordings, it reports only changes that affect programs that "
+    "read recordings.",
 )
 @options.packages
 @options.distro
@@ -104,42 +124,50 @@ def command(
     style: str,
     **scoping: Any,
 ) -> int:
-    """Report what a new version of interfaces breaks, and for whom.
+    """Compare two versions of interfaces and report breaking changes.
 
-    wire: bytes recorded before are read wrongly or not at all. hash: the middleware may not
-    deliver messages between both versions. source: code fails. behaviour: the same code does
-    something else.
+    idlc assigns one or more of these levels to each breaking change:
 
-    With distro:NAME, the standard interfaces that PATH uses are compared with that
-    distribution's, or all of them if there is no PATH.
+    \b
+    wire       existing data is misread or unreadable
+    hash       the type hash differs, so middleware might not deliver messages
+    source     code that uses the interface fails
+    behaviour  the same code behaves differently
 
-    Against recordings, the question is whether they can still be read: interfaces of PATH that
-    were recorded are compared, or without PATH all that are known here.
+    With distro:NAME, idlc compares two versions of each standard interface that PATH uses: the
+    version in your distribution and the version in the distribution NAME. Without PATH, it compares
+    all standard interfaces.
 
-    Against the graph, it reports the types of which running nodes have several versions, or
-    another one than the files here or the installed packages.
-    """
+    With a recording, idlc reports changes that prevent programs with your interfaces from reading
+    the recording. Without PATH, it compares every recorded type that it also finds on this machine.
+
+    With graph or the address of a robot, idlc reports types of which running nodes use different
+    versions. It also compares these versions with your files and your installed packages.
+    """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli import output
     from idlc.compare import packages
     from idlc.compare.breaking import GIT, BreakingOptions, breaking
     from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
     from idlc.project.settings import scope, settings_here
+    from idlc.robot.session import is_address
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
         raise click.UsageError(
-            "give --against DIR, git:REF, idlc.lock, a recording, distro:NAME or graph"
+            "missing option '--against'; give DIR, git:REF, idlc.lock, a recording, distro:NAME "
+            "or graph"
         )
-    if timeout is not None and against != GRAPH:
-        raise click.UsageError("--timeout is for --against graph")
+    is_running = against == GRAPH or is_address(against or "")
+    if timeout is not None and not is_running:
+        raise click.UsageError("--timeout needs --against graph")
     verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
     if against is not None and not report.had_errors:
         recordings: tuple[str, ...] = ()
         files = paths
-        if against != GRAPH and not is_distro(against) and not against.startswith(GIT):
+        if not is_running and not is_distro(against) and not against.startswith(GIT):
             from idlc.recordings.find import recordings_of
 
             recordings, files = recordings_of(against, paths, settings.root)
@@ -158,14 +186,14 @@ def command(
 
             verdict = compare_with_recordings(comparison, recordings, report)
             output.notes(report, sys.stderr)
-        elif against == GRAPH:
+        elif is_running:
             from idlc.compare.running import compare_with_graph
 
             patience = timeout or PATIENCE
             verdict = compare_with_graph(comparison, patience, report, has_paths=bool(paths))
         else:
             verdict = breaking(comparison, report)
-    text = _summary(verdict, levels) if verdict else ""
+    text = _summary(verdict, levels, report) if verdict else ""
     if style in options.DOCUMENTS:
         output.document(report, style, "breaking")
         if style == "github" and verdict:

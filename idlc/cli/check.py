@@ -15,42 +15,48 @@ from idlc.cli import completion, options
     "--select",
     metavar="RULE,...",
     shell_complete=completion.rules,
-    help="Only these: categories, codes, their names, `all`.",
+    help="Enable only these rules, by category, code or name; `all` enables every rule.",
 )
-@click.option("--ignore", metavar="RULE,...", shell_complete=completion.rules, help="Not these.")
-@click.option("--fix", is_flag=True, help="Fix what can be fixed without harm.")
-@click.option("--strict", is_flag=True, help="Fail on warnings as well.")
-@click.option("--statistics", is_flag=True, help="Show only how often each rule was broken.")
+@click.option(
+    "--ignore", metavar="RULE,...", shell_complete=completion.rules, help="Disable these rules."
+)
+@click.option("--fix", is_flag=True, help="Apply safe fixes.")
+@click.option(
+    "--diff", is_flag=True, help="Show the changes that --fix would make, and write nothing."
+)
+@click.option("--strict", is_flag=True, help="Also fail on warnings.")
+@click.option("--statistics", is_flag=True, help="Show only the number of problems for each rule.")
 @click.option(
     "--prefix",
     metavar="DIR",
     type=click.Path(),
-    help="Look at what is installed in a folder instead: whether C++ tools can load it.",
+    help="Check whether C++ tools can load the packages in this install prefix.",
 )
 @options.packages
 @options.distros
 @options.report_style
 def command(paths: tuple[str, ...], **arguments: Any) -> int:
-    """Report every problem of interface files and of the packages around them.
+    """Check interface files and the packages that contain them.
 
-    PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv
-    or .action file; without it, `paths` in pyproject.toml, or the working folder.
+    PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv or
+    .action file. If PATH is a package.xml, CMakeLists.txt, setup.py, setup.cfg or pyproject.toml,
+    idlc checks the package that the file belongs to. Without PATH, idlc checks the `paths` in
+    pyproject.toml. If `paths` is not set, idlc checks the working folder.
 
-    For several distributions, each problem is reported once, with those for which it holds.
+    If you select several distributions, idlc reports each problem once and names the affected
+    distributions.
 
-    Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
+    The categories of rules are correctness, portability, style and package. `idlc explain` lists
+    all rules.
     """
-    from idlc.check.select import is_selector
+    from idlc.check.select import is_selector, similar_selector
     from idlc.cli.direct import check_paths
 
     for word in f"{arguments['select'] or ''},{arguments['ignore'] or ''}".split(","):
         if word and not is_selector(word):
-            from idlc.diagnostics.codes import CATEGORIES, CODES
-            from idlc.diagnostics.text import did_you_mean
-
-            hint = did_you_mean(word, (*CATEGORIES, *(code.slug for code in CODES.values())))
-            hint = hint or "`idlc explain` lists the codes"
-            raise click.UsageError(f"{word!r} means no rule; {hint}")
-    if arguments["prefix"] is not None and (paths or arguments["fix"]):
-        raise click.UsageError("--prefix looks at what is installed, without PATH and --fix")
+            raise click.UsageError(f"{word!r} is not a rule; {similar_selector(word)}")
+    if arguments["prefix"] is not None and (paths or arguments["fix"] or arguments["diff"]):
+        raise click.UsageError("--prefix checks an install prefix; omit PATH, --fix and --diff")
+    if arguments["diff"] and arguments["style"] != "text":
+        raise click.UsageError("--diff writes text; omit --format")
     return check_paths(paths, **arguments)

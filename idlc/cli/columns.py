@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from typing import Any
 
@@ -13,6 +14,7 @@ from idlc.cli import completion, options
 @click.command(
     "columns",
     epilog=options.example(
+        "idlc columns rec.mcap /imu",
         "idlc columns rec.mcap /imu -o imu.parquet",
         "idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv",
         "idlc columns rec.mcap -o columns/",
@@ -26,33 +28,37 @@ from idlc.cli import completion, options
     metavar="OUT",
     default="-",
     type=click.Path(),
-    help="The file to write, .parquet, .arrow or .csv; for several topics a folder, or a name with "
-    "`{topic}` in it. Otherwise, Arrow's stream format goes to standard output.",
+    help="Output file (.parquet, .arrow or .csv). For several topics, give a folder, or a file "
+    "name that contains `{topic}`. Without -o, idlc shows charts and the first rows on a terminal, "
+    "and writes Arrow's stream format to a pipe.",
 )
 @click.option(
     "--format",
     "style",
-    type=click.Choice(("parquet", "arrow", "csv")),
-    help="Otherwise what OUT ends with, or parquet in a folder.",
+    type=click.Choice(("text", "parquet", "arrow", "csv")),
+    help="Output format. By default, idlc uses the format of OUT's extension. If OUT is a folder, "
+    "it writes Parquet files.",
 )
 @click.option(
-    "--fields", metavar="FIELD,...", help="Only these, such as `header.stamp,linear_acceleration`."
+    "--fields",
+    metavar="FIELD,...",
+    help="Select fields, such as `header.stamp,linear_acceleration`.",
 )
 @click.option(
     "--from",
     "start",
     metavar="TIME",
-    help="From this time on: `10` or `1m30s` after the start, a time of ROS, or a date in UTC.",
+    help="Start time: an offset from the start (`10` or `1m30s`), a ROS time, or a UTC date.",
 )
-@click.option("--to", "end", metavar="TIME", help="Until before this time.")
-@click.option("--nested", is_flag=True, help="Keep messages in messages as structs.")
+@click.option("--to", "end", metavar="TIME", help="End time (exclusive).")
+@click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(
     "--datetimes/--no-datetimes",
     default=True,
     show_default=True,
-    help="Make Time and Duration one column each.",
+    help="Convert each Time and Duration to one column.",
 )
-@click.option("--check", is_flag=True, help="Compare the checksums of the recording.")
+@click.option("--check", is_flag=True, help="Verify the checksums of the recording.")
 @click.option(
     "--index/--no-index",
     "use_index",
@@ -61,13 +67,13 @@ from idlc.cli import completion, options
     help="Use the indexes of MCAP files.",
 )
 @options.include
-@click.option("--force", is_flag=True, help="Replace files that exist.")
+@click.option("--force", is_flag=True, help="Replace existing files.")
 def command(subject: str, fields: str | None, **arguments: Any) -> int:
-    """Write topics of a recording as columns, for pandas, DuckDB and others.
+    """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.
 
-    REC is an .mcap or .db3 file, or the folder of a bag; several, or a pattern such as
-    'drive_*.mcap', are read as one. Without TOPIC, all topics are written.
-    Each row has the time when a message was recorded, and a column for each of its fields.
+    REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc reads
+    several recordings as one recording. Without TOPIC, it reads all topics. In the table of a
+    topic, each row is a message. The columns are the recording time and the fields.
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
@@ -82,8 +88,12 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
     with output.progress_bar(sys.stderr) as update:
         written = columns(request, report, update)
+    width = shutil.get_terminal_size((100, 24)).columns
+    previews = [file.preview.text(width) for file in written if file.preview]
+    output.texts(("".join(f"{line}\n" for line in lines) for lines in previews), "text", sys.stdout)
     for file in written:
-        sys.stderr.write(f"{file.topic}: {file.rows:,} messages → {file.path}\n")
+        if not file.preview:
+            sys.stderr.write(f"{file.topic}: {file.rows:,} messages → {file.path}\n")
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     return output.status(report)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
 
     from idlc.model import ir
     from idlc.project.library import Library
+    from idlc.robot.keys import Kind
+    from idlc.robot.session import Session
 
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
@@ -45,6 +48,67 @@ def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     recordings = filter(None, (read_topics(path, root, Report()) for path in words))
     names = {topic.topic.name for recording in recordings for topic in recording.topics}
     return sorted(name for name in names if name.startswith(word))
+
+
+#: Seconds that a shell waits for a robot.
+ROBOT_TIMEOUT = 1.0
+
+
+@contextmanager
+def _robot(context: click.Context) -> Iterator[Session | None]:
+    """Yield a session with the robot that was typed; `None` if it does not answer soon."""
+    from idlc.diagnostics.report import Report
+    from idlc.robot.live.connect import connected
+
+    address = context.params.get("address") or next(iter(context.args), "")
+    with connected(str(address), Report(), ROBOT_TIMEOUT) as session:
+        yield session
+
+
+def robot_topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
+    """Offer the topics of the robot that was typed."""
+    from idlc.robot.keys import Kind
+
+    return _robot_names(context, word, Kind.PUBLISHER, Kind.SUBSCRIPTION)
+
+
+def robot_services(context: click.Context, _: click.Parameter, word: str) -> list[str]:
+    """Offer the services of the robot that was typed."""
+    from idlc.robot.keys import Kind
+
+    return _robot_names(context, word, Kind.SERVICE)
+
+
+def _robot_names(context: click.Context, word: str, *kinds: Kind) -> list[str]:
+    from idlc.robot.live.connect import robot_entities
+
+    with _robot(context) as session:
+        entities = robot_entities(session, *kinds) if session else []
+    return sorted({end.name for end in entities if end.name.startswith(word)})
+
+
+def robot_fields(
+    context: click.Context, _: click.Parameter, word: str
+) -> list[CompletionItem[str]]:
+    """Offer the fields of the request of the service that was typed."""
+    from idlc.diagnostics.report import Report
+    from idlc.robot.keys import Kind
+    from idlc.robot.live import traffic
+    from idlc.robot.live.connect import find_endpoints
+    from idlc.runtime.typeinfo import structure_of
+
+    name = str(context.params.get("service") or "")
+    address = str(context.params.get("address") or "")
+    with _robot(context) as session:
+        ends = find_endpoints(session, name, (Kind.SERVICE,), Report()) if session else []
+        kind = None
+        if session and ends:
+            kind = traffic.interface_class(session, address, ends[0], Report())
+    return (
+        [_item(each) for each in traffic.field_names(structure_of(kind.Request), word)]
+        if kind
+        else []
+    )
 
 
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 )
 @options.scoped(options.package, options.include, options.distro)
 def command(subject: str, scope: Scope, report: Report) -> None:
-    """Print a type description with its hashes: the JSON that ROS 2 installs."""
+    """Print the type description and the type hashes of an interface as JSON.
+
+    ROS 2 installs files with the same format, such as Header.json.
+    """
     import json
 
     from idlc.documents.show import describe

@@ -11,6 +11,7 @@ def check_paths(
     select: str | None = None,
     ignore: str | None = None,
     fix: bool = False,
+    diff: bool = False,
     strict: bool = False,
     style: str = "text",
     statistics: bool = False,
@@ -29,6 +30,7 @@ def check_paths(
     from idlc.cli import output
     from idlc.diagnostics import terminal
     from idlc.diagnostics.terminal import counted
+    from idlc.diagnostics.text import one_line
     from idlc.project.settings import scope, settings_here
 
     settings, report = settings_here()
@@ -40,22 +42,30 @@ def check_paths(
         checked = check_prefix(prefix, settings.root, report)
     elif not report.had_errors:
         where = scope(settings, package, include, exclude, distro)
-        options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix)
+        options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix, diff)
         checked = check(options, report)
     files, fixed = checked.files, checked.fixed
     match style:
         case "text":
+            stream = sys.stderr if diff else sys.stdout  # a diff alone can be applied
+            paint = output.painter(stream)
+            for name, (old, new) in checked.texts.items() if diff else ():
+                sys.stdout.writelines(output.diff(name, old, new, sys.stdout))
             if not statistics:
-                output.show(report, style, sys.stdout)
+                output.show(report, style, stream, fixable=True)
             if statistics or len(report) > terminal.MANY:
-                sys.stdout.writelines(terminal.statistics(report))
-            done = f"{counted(fixed, 'problem')} fixed, " if fixed else ""
+                stream.writelines(terminal.statistics(report))
+            done = f"{fixed} {'would be fixed' if diff else 'fixed'}, " if fixed else ""
             what = counted(len(files), "file")
             if not files and checked.packages:
                 what = f"{counted(checked.packages, 'package')} without interfaces"
             which = f" for {', '.join(checked.distros)}" if checked.distros else ""
-            rest = terminal.summary(report) if len(report) else f"no problems in {what}{which}"
-            sys.stdout.write(f"{done}{rest}\n")
+            rest = paint("good", f"no problems in {what}{which}")
+            stream.write(f"{done}{terminal.summary(report) if len(report) else rest}\n")
+            if fixable := sum(bool(problem.edits) for problem in report):
+                star = paint("hint", "[*]")
+                stream.write(f"{star} {counted(fixable, 'problem')} fixable with `--fix`\n")
+            sys.stderr.writelines(f"note: {one_line(note)}\n" for note in checked.notes)
         case "json":
             output.show(report, style, sys.stdout)
             facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
@@ -63,7 +73,7 @@ def check_paths(
             output.fact(sys.stdout, "summary", **output.counts(report), **facts)
         case _:
             output.document(report, style, "check", files, strict=strict)
-    return output.status(report) or int(strict and bool(len(report)))
+    return output.status(report) or int((strict and len(report) > 0) or (diff and fixed > 0))
 
 
 def serve_editor() -> int:
@@ -71,7 +81,9 @@ def serve_editor() -> int:
     from idlc.editor.server import serve
 
     if sys.stdin.isatty():
-        sys.stderr.write("an editor starts this, and talks to it; Ctrl-C ends it\n")
+        sys.stderr.write(
+            "the language server waits for an editor on standard input; press Ctrl-C to stop it\n"
+        )
     # a thread may still read when the program ends, so it is not sys.stdin that it waits in, and
     # what it waits in is never closed
     reader = open(sys.stdin.fileno(), "rb", closefd=False)  # noqa: SIM115

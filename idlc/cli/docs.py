@@ -15,15 +15,17 @@ if TYPE_CHECKING:
 
 @click.command("docs", epilog=options.example(*options.DEMO, "idlc docs demo -o site"))
 @click.argument("paths", metavar="[PATH|PACKAGE|TYPE]...", nargs=-1, type=click.Path())
-@click.option("-o", "--out", metavar="DIR", required=True, type=click.Path(), help="The site.")
+@click.option("-o", "--out", metavar="DIR", required=True, type=click.Path(), help="Output folder.")
 @options.scoped(options.package, options.include, options.exclude, options.distro)
 def command(paths: tuple[str, ...], out: str, scope: Scope, report: Report) -> str:
-    """Write a static HTML site about interfaces: links, units, constants, hashes, a search.
+    """Generate a static HTML site that describes interfaces and links their types.
 
-    It needs no server and loads nothing from elsewhere. PACKAGE and TYPE are names, as for `gen`.
+    The site also shows units, constants and type hashes, and has a search. It needs no server and
+    loads nothing from other hosts. PACKAGE and TYPE are names, as in
+    `idlc gen`.
     """
     from idlc.diagnostics.terminal import counted
     from idlc.documents.docs import docs
 
     pages = docs(paths or scope.paths or (".",), out, scope, report)
-    return f"{counted(pages, 'page')} in {out}, begin with {out}/index.html\n" if pages else ""
+    return f"{counted(pages, 'page')} written; open {out}/index.html\n" if pages else ""

@@ -2,48 +2,20 @@
 
 from __future__ import annotations
 
-import codecs
 import contextlib
-import io
+import errno
 import os
 import sys
 from collections.abc import Callable
 
-#: Replacements of characters that an encoding does not have.
-_PLAIN = {"→": "->", "…": "..."}
-
-
-def set_up() -> None:
-    """Replace characters that cannot be encoded, and redirect output on Windows as elsewhere.
-
-    There, files and pipes would get a local encoding and other line ends, which other programs
-    cannot read. PYTHONIOENCODING takes precedence.
-    """
-    codecs.register_error("idlc", _readable)
-    for stream in (sys.stdout, sys.stderr):
-        if not isinstance(stream, io.TextIOWrapper):
-            continue
-        with contextlib.suppress(ValueError):  # it is closed
-            stream.reconfigure(errors="idlc")
-            if sys.platform == "win32" and not stream.isatty():
-                stream.reconfigure(newline="\n")
-                if not os.environ.get("PYTHONIOENCODING"):
-                    stream.reconfigure(encoding="utf-8", errors="idlc")
-
-
-def _readable(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Return the replacement of the first character that cannot be encoded, and its end."""
-    if isinstance(error, UnicodeEncodeError) and (plain := _PLAIN.get(error.object[error.start])):
-        return plain, error.start + 1
-    if isinstance(error, UnicodeEncodeError):
-        error.end = error.start + 1
-    return codecs.backslashreplace_errors(error)
-
+from idlc.cli.streams import set_up
 
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
 PIPE_CLOSED = 141
 INTERNAL = 3
+#: The errors of a standard stream whose disk is full.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class PipeClosedError(Exception):
@@ -58,7 +30,9 @@ def status_of(command: Callable[[], object]) -> int:
     except OSError as error:  # its path may be too long
         reason = f"cannot be opened: {(error.strerror or str(error)).lower()}"
         reason = "is gone" if isinstance(error, FileNotFoundError) else reason
-        sys.stderr.write(f"Error: the working folder {reason}\n")
+        from idlc.cli.output import usage_error
+
+        usage_error(f"the working folder {reason}", "change to another folder with `cd`")
         return 2
     try:
         status = command()
@@ -67,13 +41,28 @@ def status_of(command: Callable[[], object]) -> int:
         sys.stderr.write("interrupted\n")
         return INTERRUPTED
     except (BrokenPipeError, PipeClosedError):
-        # buffered output would fail again when Python closes the stream
-        with contextlib.suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return PIPE_CLOSED
+    except OSError as error:
+        if error.errno not in _FULL or error.filename:
+            return _internal(error)
+        _discard_output()
+        from idlc.cli.output import usage_error
+
+        reason = os.strerror(error.errno).lower()
+        usage_error(
+            f"cannot write the output: {reason}", "free space on the disk, and run it again"
+        )
+        return 2
     except Exception as error:
         return _internal(error)
     return status if isinstance(status, int) else 0
+
+
+def _discard_output() -> None:
+    """Discard buffered output, which would fail again when Python closes the stream."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _internal(error: Exception) -> int:

@@ -3,31 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from typing import TextIO
 
 import click
 
 from idlc.cli import options
-
-
-def _diff(path: str, old: str, new: str, stream: TextIO) -> Iterator[str]:
-    """Yield a unified diff: for a program as it is, for a terminal without control characters."""
-    from difflib import unified_diff
-
-    from idlc.cli import output
-    from idlc.diagnostics.text import one_line, visible
-
-    path = one_line(path)
-    before, after = old.splitlines(keepends=True), new.splitlines(keepends=True)
-    codes = {"+": "32", "-": "31", "@": "36"} if output.colours(stream) else {}
-    for line in unified_diff(before, after, f"a/{path}", f"b/{path}"):
-        text = line.rstrip("\r\n")
-        shown = visible(text) if stream.isatty() else text
-        code = codes.get(line[:1])
-        yield f"\x1b[{code}m{shown}\x1b[0m\n" if code else f"{shown}\n"
-        if not line.endswith(("\n", "\r")):
-            yield "\\ No newline at end of file\n"
 
 
 @click.command(
@@ -40,19 +19,21 @@ def _diff(path: str, old: str, new: str, stream: TextIO) -> Iterator[str]:
 )
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option("--check", is_flag=True, help="Write nothing; fail if a file would change.")
-@click.option("--diff", is_flag=True, help="Write nothing; show what would change, and fail if so.")
+@click.option(
+    "--diff", is_flag=True, help="Write nothing; show the changes and fail if there are any."
+)
 @options.exclude
 def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...]) -> int:
-    """Tidy the blanks of interface files, and leave alone what was laid out with care.
+    """Normalize whitespace and keep deliberate alignment.
 
-    A gap between words stays if it is one blank (or two before a comment), if it puts a word in one
-    column with another of its kind, or if the whole block has the same gap. A stray word moves
-    into the column of its neighbours, or else next to the word before it. `=` has blanks on both
-    sides or on none. There are at most two blank lines in a row. A file that is changed also loses
-    the blanks at the ends of its lines; these alone, or a missing line end, change no file.
+    idlc keeps single spaces between words, and two spaces before a comment. It keeps wider gaps if
+    they align words of the same kind, or if all lines of a block have them. Otherwise, it aligns
+    the word with the lines above and below, or moves it next to the previous word. It puts spaces
+    on both sides of `=` or on neither side, and keeps at most two consecutive empty lines. If idlc
+    changes a file, it also removes trailing whitespace and adds a missing final newline.
 
-    Nothing else changes, so the meaning stays. Files with syntax errors are left alone. PATH is as
-    for `idlc check`.
+    Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
+    as in `idlc check`.
     """
     from idlc.check.compiler import stage
     from idlc.check.format import laid_out
@@ -68,7 +49,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     settings, report = settings_here()
     write = not (check or diff)
     done = "changed" if write else "would change"
-    broken, clean = "with errors left alone", "already formatted"
+    broken, clean = "with errors skipped", "already formatted"
     numbers = dict.fromkeys((done, broken, clean), 0)
     if not report.had_errors:
         left_out = scope(settings, exclude=exclude).exclude
@@ -86,7 +67,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
             if write:
                 rewrite(file.path, file.shown, source.text, new, report)
             if diff:
-                sys.stdout.writelines(_diff(file.shown, source.text, new, sys.stdout))
+                sys.stdout.writelines(output.diff(file.shown, source.text, new, sys.stdout))
             else:
                 sys.stdout.write(f"{done} {one_line(file.shown)}\n")
     output.show(report, "text", sys.stderr)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,9 +14,14 @@ from idlc.cli import completion, options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
+    from idlc.diagnostics.terminal import Paint
     from idlc.generate.gen import GenOptions
     from idlc.generate.package import Generated
     from idlc.project.find import Stamp
+    from idlc.project.root import Root
+
+#: The seconds between two looks at the files.
+INTERVAL = 0.25
 
 
 def once(request: GenOptions, style: str) -> int:
@@ -35,7 +40,8 @@ def once(request: GenOptions, style: str) -> int:
             outcome = "" if request.check else "; nothing was written"
             sys.stderr.write(f"{summary(report)}{outcome}\n")
         else:
-            sys.stdout.writelines([_line(package, request.check) for package in packages])
+            paint = output.painter(sys.stdout)
+            sys.stdout.writelines([_line(package, request.check, paint) for package in packages])
     else:
         _document(report, style, packages, check=request.check)
     return output.status(report)
@@ -56,7 +62,7 @@ def _document(
     output.fact(sys.stdout, "summary", **output.counts(report))
 
 
-def _line(package: Generated, check: bool) -> str:
+def _line(package: Generated, check: bool, paint: Paint) -> str:
     """Return the line about a package: its size, and the changes if only a part was written."""
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
@@ -65,13 +71,26 @@ def _line(package: Generated, check: bool) -> str:
     note = "" if is_all else f" ({'up to date' if check else package.changes})"
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
-        f"{package.package}: {counted(package.interfaces, 'interface')} → "
+        f"{paint('good', package.package)}: {counted(package.interfaces, 'interface')} → "
         f"{counted(package.files, 'file')} in {one_line(package.out)}, "
         f"runtime {package.runtime}{note}{needs}\n"
     )
 
 
-INTERVAL = 0.25
+def _set_up_below(root: Root) -> Iterator[str]:
+    """Yield the folders of packages that `idlc gen` compiles without arguments."""
+    from idlc.diagnostics.report import Report
+    from idlc.diagnostics.text import one_line
+    from idlc.generate.gen import GenOptions, in_package, with_settings
+    from idlc.project.find import list_files
+    from idlc.project.root import Root
+    from idlc.project.settings import load_settings, scope
+
+    for folder in list_files((".",), root, Report()).packages:
+        settings = load_settings(Root.at(folder), Report())
+        request = in_package(with_settings(GenOptions((), scope(settings)), settings))
+        if request.out and list_files(request.paths, request.scope.root, Report()).files:
+            yield one_line(root.shown(folder))
 
 
 def run_again(request: GenOptions, style: str) -> int:
@@ -81,7 +100,7 @@ def run_again(request: GenOptions, style: str) -> int:
     try:
         seen = now = _snapshot(request)
         once(request, style)
-        sys.stderr.write(f"watching {one_line(', '.join(request.paths))}; Ctrl-C ends\n")
+        sys.stderr.write(f"watching {one_line(', '.join(request.paths))}; press Ctrl-C to stop\n")
         while True:
             sys.stdout.flush()
             sys.stderr.flush()
@@ -108,7 +127,7 @@ EPILOG += "\n" + options.example(
     "[tool.idlc]",
     'paths = ["demo"]',
     'out = "out/demo"',
-    title="All options can be kept in pyproject.toml",
+    title="You can set PATH and OUT in pyproject.toml",
 )
 
 
@@ -123,13 +142,13 @@ class _Command(click.Command):
 
 @click.command("gen", cls=_Command, epilog=EPILOG)
 @click.argument("paths", metavar="PATH|PACKAGE|TYPE|REC...", nargs=-1, type=click.Path())
-@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
+@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="Output folder.")
 @click.option(
     "--ament",
     metavar="PREFIX",
     type=click.Path(),
     default="",
-    help="Install into a prefix, complete for ROS 2 and its C++ tools.",
+    help="Install the package into this folder for ROS 2 and its C++ tools.",
 )
 @click.option(
     "--topic",
@@ -137,12 +156,12 @@ class _Command(click.Command):
     metavar="NAME",
     multiple=True,
     shell_complete=completion.topics,
-    help="Of recordings, only the types of this topic. May be repeated.",
+    help="Compile only the types that this recorded topic uses. May be repeated.",
 )
 @options.packages
 @options.distro
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
-@click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
+@click.option("--watch", is_flag=True, help="Keep running and compile again after every change.")
 @click.option(
     "--vendor-deps",
     "vendoring",
@@ -150,26 +169,35 @@ class _Command(click.Command):
     is_flag=False,
     flag_value="private",
     metavar="[=beside]",
-    help="Write the types that OUT uses of other packages into it, or these packages beside it.",
+    help="Copy types of other packages into OUT if the interfaces use them. With =beside, write "
+    "the copies as packages next to OUT.",
 )
 @click.option(
     "--runtime",
     type=click.Choice(["carried", "installed"]),
-    help="Have a copy of the runtime in OUT, or import idlc-runtime. As before, at first carried.",
+    help="`carried` copies the runtime into OUT. With `installed`, OUT imports idlc-runtime. By "
+    "default, idlc repeats the choice of the last run; the first run uses `carried`.",
 )
-@click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Also replace files that you edited or that idlc did not write, and keep backups.",
+)
 @options.report_style
 def command(style: str, watch: bool, **arguments: Any) -> int:
     """Compile interface files into a Python package.
 
-    PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
-    packages, or the name of a package or type that is installed or built in: std_msgs/msg/Header.
-    REC is a recording, an .mcap or .db3 file or the folder of a bag: all that its topics need.
+    PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv or
+    .action file. PACKAGE and TYPE are names of installed or built-in interfaces, such as
+    std_msgs and std_msgs/msg/Header. REC is a recording: an .mcap or .db3 file, or a bag folder.
+    idlc compiles the types of all topics in a recording.
 
-    OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
-    number of packages can share, there is nothing to build: `source PREFIX/setup.bash`. In a
-    package with a setup.py, PATH and OUT default to the package and the folder that setup.py takes
-    it from.
+    idlc writes the Python package to the folder OUT. If you compile several packages, idlc writes
+    each package to its own folder, OUT/NAME. In the folder of a package with a setup.py, you can
+    omit PATH and OUT: idlc then compiles this package into its Python folder.
+
+    With --ament, idlc installs the package into the folder PREFIX, which several packages can
+    share. To use these packages, run `source PREFIX/setup.bash`. No build is necessary.
     """
     from idlc.cli import output
     from idlc.generate.gen import GenOptions, in_package, with_settings
@@ -192,24 +220,25 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     request = in_package(with_settings(typed, settings))
     if not request.paths or not (request.out or request.ament):
         missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
-        raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
+        message = f"missing {missing}; add it, or set it in [tool.idlc] of pyproject.toml"
+        if not request.paths and (packages := list(_set_up_below(request.scope.root))):
+            call = output.program()
+            commands = (f"(cd {shlex.quote(path)} && {call} gen)" for path in packages)
+            message = f"this folder contains several packages; run `{' && '.join(commands)}`"
+        raise click.UsageError(message)
     root = request.scope.root
     # which may have no effect on the paths
     judged = request.paths if package or request.topics else ()
     recordings, others = split_recordings(judged, root)
     if request.topics and not recordings:
-        raise click.UsageError("--topic is for recordings, and none was given")
+        raise click.UsageError("--topic needs a recording")
     if package and not any(is_path(word, root) for word in others):
-        what = "what was recorded" if recordings else "what is installed"
-        raise click.UsageError(
-            f"--package is for files, and none was given; {what} keeps the name that messages have"
-        )
+        what = "a recording" if recordings else "an installed package"
+        raise click.UsageError(f"--package applies to files, but {what} keeps its own package name")
     if request.check and (watch or request.force):
-        raise click.UsageError(
-            "--check writes nothing, so it goes with neither --watch nor --force"
-        )
+        raise click.UsageError("--check cannot be combined with --watch or --force")
     if watch and style in options.DOCUMENTS:
-        raise click.UsageError("--watch goes with --format text and json only")
+        raise click.UsageError("--watch needs --format text or json")
     if watch:
         return run_again(request, style)
     return once(request, style)

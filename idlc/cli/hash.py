@@ -25,11 +25,15 @@ if TYPE_CHECKING:
 )
 @options.scoped(options.package, options.include, options.exclude, options.distro)
 def command(subjects: tuple[str, ...], scope: Scope, report: Report) -> None:
-    """Print type hashes (RIHS01), derived types of services and actions included.
+    """Print the type hashes (RIHS01) of interfaces.
 
-    TYPE is a name such as std_msgs/msg/Header, PATH a file or folder as for `idlc gen`.
+    For a service or action, idlc also prints the hashes of the messages that ROS 2 derives from it.
+
+    TYPE is a name such as std_msgs/msg/Header. PATH is a file or folder, as in `idlc gen`.
     """
+    from idlc.cli import output
     from idlc.documents.show import hashes
 
+    paint = output.painter(sys.stdout)
     for value, name in hashes(subjects, scope, report):
-        sys.stdout.write(f"{value}  {name}\n")
+        sys.stdout.write(f"{paint('value', value)}  {name}\n")

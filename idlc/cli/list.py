@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 @options.scoped(options.include, options.distro)
 @options.style
 def command(packages: tuple[str, ...], style: str, scope: Scope, report: Report) -> None:
-    """List the packages that are known here, or the interfaces of some.
+    """List the packages that idlc can find, or the interfaces in each PACKAGE.
 
-    Known are packages below the working folder, along -I, in the ament prefixes, and the standard
-    ones of a distribution, which are built in.
+    idlc searches the working folder, the -I folders and the ament prefixes. It also contains the
+    standard packages of each distribution.
     """
     from idlc.cli import output
     from idlc.diagnostics.terminal import counted
@@ -37,8 +37,10 @@ def command(packages: tuple[str, ...], style: str, scope: Scope, report: Report)
         for name in names:
             output.fact(sys.stdout, "interface", name=name)
         return
+    paint = output.painter(sys.stdout)
     width = max((len(package.name) for package in listed), default=0)
     for name, number, path in listed:
         place = one_line(path) if path else "built in"
-        sys.stdout.write(f"{name:{width}}  {counted(number, 'interface'):>14}  {place}\n")
+        head = f"{paint('type', name)}{' ' * (width - len(name))}"
+        sys.stdout.write(f"{head}  {counted(number, 'interface'):>14}  {place}\n")
     sys.stdout.writelines(f"{name}\n" for name in names)

@@ -10,21 +10,24 @@ from idlc.cli import options
 
 
 @click.command("lsp", epilog=options.example("idlc lsp --check"))
-@click.option("--check", is_flag=True, help="Print what the server can do, as JSON, and end.")
+@click.option("--check", is_flag=True, help="Print the server's capabilities as JSON, and exit.")
 @click.option(
-    "--stdio", is_flag=True, expose_value=False, help="Many editors add it; it is so anyway."
+    "--stdio",
+    is_flag=True,
+    expose_value=False,
+    help="Some editors pass this option. It has no effect, because the server always uses stdio.",
 )
 @click.option(
     "--clientProcessId",
     metavar="ID",
     expose_value=False,
-    help="Some editors add it; they say the same when they begin.",
+    help="Some editors pass this option. It has no effect.",
 )
 def command(check: bool) -> int:
-    """Serve an editor, which starts this and talks to it over standard input and output.
+    """Run the language server on standard input and output. Your editor starts it.
 
-    The protocol is the Language Server Protocol 3.17; the language id of .msg, .srv and .action
-    files is `rosmsg`. Settings are those of [tool.idlc], and those that the editor sends.
+    The server implements the Language Server Protocol 3.17. It reads [tool.idlc] and the editor's
+    settings. The language id of .msg, .srv and .action files is `rosmsg`.
     """
     if check:
         import json

@@ -53,8 +53,8 @@ def typed(*without: str) -> tuple[str, ...]:
 package = click.option(
     "--package",
     metavar="NAME",
-    help="The package's name. By default, the name in the nearest package.xml, the name of the "
-    "package that was generated from the files, or the folder's name.",
+    help="Package name. By default, idlc uses the name in the nearest package.xml. If there is no "
+    "package.xml, it uses the name of the generated package, or else the name of the folder.",
 )
 include = click.option(
     "-I",
@@ -62,14 +62,14 @@ include = click.option(
     metavar="DIR",
     multiple=True,
     type=click.Path(file_okay=False),
-    help="Look for other packages here first: a package, a source tree or an install prefix. "
-    "May be repeated.",
+    help="Search this folder first for packages that the interfaces use. The folder can be a "
+    "package, a source tree or an install prefix. May be repeated.",
 )
 exclude = click.option(
     "--exclude",
     metavar="PATTERN",
     multiple=True,
-    help="Leave out files or folders such as `msg/ros1/**` or `*_test`. May be repeated.",
+    help="Exclude files or folders, such as `msg/ros1/**` or `*_test`. May be repeated.",
 )
 
 
@@ -80,7 +80,7 @@ def packages(command: Command) -> Command:
 
 def _single(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
     if value and "," in value:
-        raise click.UsageError("--distro takes one name here; only `idlc check` takes several")
+        raise click.UsageError("--distro takes one name; only `idlc check` takes several")
     return _several(context, option, value)
 
 
@@ -89,12 +89,15 @@ def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | 
 
     for name in split_names(value) if value is not None else ():
         if name not in BY_NAME:
-            raise click.UsageError(f"there is no distribution {name!r}; {unknown_distro(name)}")
+            raise click.UsageError(f"no such distribution: {name!r}; {unknown_distro(name)}")
     return value
 
 
 def _distro(metavar: str, text: str, callback: Any) -> Callable[[Command], Command]:
-    more = "Otherwise `distro` in [tool.idlc], what is installed, or jazzy."
+    more = (
+        "By default, idlc uses `distro` in [tool.idlc]. If `distro` is not set, idlc uses the "
+        "installed distribution, or else jazzy."
+    )
     return click.option(
         "--distro",
         metavar=metavar,
@@ -104,8 +107,10 @@ def _distro(metavar: str, text: str, callback: Any) -> Callable[[Command], Comma
     )
 
 
-distro = _distro("NAME", "The distribution of ROS 2 to work for.", _single)
-distros = _distro("NAME,...", "Check for these distributions of ROS 2.", _several)
+distro = _distro("NAME", "Name of the ROS 2 distribution.", _single)
+distros = _distro(
+    "NAME,...", "Check that the interfaces work in these ROS 2 distributions.", _several
+)
 
 
 def output_style(formats: Sequence[str], text: str) -> Callable[[Command], Command]:
@@ -116,18 +121,19 @@ def output_style(formats: Sequence[str], text: str) -> Callable[[Command], Comma
     )
 
 
-style = output_style(FORMATS, "For people, or one JSON object per line.")
+style = output_style(FORMATS, "Output format: text, or one JSON object per line.")
 report_style = output_style(
-    REPORT_FORMATS, "For people, one JSON object per line, or what a CI system reads."
+    REPORT_FORMATS, "Output format: text, one JSON object per line, or the format of a CI system."
 )
 
 
 def scoped(
-    *options: Callable[[Any], Any],
+    *options: Callable[[Any], Any], despite_errors: bool = False
 ) -> Callable[[Callable[..., str | None]], Callable[..., int]]:
     """Have a command called with the `scope` that these options mean, and a `report`.
 
-    It is not called if the settings have errors. What it returns is written after the report.
+    Unless `despite_errors`, it is not called if the settings have errors. What it returns is
+    written after the report.
     """
 
     def decorate(command: Callable[..., str | None]) -> Callable[..., int]:
@@ -144,7 +150,7 @@ def scoped(
 
             settings, report = settings_here()
             text = None
-            if not report.had_errors:
+            if despite_errors or not report.had_errors:
                 where = scope(settings, package, include, exclude, distro)
                 text = command(**arguments, scope=where, report=report)
             output.show(report, "text", sys.stderr)

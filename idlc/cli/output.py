@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
+from idlc.cli.streams import colours
 from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.terminal import Paint
 from idlc.diagnostics.text import one_line, visible
 from idlc.version import __version__
 
@@ -55,22 +57,42 @@ def progress_bar(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
         stream.write(f"\r{' ' * size}\r")
 
 
-def colours(stream: TextIO) -> bool:
-    """Return whether to colour a stream: if it is a terminal, unless the user says otherwise."""
-    if os.environ.get("NO_COLOR"):
-        return False
-    if os.environ.get("FORCE_COLOR"):
-        return True
-    return stream.isatty() and os.environ.get("TERM") != "dumb"
+def painter(stream: TextIO) -> Paint:
+    """Return the function that styles text for a stream."""
+    return terminal.painter(colour=colours(stream))
 
 
-def show(report: Report, style: str, stream: TextIO) -> None:
-    """Write every problem to a stream, as text or as JSON lines."""
+def show(report: Report, style: str, stream: TextIO, *, fixable: bool = False) -> None:
+    """Write every problem to a stream, as text or as JSON lines; see `terminal.text`."""
     if style == "json":
         stream.writelines(terminal.json_lines(report))
     else:
-        blocks = terminal.text(report, colour=colours(stream))
+        blocks = terminal.text(report, colour=colours(stream), fixable=fixable)
         stream.writelines([f"{block}\n" for block in blocks])
+
+
+def usage_error(message: str, hint: str) -> None:
+    """Write a problem of the command line or the environment, which has no code."""
+    paint = painter(sys.stderr)
+    head = f"{paint('error', 'error')}: {paint('bold', one_line(message))}"
+    advice = f"{paint('frame', '=')} {paint('hint', 'hint')}: {one_line(hint)}"
+    sys.stderr.write(f"{head}\n  {advice}\n")
+
+
+def diff(path: str, old: str, new: str, stream: TextIO) -> Iterator[str]:
+    """Yield a unified diff: for a program as it is, for a terminal without control characters."""
+    from difflib import unified_diff
+
+    path = one_line(path)
+    before, after = old.splitlines(keepends=True), new.splitlines(keepends=True)
+    styles, paint = {"+": "good", "-": "bad", "@": "type"}, painter(stream)
+    for line in unified_diff(before, after, f"a/{path}", f"b/{path}"):
+        text = line.rstrip("\r\n")
+        shown = visible(text) if stream.isatty() else text
+        style = styles.get(line[:1])
+        yield f"{paint(style, shown) if style else shown}\n"
+        if not line.endswith(("\n", "\r")):
+            yield "\\ No newline at end of file\n"
 
 
 def notes(report: Report, stream: TextIO) -> None:
@@ -85,12 +107,27 @@ def fact(stream: TextIO, kind: str, **facts: object) -> None:
     stream.write(json.dumps({"type": kind, **facts}) + "\n")
 
 
-def texts(parts: Iterable[str], style: str, stream: TextIO) -> None:
-    """Write interfaces, one after the other."""
+#: The coloured elements of an interface; quoted text is first, because it may contain `#`.
+_ELEMENTS = re.compile(
+    r"""(?mx) (?P<value> '(?:[^'\\\n]|\\.)*' | "(?:[^"\\\n]|\\.)*" )
+    | (?P<comment> \#.* ) | (?P<type> ^\ *[^\s\#]+ )"""
+)
+
+
+def texts(parts: Iterable[str], style: str, stream: TextIO, *, interfaces: bool = False) -> None:
+    """Write texts, one after the other; `interfaces` in the text format are coloured."""
     text = "\n".join(parts)
     if style == "text" or stream.isatty():  # other formats are for other tools
         text = "\n".join(map(visible, text.split("\n")))
+    if interfaces and style == "text":
+        paint = painter(stream)
+        text = _ELEMENTS.sub(lambda match: paint(str(match.lastgroup), match[0]), text)
     stream.write(text)
+
+
+def lines(text: str, stream: TextIO) -> None:
+    """Write whole lines; a terminal gets them without control characters."""
+    stream.write("\n".join(map(visible, text.split("\n"))) if stream.isatty() else text)
 
 
 def counts(report: Report) -> dict[str, int]:

@@ -27,7 +27,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("idlc", "ROS 2 interface files")
     group.addoption("--idlc", action="store_true", help="check .msg, .srv and .action files")
-    group.addoption("--idlc-strict", action="store_true", help="let warnings of idlc fail as well")
+    group.addoption("--idlc-strict", action="store_true", help="also fail on warnings from idlc")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:

@@ -14,10 +14,10 @@ from idlc.cli.options import Command
 
 #: Each command with its line in the overview.
 COMMANDS = {
-    "package": "Write a new package.",
-    "interface": "Write a .msg, .srv or .action file.",
-    "node": "Write a node with its test, and enter it in its package.",
-    "templates": "List the templates of nodes and packages, or copy one to change it.",
+    "package": "Create a package.",
+    "interface": "Create a .msg, .srv or .action file.",
+    "node": "Create a node with a test, and register it in its package.",
+    "templates": "List the templates, or copy one to change it.",
 }
 
 
@@ -50,23 +50,23 @@ class Scaffold(LazyGroup):
     ),
 )
 def command() -> None:
-    """Write packages, interfaces and nodes, and enter them where they belong.
+    """Create packages, interfaces and nodes, and update the files that refer to them.
 
-    Running a command twice changes nothing the second time.
+    A second run of the same command changes nothing.
     """
 
 
 def writing(function: Command) -> Command:
     """Add the options of a command that writes files, perhaps by templates."""
-    dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the difference.")
+    dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the changes.")
     force = click.option(
-        "--force", is_flag=True, help="Replace existing files that differ, keeping copies."
+        "--force", is_flag=True, help="Replace existing files that differ, and keep backups."
     )
     templates = click.option(
         "--templates",
         metavar="DIR",
         type=click.Path(file_okay=False),
-        help="Use the templates of this folder instead of those of the same names.",
+        help="Use a template in this folder instead of idlc's template of the same name.",
     )
     return dry(force(templates(function)))
 
@@ -92,7 +92,7 @@ def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
     changes = [done for done in result.done if done.what != "unchanged"]
     sys.stdout.writelines(f"{done.what} {folder}{done.path}\n" for done in changes)
     if not changes:
-        sys.stdout.write("nothing to do: everything is there\n")
+        sys.stdout.write("nothing to do\n")
     sys.stdout.writelines(f"note: {note}\n" for note in result.notes)
     if changes:
         if result.following:

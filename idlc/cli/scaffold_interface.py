@@ -21,7 +21,7 @@ EPILOG = options.example(
 @click.argument("kind", type=click.Choice(["msg", "srv", "action"]))
 @click.argument("name", metavar="NAME")
 @click.argument("fields", metavar="FIELD...", nargs=-1, type=click.UNPROCESSED)
-@click.option("--comment", default="", help="What the interface is for.")
+@click.option("--comment", default="", help="Description of the interface.")
 @common
 def command(
     kind: str,
@@ -31,10 +31,10 @@ def command(
     include: tuple[str, ...],
     **arguments: Any,
 ) -> int:
-    """Write an interface of the package that the working folder belongs to.
+    """Create an interface in the package that contains the working folder.
 
-    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]'; the parts of services and
-    actions are separated by ---.
+    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]'. `---` separates the sections
+    of services and actions.
     """
     from idlc.diagnostics.report import Report
     from idlc.model.ir import KINDS

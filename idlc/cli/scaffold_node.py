@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,7 +15,10 @@ from idlc.cli import completion
 from idlc.cli.scaffold import common, finish
 from idlc.model import ir
 from idlc.scaffold import spec
-from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, Endpoint, Role
+from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, Endpoint, Role, qos_preset
+
+if TYPE_CHECKING:
+    from idlc.scaffold.translator import Request
 
 DONE = "done"
 PARAMETER = "parameter"
@@ -37,13 +40,15 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
     choices = click.Choice([*roles, PARAMETER, DONE])
     endpoints: list[Endpoint] = []
     parameters: list[spec.Parameter] = []
-    while (chosen := click.prompt(f"Add ({DONE} to finish)", type=choices, default=DONE)) != DONE:
+    while (
+        chosen := click.prompt(f"Add an endpoint ({DONE} to finish)", type=choices, default=DONE)
+    ) != DONE:
         if chosen == PARAMETER:
             answer = _answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter)
             parameters.append(spec.parameter(answer))
         else:
             endpoints.append(_endpoint(roles[chosen], check_type))
-    lifecycle = click.confirm("Make it a lifecycle node?", default=False, prompt_suffix=" ")
+    lifecycle = click.confirm("Lifecycle node?", default=False, prompt_suffix=" ")
     endpoints.sort(key=lambda endpoint: ROLES.index(endpoint.role))
     return spec.Node(name, "", tuple(endpoints), tuple(parameters), lifecycle)
 
@@ -83,14 +88,15 @@ def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
 
 
 EPILOG = """\
-TYPE is an interface of your own package (RobotCommand) or any other (std_msgs/String). An
-endpoint can be followed by its --qos. Without options, on a terminal, you are asked.
+TYPE is an interface in your package (RobotCommand) or in another package (std_msgs/String). If you
+give no endpoints on a terminal, idlc asks for them.
 
 Example, within a package:
 
 \b
   idlc scaffold node talker --publisher std_msgs/String:chatter@2 --qos latched
   idlc scaffold node listener --subscriber std_msgs/String:chatter --param verbose:bool=true
+  idlc scaffold node drive_translator --translate git:v1.0 . --topic Drive:drive:drive_v2
 """
 
 
@@ -105,7 +111,7 @@ class NodeCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Assign each quality of service to its endpoint, then parse as usual."""
         if not ctx.resilient_parsing:
-            names = {role.name for role in ROLES if role.kind}
+            names = {"topics", *(role.name for role in ROLES if role.kind)}
             counts: Counter[str] = Counter()
             last: tuple[str, int] | None = None
             owners = ctx.meta[_OWNERS] = []
@@ -116,13 +122,34 @@ class NodeCommand(click.Command):
                     counts[name] += 1
                 elif name == "qos":
                     if last is None:
-                        raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
+                        raise click.UsageError("--qos must follow its endpoint", ctx)
                     owners.append(last)
         return super().parse_args(ctx, args)
 
 
 #: The key of the endpoints with a --qos in the context: for each, its role and its index.
 _OWNERS = "idlc.qos"
+
+
+def _translator(name: str, others: list[str], arguments: Mapping[str, Any]) -> Request:
+    """Return the translation that is asked for; raise ValueError if it is incomplete."""
+    from idlc.scaffold.translator import Request, topic
+
+    if arguments["versions"] is None or not arguments["topics"]:
+        raise ValueError("use --translate OLD NEW together with --topic TYPE:NAME:NEW_NAME")
+    if others:
+        raise ValueError("a translator has no other endpoints; create another node for them")
+    presets = _presets(arguments)
+    topics = tuple(
+        topic(text, name, qos_preset(presets.get(("topics", n), DEFAULT_QOS.name)))
+        for n, text in enumerate(arguments["topics"])
+    )
+    return Request(arguments["versions"], topics, arguments["rules"])
+
+
+def _presets(arguments: Mapping[str, Any]) -> dict[tuple[str, int], str]:
+    owners = click.get_current_context().meta[_OWNERS]
+    return dict(zip(owners, arguments["qos"], strict=True))
 
 
 def _role_options(function: Any) -> Any:
@@ -142,6 +169,31 @@ def _role_options(function: Any) -> Any:
 @click.argument("name", metavar="NAME")
 @_role_options
 @click.option(
+    "--translate",
+    "versions",
+    metavar="OLD NEW",
+    nargs=2,
+    help="Translate from one version of interfaces to another. OLD and NEW are package folders or "
+    "distributions (distro:NAME). If either is a package folder, the other can be a git revision "
+    "of this folder (git:REF).",
+)
+@click.option(
+    "--topic",
+    "topics",
+    metavar="TYPE:NAME:NEW_NAME",
+    multiple=True,
+    help="With --translate: a topic or service. NAME is its name for the old version, and NEW_NAME "
+    "its name for the new version.",
+)
+@click.option(
+    "--rules",
+    metavar="PATH",
+    multiple=True,
+    type=click.Path(),
+    help="With --translate: copy the rules from this file or folder into the node. `idlc upgrade "
+    "--write-rules` writes rules.",
+)
+@click.option(
     "--param", "parameters", metavar="NAME:TYPE=DEFAULT", multiple=True, help="Declare a parameter."
 )
 @click.option(
@@ -150,16 +202,17 @@ def _role_options(function: Any) -> Any:
     metavar="|".join(QOS_NAMES),
     multiple=True,
     shell_complete=lambda _, __, word: [name for name in QOS_NAMES if name.startswith(word)],
-    help="The quality of service of the endpoint before it.",
+    help="Set the quality of service of the preceding endpoint.",
 )
-@click.option("--lifecycle", is_flag=True, help="Make it a managed node, with states.")
-@click.option("--launch/--no-launch", default=True, help="Enter it in the launch file, or not.")
+@click.option("--lifecycle", is_flag=True, help="Create a lifecycle node.")
+@click.option("--launch/--no-launch", default=True, help="Add the node to the launch file.")
 @common
 def command(name: str, **arguments: Any) -> int:
-    """Write a node of the package that the working folder belongs to.
+    """Create a node in the package that contains the working folder.
 
-    Writes the module and its test, and adds the command to setup.py, the packages that it needs
-    to package.xml and the node to the launch file, unless it does one thing and ends.
+    idlc writes the module and a test. It adds the command to setup.py and the dependencies to
+    package.xml. It also adds the node to the launch file, unless the node performs a single task
+    and exits.
     """
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
@@ -168,13 +221,16 @@ def command(name: str, **arguments: Any) -> int:
     shared = ("dry_run", "force", "include", "templates", "launch")
     settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle")
+    translator = None
     try:
         spec.check_name(name)
-        if not any(arguments[option] for option in described) and interactive():
+        if any(arguments[option] for option in ("versions", "topics", "rules")):
+            translator = _translator(name, [*filter(arguments.get, described)], arguments)
+            requested = spec.Node(name, "")
+        elif not any(arguments[option] for option in described) and interactive():
             requested = ask(name, lambda role, type_: changes.check(role, type_, settings))
         else:
-            owners = click.get_current_context().meta[_OWNERS]
-            presets = dict(zip(owners, arguments["qos"], strict=True))
+            presets = _presets(arguments)
             endpoints = (
                 spec.endpoint(role, value, presets.get((role.name, n)))
                 for role in ROLES
@@ -186,7 +242,7 @@ def command(name: str, **arguments: Any) -> int:
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
-    result = new_node.node(requested, settings, report)
+    result = new_node.node(requested, settings, report, translator)
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
     python = Path(sys.executable).name
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)

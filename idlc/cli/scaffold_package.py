@@ -21,25 +21,26 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.command("package", epilog=EPILOG)
 @click.argument("name", metavar="NAME")
 @click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
-@click.option("--description", default="", help="What the package is for, in a sentence.")
-@click.option("--maintainer", help="Who answers for it; git's user.name if not given.")
-@click.option("--email", help="The maintainer's address; git's user.email if not given.")
+@click.option("--description", default="", help="Description of the package, in one sentence.")
+@click.option("--maintainer", help="Name of the maintainer.  [default: git's user.name]")
+@click.option("--email", help="Email address of the maintainer.  [default: git's user.email]")
 @click.option("--license", "licence", type=click.Choice(LICENSES))
 @click.option(
     "--interfaces",
     "--interfaces-only",
     "interfaces_only",
     is_flag=True,
-    help="Only interfaces, which CMake builds for nodes in any language, and pip for Python. "
-    "INTERFACE names those to begin with, such as `Drive` or `srv/Ask`.",
+    help="Create a package that contains only interfaces. CMake builds it for nodes in any "
+    "language, and pip builds it for Python. INTERFACE is an interface to create, such as "
+    "`Drive` or `srv/Ask`.",
 )
 @click.option(
     "--build-type",
     type=click.Choice(BUILD_TYPES),
-    help="ament_python is for nodes in Python and their interfaces; ament_cmake compiles "
-    "interfaces for C++ as well, and goes with --interfaces.",
+    help="ament_python builds Python nodes and their interfaces. ament_cmake requires "
+    "--interfaces, and also compiles the interfaces for C++.",
 )
-@click.option("-C", "--folder", metavar="DIR", default=".", help="Where to make it.")
+@click.option("-C", "--folder", metavar="DIR", default=".", help="Parent folder of the package.")
 @common
 def command(
     name: str,
@@ -49,9 +50,9 @@ def command(
     folder: str,
     **arguments: Any,
 ) -> int:
-    """Write a package that builds with colcon and installs with pip.
+    """Create a package that you can build with colcon and install with pip.
 
-    Interfaces in its msg/, srv/ and action/ folders are compiled whenever it is built.
+    Each build of the package compiles the interfaces in its msg/, srv/ and action/ folders.
     """
     from idlc.cli.output import program
     from idlc.diagnostics.report import Report
@@ -62,13 +63,13 @@ def command(
     from idlc.scaffold.package import Package, check_package_name, package
 
     if build_type == "ament_cmake" and not interfaces_only:
-        raise click.UsageError("--build-type ament_cmake goes with --interfaces")
+        raise click.UsageError("--build-type ament_cmake needs --interfaces")
     if interfaces_only and build_type == "ament_python":
         raise click.UsageError(
-            "--interfaces is for ament_cmake; ament_python packages can have interfaces, too"
+            "--interfaces needs ament_cmake; omit it: ament_python packages can contain them"
         )
     if starters and not interfaces_only:
-        raise click.UsageError("interfaces to begin with go with --interfaces")
+        raise click.UsageError("INTERFACE needs --interfaces")
     try:
         check_package_name(name)
         examples = dict(map(starter, (starters or ("Example",)) if interfaces_only else ()))
@@ -88,4 +89,5 @@ def command(
     chosen |= {"starters"} if starters else set()
     result = package(requested, folder, Settings(root, **shared), report, examples, chosen)
     inside = name if folder in ("", ".") else f"{folder}/{name}"
-    return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))
+    example = f"{program()} scaffold interface msg Status 'float32 battery'"
+    return finish(result, report, (f"cd {inside}", example))

@@ -23,26 +23,26 @@ from idlc.cli.scaffold import finish, writing
     metavar="NAME",
     multiple=True,
     shell_complete=completion.templates,
-    help="Copy one into your folder of templates, to change it there. May be repeated.",
+    help="Copy this template into your folder of templates. May be repeated.",
 )
 @writing
 def command(copies: tuple[str, ...], **arguments: Any) -> int:
-    """List the templates of nodes and packages, or copy some to change them.
+    """List the templates for nodes and packages, or copy templates so that you can change them.
 
-    Your folder is that of --templates, or of `templates` in [tool.idlc]; otherwise copies go to
-    templates/. A template there is used instead of the one of the same name.
+    --copy writes to the folder that you pass with --templates. Without --templates, it writes to
+    the folder in the setting `templates` of [tool.idlc]. If neither exists, it writes to the folder
+    templates/. A template in your folder replaces idlc's template of the same name.
     """
     from idlc.diagnostics.report import Report
-    from idlc.diagnostics.text import did_you_mean
     from idlc.project.root import Root
     from idlc.scaffold import changes
     from idlc.scaffold.changes import Settings
-    from idlc.scaffold.templates import names
+    from idlc.scaffold.templates import names, suggestion
 
     for name in copies:
         if name not in names():
-            hint = did_you_mean(name, names()) or "`idlc scaffold templates` lists them"
-            raise click.UsageError(f"there is no template {name!r}; {hint}")
+            hint = suggestion(name) or "`idlc scaffold templates` lists them"
+            raise click.UsageError(f"no such template: {name!r}; {hint}")
     if copies:
         report = Report()
         result = changes.copied(copies, Settings(Root.here(), **arguments), report)

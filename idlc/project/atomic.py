@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import itertools
 import os
 import signal
@@ -73,6 +74,24 @@ def create(path: str, data: bytes, how: int = os.O_TRUNC, *, sync: bool = False)
         with contextlib.suppress(OSError):
             Path(path).unlink()
         raise
+
+
+def move_new(path: Path, target: Path) -> None:
+    """Move a file or folder to a path that is free; raise FileExistsError if it is not."""
+    if sys.platform != "win32" and path.is_file():
+        try:
+            os.link(path, target)  # which no other file can precede
+        except FileExistsError:
+            raise
+        except OSError:  # some file systems have no links
+            pass
+        else:
+            with contextlib.suppress(OSError):
+                path.unlink()
+            return
+    if os.path.lexists(target):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target))
+    path.rename(target)
 
 
 def write_whole(target: Path, data: bytes, mode: int) -> None:
@@ -172,6 +191,35 @@ def uninterrupted() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _EndedError(BaseException):
+    """A signal is to end the process."""
+
+
+@contextlib.contextmanager
+def ended_by_errors() -> Iterator[None]:
+    """Let signals that would end the process end what is done first, as an exception does."""
+    received: list[int] = []
+
+    def end(number: int, _: Any) -> None:
+        received.append(number)
+        if len(received) == 1:
+            raise _EndedError
+
+    is_main = threading.current_thread() is threading.main_thread()
+    names = ("SIGTERM", "SIGHUP") if is_main else ()
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    mine = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    for number in mine:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in mine:
+            signal.signal(number, signal.SIG_DFL)
+        if received:
+            signal.raise_signal(received[0])
 
 
 @contextlib.contextmanager

@@ -144,8 +144,8 @@ def content(path: str | Path, size: int, most: int = sys.maxsize) -> bytes:
 
 def too_large(name: str) -> Diagnostic:
     """Return the problem with a file of more than `MAX_SIZE` bytes."""
-    message = f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is"
-    hint = "is it another kind of file with this extension?"
+    message = f"`{name}` is larger than {MAX_SIZE >> 20} MiB, the limit for interface files"
+    hint = "check that this is an interface file"
     return codes.TOO_LARGE.of(name, message, hint=hint)
 
 
@@ -165,7 +165,7 @@ def decode(data: bytes, name: str, report: Report) -> Source | None:
         return None
     if sum(map(text.count, _LINE_ENDS)) <= MAX_LINES:
         return Source(name, text)
-    message = f"`{name}` has more than {MAX_LINES:,} lines, which no interface file has"
+    message = f"`{name}` has more than {MAX_LINES:,} lines, too many for an interface file"
     report.add(codes.TOO_LARGE.of(name, message, hint="split it up"))
     return None
 

@@ -86,6 +86,8 @@ def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
 
 KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
 KIND_FOLDERS = frozenset(KINDS.values())
+#: The folder of rules for recordings of earlier versions, beside those.
+RULES = "upgrade"
 #: Folders with copies or without sources, which colcon and Python tools write.
 SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
 #: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
@@ -151,7 +153,7 @@ def no_interfaces(
         message = f"every interface file in `{folder}` is excluded"
         return codes.NO_INTERFACES.of(folder, message, hint="see `exclude` in [tool.idlc]")
     message = f"no {also}.msg, .srv or .action file in `{folder}`"
-    hint = "interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself"
+    hint = "idlc searches the folder itself and its msg/, srv/ and action/ folders"
     return codes.NO_INTERFACES.of(folder, message, hint=hint)
 
 
@@ -176,7 +178,7 @@ def list_files(
                 packages.setdefault(Path(whole).parent)
             elif path.suffix not in KINDS:
                 extension = path.suffix.lower()
-                message = f"`{path.name}` is not read, because ROS 2 knows `{extension}` only"
+                message = f"idlc skips `{path.name}`, because ROS 2 reads only `{extension}`"
                 hint = f"rename it to `{path.stem}{extension}`"
                 report.add(codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint))
             else:

@@ -51,8 +51,8 @@ _ELSEWHERE = frozenset(
     "GIT_DIR GIT_WORK_TREE GIT_COMMON_DIR GIT_INDEX_FILE GIT_OBJECT_DIRECTORY "
     "GIT_ALTERNATE_OBJECT_DIRECTORIES GIT_NAMESPACE GIT_PREFIX".split()
 )
-_NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
-_DAMAGED = "`git fsck` lists what is missing or damaged"
+_NAMES = "`git branch --all` and `git tag` list the revisions; `git fetch` updates them"
+_DAMAGED = "`git fsck` lists missing or damaged objects"
 #: Prefixes of git's error messages.
 _BAD = ("fatal: ", "error: ")
 
@@ -102,7 +102,7 @@ class Revision(NamedTuple):
 
     def holds(self, path: Path) -> bool:
         """Return whether a file of the working tree is in this repository, not in another."""
-        return _top(path) == self.top
+        return repository_of(path) == self.top
 
     def unknown(self, paths: Iterable[str]) -> Iterator[str]:
         """Yield the submodules below paths that are none any more: their files are not known."""
@@ -180,12 +180,12 @@ def commit(name: str, path: Path) -> str | None:
 def setting(name: str, folder: Path) -> str:
     """Return a setting of git for a folder, on one line; empty if there is none."""
     with suppress(GitError):
-        value = _git(_top(folder) or folder, ["config", "--get", name])
+        value = _git(repository_of(folder) or folder, ["config", "--get", name])
         return one_line(value.decode("utf-8", errors="replace").strip())
     return ""
 
 
-def _top(path: Path) -> Path | None:
+def repository_of(path: Path) -> Path | None:
     """Return the closest folder around a path that has a `.git`.
 
     Git would also take a tracked folder for a repository that only looks like the inside of one.
@@ -197,7 +197,7 @@ def _top(path: Path) -> Path | None:
 
 def _repository(path: Path) -> Path:
     """Return the top of the working tree that holds a path."""
-    top = _top(path)
+    top = repository_of(path)
     if top is None:
         raise GitError("not in a git repository")
     other = os.fsdecode(_git(top, ["rev-parse", "--show-toplevel"]).rstrip(b"\r\n"))
@@ -222,7 +222,7 @@ def _program() -> str:
     for entry in map(Path, os.get_exec_path()):
         if entry.is_absolute() and os.access(entry / name, os.X_OK) and (entry / name).is_file():
             return str(entry / name)
-    raise GitError("there is no `git` on PATH", "")
+    raise GitError("`git` is not on PATH", "")
 
 
 def _git(top: Path, words: Sequence[str], input_: bytes = b"", otherwise: str = "") -> bytes:
@@ -260,7 +260,7 @@ def _git(top: Path, words: Sequence[str], input_: bytes = b"", otherwise: str = 
     except (OSError, ValueError) as error:
         raise GitError(f"git cannot be run: {reason(error)}", "") from None
     if process.returncode:
-        why = otherwise or f"`git {words[0]}` ended with status {process.returncode}"
+        why = otherwise or f"`git {words[0]}` exited with status {process.returncode}"
         bad = [line[len(_BAD[0]) :] for line in lines if line.startswith(_BAD)]
         said_to_do = next((line.strip() for line in lines if line.startswith("\tgit ")), "")
         hint = f"`{one_line(said_to_do)}`" if said_to_do else None
@@ -283,7 +283,7 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
     names = list(dict.fromkeys(entry.identity for entry in selected))
     contents = dict(zip(names, _contents(top, names), strict=True))
     if rest:
-        raise GitError("git's list of files ends in the middle")
+        raise GitError("git's list of files is cut off")
     try:
         for mode, identity, path in selected:
             target = root / path
@@ -344,7 +344,7 @@ def _contents(top: Path, names: Sequence[bytes]) -> Iterator[bytes]:
             raise GitError(f"git does not have all of its files: {name.decode()} is missing")
         at = end + 1 + int(head[2])
         if answer[at : at + 1] != b"\n":
-            raise GitError(f"git's answer ends in the middle of {name.decode()}")
+            raise GitError(f"git's output is cut off in {name.decode()}")
         yield answer[end + 1 : at]
         at += 1
 

@@ -59,7 +59,7 @@ def name_of(
     name = _by_settings(home, scope) or _by_lock(home, scope.root, digests)
     if name:
         return name, ""
-    note = f"no package.xml: `{home.name}` is taken for the package's name; --package sets another"
+    note = f"without a package.xml, the package name is `{home.name}`; --package overrides it"
     return home.name, note
 
 
@@ -162,9 +162,9 @@ def load(
     for file in files:
         first = loaded.get(file.key)
         if first is not None:
-            message = f"`{file.key}` is defined by `{first.file.shown}` as well"
+            message = f"`{file.key}` is also defined by `{first.file.shown}`"
             hint = (
-                "a package can have only one interface of each kind and name; leave files out "
+                "a package can have only one interface of each kind and name; exclude files "
                 "with --exclude, or `exclude` in [tool.idlc]"
             )
             report.add(codes.DUPLICATE_INTERFACE.of(file.shown, message, hint=hint))
@@ -208,8 +208,8 @@ def without_duplicates(
         other = first.setdefault(package_inputs.package, package_inputs)
         if other is not package_inputs:
             home, elsewhere = root.shown(package_inputs.home), root.shown(other.home)
-            message = f"package `{package_inputs.package}` is in `{elsewhere}` as well"
-            hint = "remove one, or put a file COLCON_IGNORE into its folder"
+            message = f"package `{package_inputs.package}` is also in `{elsewhere}`"
+            hint = "remove one of them, or create a COLCON_IGNORE file in its folder"
             report.add(codes.DUPLICATE_PACKAGE.of(home, message, hint=hint))
     return tuple(first.values())
 

@@ -268,8 +268,8 @@ def interfaces(requested: Sequence[str], scope: Scope, report: Report) -> list[s
     for package in requested:
         names = [str(interface) for interface in library.interfaces(package)]
         if not names:
-            hint = did_you_mean(package, library.packages()) or "`idlc list` names the packages"
-            message = f"no package `{package}` is known here"
+            hint = did_you_mean(package, library.packages()) or "`idlc list` lists the packages"
+            message = f"no such package: `{package}`"
             report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
         listed += names
     return listed
@@ -297,13 +297,13 @@ def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Res
         return library, types
     if types:
         names = first_few((f"`{type_.name}`" for type_ in types), _LISTED)
-        message, hint = f"`{text}` may be {len(types)} types", f"name one of {names}"
+        message, hint = f"`{text}` can be {len(types)} types", f"write one of {names}"
     else:
         message = f"no such type: `{text}`"
         if not _DIVIDER.search(text):
-            message = f"`{text}` is no file or folder, and no type or package that is known here"
+            message = f"no file, folder, package or type named `{text}`"
         similar = _similar(_DIVIDER.split(text), library, scope.root)
-        hint = similar or "`idlc list` shows what is known here"
+        hint = similar or "`idlc list` lists the known packages and types"
     report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
     return library, ()
 
@@ -350,8 +350,8 @@ def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
     package = closest(parts[0], library.packages()) or ""
     named = {interface.name: str(interface) for interface in library.interfaces(package)}
     if package == parts[0]:
-        near, hint = closest(parts[-1], named), f"`idlc list {package}` names its types"
+        near, hint = closest(parts[-1], named), f"`idlc list {package}` lists its types"
     else:
         near = parts[-1] if parts[-1] in named else None
-        hint = f"package `{parts[0]}` is not known: point -I to it, or source its workspace"
+        hint = f"package `{parts[0]}` not found; add its folder with -I, or source its workspace"
     return f"did you mean `{named[near]}`?" if near else hint

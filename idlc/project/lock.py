@@ -127,7 +127,8 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     interfaces that were read, by full name, `outputs` the files written, by path below the
     lock: each with a SHA-256. `types` are the package's type hashes. `imports` are the modules of
     other packages that the generated code needs, `vendored` the packages written beside it.
-    `converts_values` is set where the classes convert values as in Lyrical.
+    `converts_values` is set where the classes convert values as in Lyrical, `enums` where they
+    have enums for all fields.
     """
 
     format: int
@@ -135,6 +136,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     package: str
     runtime: Runtime = "carried"
     vendor_deps: bool = False
+    enums: bool = False
     converts_values: bool | msgspec.UnsetType = msgspec.UNSET
     vendored: tuple[str, ...] = ()
     imports: tuple[str, ...] = ()
@@ -212,8 +214,11 @@ def encode(lock: Lock) -> bytes:
     return msgspec.json.format(msgspec.json.encode(lock, order="sorted"), indent=2) + b"\n"
 
 
-def load_lock(out: Path, name: str, report: Report) -> Lock | None:
-    """Return the lock of a generated package, `None` if it has none; report IDL615."""
+def load_lock(out: Path, name: str, report: Report, again: str = "idlc gen") -> Lock | None:
+    """Return the lock of a generated package, `None` if it has none; report IDL615.
+
+    `again` is the command for hints that writes the package.
+    """
     path = out / FILE
     if not is_file(path):
         return None
@@ -228,10 +233,10 @@ def load_lock(out: Path, name: str, report: Report) -> Lock | None:
         hint = "upgrade idlc"
         if "newer" not in why:
             hint = (
-                "restore it from version control, or run again with --force, which keeps a copy "
+                f"restore it from version control, or run `{again} --force`, which keeps a copy "
                 "of every file that it replaces"
             )
-        report.add(codes.BAD_LOCK.of(shown, f"`{shown}` cannot be used: {why}", hint=hint))
+        report.add(codes.BAD_LOCK.of(shown, f"`{shown}` is unusable: {why}", hint=hint))
         return None
 
 
@@ -246,7 +251,7 @@ def _decoded(data: bytes, kind: type[Content]) -> Content:
 
 def _decline_newer(read: _Header | Lock) -> None:
     if read.format > FORMAT:
-        raise ValueError(f"it was written by idlc {read.idlc}, which is newer than this one")
+        raise ValueError(f"it was written by idlc {read.idlc}, which is newer than this version")
 
 
 def decode(data: bytes) -> Lock:
@@ -264,5 +269,5 @@ def decode(data: bytes) -> Lock:
     names += [f"{package}/msg/X" for package in lock.vendored]
     for name in names:
         if not is_package_name(TypeName.parse(name).package):
-            raise ValueError(f"it names what cannot be a package: {name}")
+            raise ValueError(f"it contains an invalid package name: {name}")
     return lock

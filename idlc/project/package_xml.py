@@ -52,6 +52,7 @@ class Facts(msgspec.Struct, frozen=True):
     installed, `native` whether it has C or C++ sources, `marker` whether resource/NAME exists.
     `available` are the names of ROS packages that can be found.
     `files` are the paths of interface files in the package's folder by name within the package.
+    `interfaces` are the paths of all, checked or not, .idl files included.
     `folders` are those with files by dotted name, and whether they are Python packages.
     """
 
@@ -71,11 +72,12 @@ class Facts(msgspec.Struct, frozen=True):
     outputs: tuple[GeneratedOutput, ...] = ()
     available: frozenset[str] = frozenset()
     files: Mapping[str, str] = {}
+    interfaces: frozenset[str] = frozenset()
     folders: Mapping[str, bool] = {}
 
     @property
     def runtime(self) -> Runtime:
-        """How the generated classes have their runtime."""
+        """Return the runtime mode of the generated classes."""
         modes = [output.runtime for output in self.outputs if output.package == self.name]
         return modes[0] if modes else "carried"
 
@@ -214,7 +216,7 @@ def declared_name(path: Path, root: Root, report: Report) -> str | None:
         return None
     if not declared:
         message = "no package name in this file"
-        hint = "add `<name>my_package</name>` within `<package>`, or give --package NAME"
+        hint = "add `<name>my_package</name>` to `<package>`, or pass --package NAME"
         report.add(codes.BAD_PACKAGE_XML.of(name, message, hint=hint))
     return declared or None
 
@@ -233,7 +235,7 @@ def _version(data: bytes) -> str:
 
 def _broken(data: bytes, name: str, error: Exception) -> Diagnostic:
     message = f"not well-formed XML: {str(error).partition(':')[0]}"
-    hint = "fix the file, or give --package NAME"
+    hint = "fix the file, or pass --package NAME"
     if not (isinstance(error, expat.ExpatError) and error.lineno):
         return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
     source = Source(name, data.decode("utf-8", errors="replace"))

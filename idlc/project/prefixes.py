@@ -105,7 +105,7 @@ def distribution(prefixes: Iterable[Path] | None = None) -> Distribution:
     if not distributions and requested:
         name = requested if requested in _BY_VERSION.values() else ""
         return Distribution(name, f"ROS_DISTRO={requested}")
-    first = next(iter(distributions), Distribution(DEFAULT, "no ROS 2 is installed here"))
+    first = next(iter(distributions), Distribution(DEFAULT, "ROS 2 is not installed"))
     return next((each for each in distributions if each.name == requested), first)
 
 
@@ -137,7 +137,8 @@ def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
     packages = set(_registered(prefix, "packages"))
     for name in interfaces:
         if name not in packages:
-            yield name, "has interfaces and is not a package there: `ros2 interface list` fails"
+            why = "is in ROS 2's list of interface packages but not in its list of packages"
+            yield name, f"{why}, so `ros2 interface list` fails"
             continue
         path = prefix / INDEX / "rosidl_interfaces" / name
         listed = (read_bytes(path, path.as_posix(), Report()) or b"").decode("utf-8", "replace")
@@ -145,11 +146,14 @@ def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
         missing = [line for line in listed.split() if not is_file(share / line)]
         if missing:
             files = first_few((f"`{file[:80]}`" for file in missing), 3)
-            yield name, f"lists {files} there, and not all of it is installed"
+            yield name, f"lacks files that ROS 2's index lists: {files}"
     for name in sorted(packages.difference(interfaces)):
         share = prefix / "share" / name
         if any(any((share / kind).glob(f"*.{kind}")) for kind in ("msg", "srv", "action")):
-            yield name, "has interfaces that are not listed there: `ros2 interface` misses them"
+            yield (
+                name,
+                "has interfaces that ROS 2's index omits, so `ros2 interface` cannot find them",
+            )
 
 
 def _registered(prefix: Path, kind: str) -> list[str]:

@@ -30,6 +30,7 @@ Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
 Mode = Annotated[Runtime | None, Meta(title='"carried" or "installed"')]
+Switch = Annotated[bool, Meta(title="true or false")]
 SwitchOrBeside = Annotated[bool | Literal["beside"], Meta(title='true, false or "beside"')]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
@@ -56,7 +57,9 @@ class TableLocation(NamedTuple):
         """Report a URL: files, which others may have written, do not cause downloads."""
         if "://" in value:
             message = f"`{key}` in {self.shown} is a URL"
-            self.wrong(key, message, report, "URLs are opened if they are typed")
+            self.wrong(
+                key, message, report, "idlc opens a URL only if you pass it on the command line"
+            )
 
     def _span(self, key: str) -> Span | None:
         """Return the span of a key of the table, else of its header, else of any such key."""
@@ -131,6 +134,7 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     package: Text = ""
     runtime: Mode = None
     vendor_deps: SwitchOrBeside = False
+    enums: Switch = False
     distro: TextOrTexts = ()
     templates: Text = ""
     breaking: Table = {}
@@ -180,7 +184,7 @@ def _read(path: Path, root: Root, report: Report) -> Config:
     try:
         document = toml(source.text)
     except ValueError as error:
-        report.add(_broken(source, str(error)))
+        report.add(broken_toml(source, str(error)))
         return Config(root=root)
     tool = document.get("tool", {})
     table = tool.get("idlc", {}) if isinstance(tool, dict) else {}
@@ -196,7 +200,7 @@ def _read(path: Path, root: Root, report: Report) -> Config:
     distros = split_names(wanted) if isinstance(wanted, str) else wanted
     for name in distros:
         if name and name not in BY_NAME:
-            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
+            message = f"`distro` in {place.shown} contains `{name}`, which is not a distribution"
             place.wrong("distro", message, report, unknown_distro(name))
     folder = path.parent
     values = {
@@ -226,7 +230,8 @@ def toml(text: str) -> dict[str, Any]:
     return document
 
 
-def _broken(source: Source, message: str) -> Diagnostic:
+def broken_toml(source: Source, message: str) -> Diagnostic:
+    """Return the problem with a file that is not valid TOML, with the parser's message."""
     text, _, place = message.partition(" (at ")
     if not place:
         return codes.BAD_CONFIG.at(Span(source, 0, len(source.text)), message)
@@ -235,7 +240,9 @@ def _broken(source: Source, message: str) -> Diagnostic:
     if len(numbers) == 2 and numbers[0] <= len(source.line_starts):
         start = source.line_starts[numbers[0] - 1] + numbers[1] - 1
     span = Span(source, start, start + 1)
-    return codes.BAD_CONFIG.at(span, f"not valid TOML: {text[:1].lower()}{text[1:]}")
+    is_marked = source.text.startswith("\ufeff")
+    hint = "save the file as UTF-8 without a byte order mark" if is_marked else None
+    return codes.BAD_CONFIG.at(span, f"not valid TOML: {text[:1].lower()}{text[1:]}", hint=hint)
 
 
 def _typed(folder: Path, path: str, root: Root) -> str:
@@ -264,7 +271,8 @@ class Scope(msgspec.Struct, frozen=True):
 
     Paths are relative to `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its
     name may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
-    except for `check`; none means the one that is installed.
+    except for `check`; none means the one that is installed. With `enums`, generated classes have
+    enums for all fields whose names constants begin with.
     """
 
     root: Root
@@ -273,6 +281,7 @@ class Scope(msgspec.Struct, frozen=True):
     exclude: Exclusions = Exclusions()
     paths: tuple[str, ...] = ()
     out: str | None = None
+    enums: bool = False
     distros: tuple[Distro, ...] = ()
 
     @property
@@ -300,5 +309,6 @@ def scope(
         Exclusions(left_out),
         settings.paths,
         settings.out or None,
+        settings.enums,
         tuple(dict.fromkeys(BY_NAME[name] for name in names)),
     )

@@ -20,7 +20,6 @@ from idlc.diagnostics.report import Diagnostic, Edit, Report
 from idlc.project.atomic import create, exclusive, make_folder, move_over, uninterrupted
 from idlc.project.files import entries, reason
 from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
-from idlc.project.root import Root
 
 #: Files of a package that are the user's where they exist already.
 YIELDING = frozenset({"__init__.py", "py.typed"})
@@ -115,12 +114,13 @@ def plan(
     report: Report,
     *,
     record: str,
-    force: bool | None = None,
+    force: bool = False,
+    again: str = "",
 ) -> Plan | None:
     """Return the changes after which `out` holds `files`; `None` after a report if it must not.
 
-    A file that is not owned, or was edited since, is only replaced with `force`; `None` is for
-    commands without such an option. Reports IDL613 and IDL614.
+    A file that is not owned, or was edited since, is only replaced with `force`, which is what
+    `again` runs, if there is such a command. Reports IDL613 and IDL614.
     """
     problems = diagnostics.Report()
     changes = compare(out, name, files, {p: d for p, d in owned.items() if p != record}, problems)
@@ -132,7 +132,7 @@ def plan(
     if not force:
         refused = [each for each in changes if each.ownership is not Ownership.OWN]
         problems.extend(
-            _refusal(shown(name, change.path), change, force, in_full=number < DIFFS)
+            _refusal(shown(name, change.path), change, again, in_full=number < DIFFS)
             for number, change in enumerate(refused)
         )
     report.extend(problems)
@@ -148,19 +148,19 @@ def _in_the_way(shown_path: str, obstacle: Obstacle) -> Diagnostic:
     return codes.FOREIGN_FILE.of(shown_path, message, hint=hint)
 
 
-def _refusal(path: str, change: Change, force: bool | None, *, in_full: bool) -> Diagnostic:
+def _refusal(path: str, change: Change, again: str, *, in_full: bool) -> Diagnostic:
     diff = ""
     if in_full and change.new is not None:
         diff = "\n".join(difference(change.old or b"", change.new))
     if change.ownership is Ownership.FOREIGN:
-        code, message = codes.FOREIGN_FILE, "is in the way and was not written by idlc"
-        ways = ["move it away", "choose another folder with -o"]
+        code, message = codes.FOREIGN_FILE, "already exists, and idlc did not write it"
+        ways = ["move it away", "choose another folder"]
     else:
-        code, message = codes.EDITED_FILE, "was edited since idlc wrote it"
-        message += ", and is to be removed" if change.new is None else ""
-        ways = ["move the edit out of generated code"]
-    if force is not None:
-        ways.append("run again with --force, which keeps a copy")
+        code, message = codes.EDITED_FILE, "was edited after idlc wrote it"
+        message += ", and idlc would remove it" if change.new is None else ""
+        ways = ["move the edit out of the generated code"]
+    if again:
+        ways.append(f"run `{again}`, which keeps a copy of the file")
     hint = ", or ".join(filter(None, (", ".join(ways[:-1]), ways[-1])))
     return code.of(path, f"`{path}` {message}", hint=hint, detail=diff)
 
@@ -214,7 +214,7 @@ def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -
         sweep(home)
         if not is_locked and os.path.lexists(home / STAGE):
             path = shown(name, (home / STAGE).relative_to(plan.out).as_posix())
-            message = f"`{path}` is another run's, and this file system locks no folders"
+            message = f"`{path}` belongs to another run, and this file system cannot lock folders"
             hint = "wait for that run, or remove the folder if none is running"
             report.add(codes.CANNOT_WRITE.of(path, message, hint=hint))
             return False
@@ -285,9 +285,9 @@ class _Transaction:
             if not isinstance(error, OSError):
                 raise
             where = shown(name, self._current) if self._current else name
-            hint = f"nothing in `{name}` was changed"
+            hint = f"no file in `{name}` was changed"
             if torn:
-                hint = "undoing failed as well; these files are new, the others as before: "
+                hint = "restoring the old files failed, too; these files are new: "
                 hint += ", ".join(torn)
             message = f"cannot write `{where}`: {reason(error)}"
             report.add(codes.CANNOT_WRITE.of(where, message, hint=hint))
@@ -372,20 +372,26 @@ def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     return apply(Plan(target.parent, (change,), {}), folder, report)
 
 
-def edit(
-    edits: Iterable[Edit], root: Root, report: Report, keep_layout: Callable[[str, str, str], str]
-) -> int:
-    """Apply edits to their files; return the number of applied edits.
+class EditedFile(NamedTuple):
+    """The name of a file, its text before and after edits, and the number of applied edits."""
+
+    name: str
+    old: str
+    new: str
+    edits: int
+
+
+def edited(
+    edits: Iterable[Edit], keep_layout: Callable[[str, str, str], str]
+) -> Iterator[EditedFile]:
+    """Apply edits to the texts of their files; this writes nothing.
 
     `keep_layout` takes a file's name, its old text and its edited text, and returns the new text.
     """
     by_path: dict[str, list[Edit]] = {}
     for edit in edits:
         by_path.setdefault(edit.span.source.path, []).append(edit)
-    done = 0
     for name, own in by_path.items():
         old = own[0].span.source.text
         text, number = diagnostics.apply(old, own)
-        if rewrite(Path(root.path(name)), name, old, keep_layout(name, old, text), report):
-            done += number
-    return done
+        yield EditedFile(name, old, keep_layout(name, old, text), number)

@@ -61,6 +61,11 @@ class Result(NamedTuple):
     following: tuple[str, ...] = ()
 
 
+def marked(text: str, old: bytes) -> bytes:
+    """Return the bytes of an edited file, with the byte order mark that it had."""
+    return BOM_UTF8 * old.startswith(BOM_UTF8) + text.encode()
+
+
 class Project:
     """A package's folder, existing or not; `name` is the folder's name in reports."""
 
@@ -122,7 +127,8 @@ class Project:
                 continue
             place = self.shown(path)
             message = f"cannot edit `{place}`: {outcome.why}"
-            hint = f"add this line by hand {outcome.where}, then run the command again"
+            lines = "these lines" if "\n" in outcome.line else "this line"
+            hint = f"add {lines} {outcome.where}, then run the command again"
             self._report.add(codes.CANNOT_EDIT.of(place, message, hint=hint, detail=outcome.line))
         return None if self._report.had_errors else edited
 
@@ -139,7 +145,7 @@ class Project:
         for path in edited:
             old = tree.read(path)
             if isinstance(old, bytes):
-                files[path] = BOM_UTF8 * old.startswith(BOM_UTF8) + files[path]
+                files[path] = marked(edited[path], old)
                 owned[path] = frozenset((digest(old),))
         changes = {c.path: c for c in compare(self.path, self.name, files, owned, self._report)}
         done = []
@@ -153,9 +159,9 @@ class Project:
                 what = "edited" if path in edited else "replaced"
                 if what == "replaced" and not self._settings.force:
                     place, detail = self.shown(path), "\n".join(difference(change.old, content))
-                    message = f"`{place}` exists and is not what would be written"
-                    hint = "keep it and choose another name, or run again with --force, "
-                    hint += "which keeps a copy"
+                    message = f"`{place}` already exists with different content"
+                    hint = "choose another name, or add --force, "
+                    hint += "which keeps a copy of the file"
                     problem = codes.EXISTING_FILE.of(place, message, hint=hint, detail=detail)
                     self._report.add(problem)
             done.append(FileOutcome(path, what))
@@ -206,7 +212,7 @@ def find_package(settings: Settings, report: Report) -> Project | None:
     root = settings.root
     path = root.manifest(root.base)
     if path is None:
-        message = "this folder belongs to no package: there is no package.xml here or above"
+        message = "this folder is not in a package: no package.xml here or above"
         hint = "run `idlc scaffold package NAME`, then `cd NAME`"
         report.add(codes.NO_SUCH_PATH.of("package.xml", message, hint=hint))
         return None
@@ -281,4 +287,4 @@ def _hint(name: ir.TypeName, own: str, library: Library) -> str | None:
     if hint or name.package in library.packages():
         return hint
     near = did_you_mean(name.package, library.packages())
-    return near or f"there is no package `{name.package}` here: name its folder with -I"
+    return near or f"no such package: `{name.package}`; add its folder with -I"

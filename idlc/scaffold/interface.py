@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from idlc.check.compiler import compile_package
+from idlc.check.package.cmake import calls
+from idlc.check.package.cmake_lists import dependency_edit
 from idlc.check.package.facts import folders
-from idlc.check.package.manifest import calls, dependency_edit
 from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir, names
@@ -35,7 +36,7 @@ def interface_text(kind: str, fields: Sequence[str], comment: str = "") -> str:
     parts: list[list[str]] = [[]]
     for field in fields:
         if len(field.splitlines()) > 1:
-            raise ValueError(f"a field is one line, not {field!r}")
+            raise ValueError(f"a field must be one line, not {field!r}")
         if field.strip() == SEPARATOR:
             parts.append([])
         else:
@@ -59,13 +60,13 @@ def interface_text(kind: str, fields: Sequence[str], comment: str = "") -> str:
 #: The first content of a new file.
 _STARTERS = {
     "msg": ("float32 speed  # forwards [m/s]",),
-    "srv": ("bool enable  # what is wanted", "---", "bool enabled  # what is so now"),
+    "srv": ("bool enable  # desired state", "---", "bool enabled  # current state"),
     "action": (
-        "uint32 count  # how many times",
+        "uint32 count  # repetitions",
         "---",
-        "uint32 total  # how many times it was",
+        "uint32 total  # final count",
         "---",
-        "uint32 done  # how many times until now",
+        "uint32 done  # count so far",
     ),
 }
 
@@ -75,9 +76,11 @@ def starter(word: str) -> tuple[str, str]:
     kind, _, name = word.rpartition("/")
     kind = kind or "msg"
     if kind not in _STARTERS:
-        raise ValueError(f"`{word}` is no interface: write `Drive`, `srv/Ask` or `action/Walk`")
+        raise ValueError(
+            f"`{word}` is not an interface name; write `Drive`, `srv/Ask` or `action/Walk`"
+        )
     path = f"{kind}/{check_interface_name(name)}.{kind}"
-    return path, interface_text(kind, _STARTERS[kind], "An example: say here what it is for.")
+    return path, interface_text(kind, _STARTERS[kind], "An example. Describe the interface here.")
 
 
 WHERE = "to the packages that rosidl_generate_interfaces() depends on, and find_package() it"

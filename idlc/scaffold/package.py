@@ -89,7 +89,7 @@ def check_package_name(name: str) -> str:
     """Return the name of a new package; one that hides another module is refused."""
     why = why_not_package(name)
     if not why and name in _TAKEN:
-        why = "is the name of a folder or a module that it needs"
+        why = "is the name of a folder or module that the package needs"
     if why:
         raise ValueError(f"`{name}` {why}")
     return name
@@ -193,7 +193,7 @@ def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnosti
             kind, name = path.rpartition(".")[0].split("/")
             yield codes.EXISTING_FILE.of(
                 project.shown(path),
-                f"`{project.name}` has interfaces already, and `{path}` is not one of them",
+                f"`{project.name}` already has interfaces, but not `{path}`",
                 hint=f"run `cd {shlex.quote(project.name)}`, then "
                 f"`idlc scaffold interface {kind} {name}`",
             )

@@ -80,12 +80,17 @@ def _typed(text: str, shape: str = "TYPE:NAME") -> Value:
     type_, colon, topic = text.partition(":")
     if not colon or not type_ or not topic:
         raise ValueError(f"`{text}` is not {shape}, such as `std_msgs/String:chatter`")
-    if not _TOPIC.fullmatch(topic) or "__" in topic:
+    return type_, endpoint_name(topic), None
+
+
+def endpoint_name(text: str) -> str:
+    """Return the name of a topic, service or action if it can be one."""
+    if not _TOPIC.fullmatch(text) or "__" in text:
         raise ValueError(
-            f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
+            f"`{text}` cannot be the name of a topic, service or action: use letters, digits "
             "and single underscores, parts separated by `/`"
         )
-    return type_, topic, None
+    return text
 
 
 class Role(NamedTuple):
@@ -159,7 +164,7 @@ ROLES: tuple[Role, ...] = (
         name="publisher",
         kind="msg",
         metavar="TYPE:TOPIC[@HZ]",
-        help="Publish, by default once a second.",
+        help="Publish messages, by default once per second.",
         read=_published,
         answer="publish",
         question=Question("Rate in Hz", "1", separator="@"),
@@ -188,7 +193,7 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="client",
         kind="srv",
-        help="Call a service; the request's fields come from the command line.",
+        help="Call a service. The node's command line sets the fields of the request.",
         answer="call",
         summary="calls",
         family="action",
@@ -198,9 +203,9 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="action_server",
         kind="action",
-        help="Work on goals, which can be cancelled and replaced.",
+        help="Execute goals, which clients can cancel and replace.",
         answer="act",
-        summary="works on goals for",
+        summary="executes goals of",
         family="action",
         samples=("result", "feedback"),
         imports={"rclpy.action.server": (*_SERVER, "GoalResponse")},
@@ -210,7 +215,7 @@ ROLES: tuple[Role, ...] = (
     Role(
         name="action_client",
         kind="action",
-        help="Send a goal; its fields come from the command line.",
+        help="Send a goal. The node's command line sets the fields of the goal.",
         answer="send goals",
         summary="sends goals to",
         family="action",
@@ -228,7 +233,7 @@ ROLES: tuple[Role, ...] = (
         name="timer",
         kind=None,
         metavar="SECONDS",
-        help="Call a method regularly.",
+        help="Call a method periodically.",
         read=lambda text: ("", "tick", _positive(text, "the period of a timer", "seconds")),
         answer="timer",
         question=Question("Period in seconds", "1.0"),

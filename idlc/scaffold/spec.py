@@ -12,10 +12,11 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
+from idlc.project.templates import Code
 from idlc.scaffold.roles import DEFAULT_QOS, ROLES, Endpoint, Role, qos_preset
 
 #: Names that a module of a node cannot have in its package.
-TAKEN = frozenset({"msg", "srv", "action"})
+TAKEN = frozenset({"msg", "srv", "action", "versions"})
 _NODE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*")
 
@@ -61,11 +62,11 @@ def check_name(name: str) -> str:
     if not _NODE.fullmatch(name):
         raise ValueError(
             f"`{name}` cannot be a node: use lower-case letters, digits and single underscores, "
-            "a letter first"
+            "and begin with a letter"
         )
     if keyword.iskeyword(name) or name in TAKEN or name in sys.stdlib_module_names:
         raise ValueError(
-            f"`{name}` cannot be a node: the name is taken by a module of Python or by interfaces"
+            f"`{name}` cannot be a node: a Python module or an interface package has this name"
         )
     return name
 
@@ -88,7 +89,7 @@ def parameter(text: str) -> Parameter:
         raise ValueError(
             f"`{text}` is not NAME:TYPE=DEFAULT, such as `speed:double=0.5`; types are "
             + ", ".join(PARAMETERS)
-            + ", and each with []"
+            + ", and arrays of these with []"
         )
     if not type_.endswith("[]"):
         return Parameter(name, _value(element, default, name), element.__name__)
@@ -106,12 +107,26 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
         value = type_(text)
     except (ValueError, KeyError):
         what = {"int": "an integer", "str": "a string"}.get(type_.__name__, f"a {type_.__name__}")
-        raise ValueError(f"`{text}` is not {what}, for the parameter `{name}`") from None
+        raise ValueError(f"the parameter `{name}` needs {what}, not `{text}`") from None
     if isinstance(value, float) and value - value != 0:
-        raise ValueError(f"`{text}` is not finite, for the parameter `{name}`")
+        raise ValueError(f"the parameter `{name}` needs a finite number, not `{text}`")
     if isinstance(value, int) and not -(1 << 63) <= value < 1 << 63:
-        raise ValueError(f"`{text}` does not fit into 64 bits, for the parameter `{name}`")
+        raise ValueError(f"the parameter `{name}` needs a 64-bit integer, not `{text}`")
     return value
+
+
+class Translation(NamedTuple):
+    """The names of a translated topic or service in the module of a node.
+
+    `convert` is the function from old to new messages or requests, `back` that from new responses
+    to old ones, empty for a topic. `new_name` is a literal.
+    """
+
+    old: Code
+    new: Code
+    convert: Code
+    back: Code
+    new_name: Code
 
 
 class Placed(NamedTuple):
@@ -120,6 +135,7 @@ class Placed(NamedTuple):
     endpoint: Endpoint
     word: str
     interface: ir.Interface | None
+    translation: Translation | None = None
 
 
 class Plan(NamedTuple):
@@ -128,6 +144,11 @@ class Plan(NamedTuple):
     node: Node
     endpoints: tuple[Placed, ...]
     messages: Mapping[ir.TypeName, ir.Message]
+
+    def translating(self, translations: Iterable[Translation]) -> Plan:
+        """Return the plan with a translation for each endpoint."""
+        pairs = zip(self.endpoints, translations, strict=True)
+        return self._replace(endpoints=tuple(p._replace(translation=names) for p, names in pairs))
 
     @property
     def asking(self) -> tuple[Placed, ...]:

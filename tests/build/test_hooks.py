@@ -218,7 +218,7 @@ def test_a_source_distribution_holds_nothing_from_outside(source, tmp_path, caps
     assert names >= {*FILES, "kept/again.txt"}
     assert not names & {"NOTICE", "note.txt", "msg/Out.msg"}
     said = capsys.readouterr().err
-    assert "left out, because they lead out of the project: `NOTICE`, `action/by`, `extra`" in said
+    assert "skipped, because they lead out of the project: `NOTICE`, `action/by`, `extra`" in said
 
 
 def test_hooks_of_hatchling_are_not_run(source, tmp_path):
@@ -371,7 +371,7 @@ REFUSED = {
     ),
     "modules that the wheel would not have": (
         {"demo_msgs/node.py": "print()\n"},
-        "and here is `demo_msgs/node.py`",
+        "but this folder contains `demo_msgs/node.py`",
     ),
     "another name than in package.xml": (
         {"pyproject.toml": BUILD + '[tool.idlc]\npackage = "other"\n'},
@@ -449,7 +449,7 @@ def test_without_a_library_a_package_is_not_registered(
     assert {name.removeprefix(data) for name in files if name.startswith(data)} == {
         path for path in kept if not path.startswith("lib/")
     }
-    assert "recorders stop at packages without a library" in capfd.readouterr().err
+    assert "recorders stop at a package without a library" in capfd.readouterr().err
 
 
 def test_wheels_that_differ_have_different_names_and_a_platform_tag_of_pypi(
@@ -478,6 +478,11 @@ def test_wheels_that_differ_have_different_names_and_a_platform_tag_of_pypi(
         assert re.fullmatch(r"any|(manylinux_2_17|musllinux_1_1)_x86_64", tag.platform)
     for name, content in wheels.items():
         assert (tmp_path / "dist" / name).read_bytes() == content
+        build, (tag,) = parse_wheel_filename(name)[2:]
+        files, _ = read(tmp_path / "dist" / name)
+        inside = Parser().parsestr(files["demo_msgs-1.2.3.dist-info/WHEEL"].decode())
+        assert inside["Build"] == (f"{build[0]}{build[1]}" if build else None)
+        assert [str(tag)] == inside.get_all("Tag")
 
 
 @pytest.mark.parametrize("hook", [backend.build_wheel, backend.build_sdist])
@@ -509,7 +514,7 @@ def test_the_distribution_can_be_told(source, tmp_path, capfd):
     for unknown in ("foxy", "", ["humble", "jazzy"], True):
         with pytest.raises(SystemExit):
             built(tmp_path, settings={"distro": unknown})
-        assert "which idlc does not know" in capfd.readouterr().err
+        assert "which idlc does not support" in capfd.readouterr().err
 
 
 def test_a_package_may_refer_to_others_and_leave_files_out(source, tmp_path):

@@ -92,7 +92,7 @@ def test_the_index_says_what_is_installed(shape, machine, package, tmp_path):
         listed = found[f"{INDEX}/rosidl_interfaces/demo"].split()
         assert listed == ["msg/Drive.idl", "msg/Drive.msg"]
     else:
-        assert "`demo` is not registered in the index of ROS 2" in said
+        assert "idlc does not add `demo` to ROS 2's index" in said
     assert own == expected
     assert found["share/demo/msg/Drive.json"] != "{}\n"
     assert ("README.md" in found) == (shape == "a file for the prefix itself")

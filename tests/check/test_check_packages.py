@@ -31,7 +31,7 @@ def test_a_misspelt_declaration_is_named(capsys):
     manifest = HEAD + "  <depend>geometry_msg</depend>\n" + TAIL
     write_all({"package.xml": manifest, "msg/A.msg": "geometry_msgs/Pose pose\n"})
     said = check(capsys, "--fix")
-    assert "write `<depend>geometry_msgs</depend>` in place of `geometry_msg`" in said
+    assert "write `<depend>geometry_msgs</depend>` instead of `geometry_msg`" in said
     assert Path("package.xml").read_text() == manifest
 
 
@@ -53,27 +53,27 @@ def test_a_package_of_interfaces_and_nodes_is_declared_once(capsys):
     )
 
 
-FIND = "find_package(ament_cmake REQUIRED)\n"
+FIND = "find_package(base_msgs REQUIRED)\n"
+CALL = "rosidl_generate_interfaces(demo msg/A.msg"
+LINES = "rosidl_generate_interfaces(demo\n  msg/A.msg\n  DEPENDENCIES base_msgs"
 #: A CMakeLists.txt, and what it becomes when the interfaces use std_msgs; `None`: not judged.
 CMAKE = {
-    "rosidl_generate_interfaces(demo msg/A.msg)\n": "rosidl_generate_interfaces(demo msg/A.msg "
-    "DEPENDENCIES std_msgs)\n",
-    FIND + "rosidl_generate_interfaces(demo\n  msg/A.msg\n  DEPENDENCIES nav_msgs # ours\n)\n": FIND
-    + "find_package(std_msgs REQUIRED)\n"
-    "rosidl_generate_interfaces(demo\n  msg/A.msg\n  DEPENDENCIES nav_msgs std_msgs # ours\n)\n",
-    "set(deps nav_msgs)\nrosidl_generate_interfaces(demo ${x} DEPENDENCIES ${deps} "
-    "ADD_LINTER_TESTS)\n": "set(deps nav_msgs std_msgs)\nrosidl_generate_interfaces(demo ${x} "
+    f"{CALL})\n": f"{CALL} DEPENDENCIES std_msgs)\n",
+    f"{FIND}{LINES} # ours\n)\n": FIND
+    + f"find_package(std_msgs REQUIRED)\n{LINES} std_msgs # ours\n)\n",
+    "set(deps base_msgs)\nrosidl_generate_interfaces(demo ${x} DEPENDENCIES ${deps} "
+    "ADD_LINTER_TESTS)\n": "set(deps base_msgs std_msgs)\nrosidl_generate_interfaces(demo ${x} "
     "DEPENDENCIES ${deps} ADD_LINTER_TESTS)\n",
-    "rosidl_generate_interfaces(demo a DEPENDENCIES nav_msgs ADD_LINTER_TESTS)\n": "rosidl_"
-    "generate_interfaces(demo a DEPENDENCIES nav_msgs std_msgs ADD_LINTER_TESTS)\n",
-    "set(deps\r\n)\r\nrosidl_generate_interfaces(demo a DEPENDENCIES ${deps})\r\n": "set(deps\r\n"
-    "  std_msgs\r\n)\r\nrosidl_generate_interfaces(demo a DEPENDENCIES ${deps})\r\n",
-    'rosidl_generate_interfaces(a "b (c)" DEPENDENCIES d)\n': "rosidl_generate_interfaces("
-    'a "b (c)" DEPENDENCIES d std_msgs)\n',
-    "rosidl_generate_interfaces(demo a DEPENDENCIES ${computed})\n": None,
-    "set(d x)\nlist(APPEND d ${y})\nrosidl_generate_interfaces(demo a DEPENDENCIES ${d})\n": None,
-    "rosidl_generate_interfaces(demo a DEPENDENCIES std_msgs)\n": None,
-    "rosidl_generate_interfaces(demo a DEPENDENCIES ${X}_msgs)\n": None,
+    f"{CALL} DEPENDENCIES base_msgs ADD_LINTER_TESTS)\n": f"{CALL} DEPENDENCIES base_msgs std_msgs "
+    "ADD_LINTER_TESTS)\n",
+    "set(deps\r\n)\r\n" + CALL + " DEPENDENCIES ${deps})\r\n": "set(deps\r\n  std_msgs\r\n)\r\n"
+    + CALL
+    + " DEPENDENCIES ${deps})\r\n",
+    f'{CALL} "b (c)" DEPENDENCIES d)\n': f'{CALL} "b (c)" DEPENDENCIES d std_msgs)\n',
+    CALL + " DEPENDENCIES ${computed})\n": None,
+    "set(d x)\nlist(APPEND d ${y})\n" + CALL + " DEPENDENCIES ${d})\n": None,
+    CALL + " DEPENDENCIES std_msgs)\n": None,
+    CALL + " DEPENDENCIES ${X}_msgs)\n": None,
 }
 
 

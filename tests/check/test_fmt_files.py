@@ -69,7 +69,7 @@ def test_files_with_errors_and_line_ends_stay(here, capsys):
     assert main(["fmt"]) == 1
     assert (here / "Broken.msg").read_bytes() == broken
     assert (here / "Dos.msg").read_bytes() == b"int8 a\r\nint8 b\r\n"
-    assert "1 file with errors left alone" in capsys.readouterr().out
+    assert "1 file with errors skipped" in capsys.readouterr().out
 
 
 def test_files_with_other_errors_are_laid_out(here, capsys):

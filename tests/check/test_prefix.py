@@ -45,7 +45,7 @@ def said(capsys):
     def said(folder="prefix"):
         status = main(["check", "--prefix", folder])
         lines = capsys.readouterr().out
-        found = re.findall(r"\nerror\[IDL632\]: `(\w+\.so)` (.*): C\+\+ tools", f"\n{lines}")
+        found = re.findall(r"\nerror\[IDL632\]: `(\w+\.so)` (.*), so C\+\+ tools", f"\n{lines}")
         return status, found
 
     return said
@@ -77,9 +77,12 @@ def test_what_is_not_in_the_index_is_not_looked_for(here, said):
 def test_the_index_is_compared_with_what_is_installed(here, capsys):
     index = here / "share/ament_index/resource_index"
     for change, expected in (
-        (lambda: (here / "share/arm/srv/Wave.srv").unlink(), "lists `srv/Wave.srv` there"),
+        (
+            lambda: (here / "share/arm/srv/Wave.srv").unlink(),
+            "lacks files that ROS 2's index lists: `srv/Wave.srv`",
+        ),
         (lambda: (index / "rosidl_interfaces/arm").write_bytes(b"\xff\n/etc\n" * 99), "`/etc`"),
-        (lambda: (index / "rosidl_interfaces/arm").unlink(), "`ros2 interface` misses them"),
+        (lambda: (index / "rosidl_interfaces/arm").unlink(), "`ros2 interface` cannot find them"),
         (lambda: (index / "rosidl_interfaces/only").write_text("msg/X.msg\n"), "list` fails"),
         (lambda: (index / "rosidl_interfaces/only").rename(index / "packages/nodes"), ""),
     ):
@@ -124,7 +127,7 @@ def test_a_type_that_is_missing(here, said):
 def test_another_processor(here, said, monkeypatch):
     monkeypatch.setattr("idlc.project.prefixes.machine", lambda: "x86_64")
     (here / LIBRARY).write_bytes(made(machine="aarch64"))
-    assert said() == (1, [(NAME, "is for another processor than x86_64")])
+    assert said() == (1, [(NAME, "is for a different processor than x86_64")])
 
 
 def test_another_distribution(here, said, monkeypatch):
@@ -137,7 +140,7 @@ def test_another_distribution(here, said, monkeypatch):
         assert (status, found) == (
             (0, [])
             if fits
-            else (1, [(NAME, "is for another distribution of ROS 2 than jazzy (for this test)")])
+            else (1, [(NAME, "is for a different ROS 2 distribution than jazzy (for this test)")])
         )
 
 
@@ -157,7 +160,7 @@ def test_the_distribution_that_is_named_is_noticed(here, said, capsys, monkeypat
     printed = "".join(capsys.readouterr())
     for line in printed.splitlines():
         if ".so`" in line:
-            assert line.endswith(".so` is out of date: it is for another distribution of ROS 2")
+            assert line.endswith(".so` is out of date: it is for a different ROS 2 distribution")
     assert printed.count(".so` is out of date") == 2
 
 
@@ -173,7 +176,7 @@ def test_colcon_makes_a_prefix_for_each_package(here, said):
 @pytest.mark.parametrize("content", [b"", b"\x7fELF", b"\x7fELF\2\1\1" + bytes(100), b"text\n"])
 def test_a_file_that_is_no_library(content, here, said):
     (here / LIBRARY).write_bytes(content)
-    assert said() == (1, [(NAME, "is no shared library, or a part of one")])
+    assert said() == (1, [(NAME, "is not a complete shared library")])
 
 
 def test_a_part_of_a_library_is_no_library(here):

@@ -30,17 +30,20 @@ def test_advice_can_be_chosen_by_category_and_errors_cannot():
 @pytest.mark.parametrize("code", codes.CODES)
 def test_a_page_says_whether_its_code_is_off(code):
     text = " ".join((page(code) or "").split())
-    assert ("Off unless it is selected" in text) is not codes.CODES[code].default
+    assert ("This rule is off by default." in text) is not codes.CODES[code].default
 
 
 def test_a_terminal_gets_each_page_without_its_markup(monkeypatch, capsys):
     monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
     for code in codes.CODES:
         assert main(["explain", code]) == 0
         out = capsys.readouterr().out
         plain = re.sub("\x1b\\[[0-9]*m", "", out)
         assert plain != out
         assert not re.search(r"(?m)^## |```", plain)
+        prose = [line for line in plain.splitlines() if not line.startswith("    ")]
+        assert max(map(len, prose)) <= 80
         words = re.sub("[`#]", "", page(code)).replace("console\n", "\n").split()
         assert plain.replace("`", "").replace("#", "").split() == words
 

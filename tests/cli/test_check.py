@@ -227,7 +227,7 @@ def test_what_can_be_fixed_is_fixed_once_and_nothing_else_changes(capsys):
     )
     status, out = check(capsys, "--fix", "--select", "correctness,portability,package,IDL401")
     assert status == 0
-    assert out == "9 problems fixed, no problems in 1 file\n"
+    assert out == "9 fixed, no problems in 1 file\n"
     assert Path("msg/A.msg").read_text() == (
         "# char is a word\nuint8[3]  a\nuint8 B=5  # a char\n"
         "std_msgs/Header h\ngeometry_msgs/Pose p\n"
@@ -241,6 +241,31 @@ def test_what_can_be_fixed_is_fixed_once_and_nothing_else_changes(capsys):
         "  <member_of_group>rosidl_interface_packages</member_of_group>\n",
     )
     assert check(capsys, "--fix")[1] == "no problems in 1 file\n"
+
+
+def test_a_diff_shows_what_fix_would_write_and_writes_nothing(capsys):
+    files = {
+        "package.xml": PACKAGE_XML,
+        "CMakeLists.txt": "rosidl_generate_interfaces(demo msg/A.msg)\n",
+        "msg/A.msg": "  char a\ngeometry_msgs/Pose p\nflot64 b",
+    }
+    write_all(files)
+    status, diff = check(capsys, "--fix", "--diff", "--select", "all")
+    assert status == 1
+    assert {path: Path(path).read_text() for path in files} == files
+    Path("fix.diff").write_text(diff)
+    subprocess.run(["/usr/bin/env", "git", "apply", "fix.diff"], check=True)
+    applied = {path: Path(path).read_text() for path in files}
+    assert applied["msg/A.msg"] == "uint8 a\ngeometry_msgs/Pose p\nflot64 b"
+    write_all(files)
+    check(capsys, "--fix", "--select", "all")
+    assert {path: Path(path).read_text() for path in files} == applied
+    assert check(capsys, "--diff", "--format", "json")[0] == 2
+
+
+def test_a_diff_of_nothing_is_a_success(capsys):
+    write_all({"demo/msg/A.msg": "wstring a\n"})
+    assert check(capsys, "demo", "--diff") == (0, "")
 
 
 def test_the_first_dependency_is_a_group_after_the_head(capsys):
@@ -343,7 +368,7 @@ def test_an_entry_point_that_leads_nowhere_is_found(capsys):
         "`nowhere` is not an entry point",
         "there is no Python package `nodes` here",
         "there is no module `demo.noode`",
-        "`demo/node.py` has no `run`",
+        "`demo/node.py` does not define `run`",
     ]
 
 
@@ -375,7 +400,9 @@ def test_a_hint_calls_find_packages_as_setup_py_can(capsys):
         }
     )
     _, out = check(capsys)
-    assert "write `packages=tools.find_packages(exclude=['test'])`; --fix does" in out
+    assert (
+        "write `packages=tools.find_packages(exclude=['test'])`, or run `idlc check --fix`" in out
+    )
 
 
 def test_files_that_are_not_python_or_xml_are_not_judged(capsys):
@@ -400,7 +427,7 @@ def test_what_is_sure_of_a_broken_file_is_fixed(capsys):
         }
     )
     status, out = check(capsys, "demo", "--fix")
-    assert (status, out) == (0, "5 problems fixed, no problems in 3 files\n")
+    assert (status, out) == (0, "5 fixed, no problems in 3 files\n")
     assert Path("demo/msg/A.msg").read_text("utf-8") == "# head\nfloat64 a\nint8 b # c\n"
     assert Path("demo/srv/B.srv").read_text() == "int8 a\n---\nint8 b\n"
     assert Path("demo/action/C.action").read_text() == "---\nint8 a\n---\n"

@@ -58,7 +58,7 @@ def complete(*words):
 
 
 def test_commands_options_and_choices_are_completed():
-    assert complete("e") == ["explain"]
+    assert complete("e") == ["echo", "explain"]
     assert set(complete("")) == set(COMMANDS)
     assert "--vendor-deps" in complete("gen", "--v")
     assert complete("breaking", "--level", "w") == ["wire"]

@@ -19,7 +19,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from idlc.cli import exit_status
+from idlc.cli import streams
 from idlc.cli.main import main
 from idlc.diagnostics import formats
 from idlc.project import atomic, lock
@@ -204,14 +204,14 @@ def printed(monkeypatch, text, encoding="cp1252", ends="\r\n"):
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding=encoding, newline=ends)
     monkeypatch.setattr(sys, "stdout", stream)
-    exit_status.set_up()
+    streams.set_up()
     stream.write(text)
     stream.flush()
     return raw.getvalue()
 
 
 def test_what_windows_redirects_is_what_others_redirect(monkeypatch):
-    monkeypatch.setattr(exit_status.sys, "platform", "win32")
+    monkeypatch.setattr(streams.sys, "platform", "win32")
     monkeypatch.delenv("PYTHONIOENCODING", raising=False)
     text = "größe → €\udcff\n"
     assert printed(monkeypatch, text) == "größe → €\\udcff\n".encode()
@@ -295,7 +295,7 @@ def test_a_real_edit_is_still_noticed(here, capsys):
     module = Path("out/demo/msg/_drive.py")
     module.write_bytes(module.read_bytes().replace(b"\n", b"\r\n") + b"# mine\r\n")
     assert main(["gen", "demo", "-o", "out/demo", "--check"]) == 1
-    assert "was edited since" in capsys.readouterr().err
+    assert "was edited after" in capsys.readouterr().err
     assert lock.digest(b"\x7fELF\0\r\n") != lock.digest(b"\x7fELF\0\n")
     assert not lock.is_same(b"\x7fELF\0\r\n", b"\x7fELF\0\n")
 

@@ -101,7 +101,10 @@ def test_all_commands_agree(seed):
 
 def test_the_name_of_what_was_generated_is_known_to_all_commands():
     write("src/robo/interfaces/msg/P.msg", "int8 a\n")
-    assert "note: no package.xml: `interfaces`" in idlc("hash", "src/robo/interfaces")[2]
+    assert (
+        "note: without a package.xml, the package name is `interfaces`"
+        in idlc("hash", "src/robo/interfaces")[2]
+    )
     for out, told in (("src/robo/ifaces", False), ("elsewhere", False), ("far/away/pkg", True)):
         status, _, said = idlc("gen", "src/robo/interfaces", "-o", out)
         assert status == 0

@@ -294,7 +294,7 @@ def test_edited_files_are_refused_with_a_difference_and_nothing_is_written(out):
     assert (replaced.code, removed.code) == ("IDL613", "IDL613")
     assert "-mine" in replaced.detail
     assert "+2" in replaced.detail
-    assert "to be removed" in removed.message
+    assert "would remove it" in removed.message
 
 
 def test_force_keeps_copies_and_never_overwrites_one(out):

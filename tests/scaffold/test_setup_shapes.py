@@ -235,7 +235,7 @@ def test_a_build_stops_before_it_installs_no_classes(package, tmp_path):
     folder = package(compiling).parent
     status, printed = built(folder, tmp_path / "installed")
     assert status != 0
-    assert "setup() is given `packages` without demo._idlc, " in printed
+    assert "`packages` in the call of setup() omits demo._idlc, " in printed
     assert "demo.msg" in printed
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from idlc.check.package.manifest import GENERATE, calls
+from idlc.check.package.cmake import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.project.find import CLOSING, KINDS, SKIPPED
@@ -24,7 +24,7 @@ _LIBRARIES = frozenset(
 )
 _SETUP_FILES = ("setup.py", "setup.cfg", "pyproject.toml")
 _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
-_NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
+_NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
 
 
 def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
@@ -79,6 +79,9 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
             for entry in package.files
             if (place := root.absolute(entry.file.path)).is_relative_to(folder)
         },
+        interfaces=frozenset(
+            file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
+        ),
         folders=folders(folder, files),
         available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
     )

@@ -97,7 +97,7 @@ def _missing_interfaces(package: _Package, keys: Mapping[str, str]) -> Iterator[
     if not missing and not index:
         return
     subjects = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
-    subjects += ["the index entry of the interfaces"] if index else []
+    subjects += ["the index entry for the interfaces"] if index else []
     patterns = set()
     for key, file in keys.items():
         folder, kind = file.rpartition("/")[0], key.split("/")[0]
@@ -111,7 +111,7 @@ def _missing_interfaces(package: _Package, keys: Mapping[str, str]) -> Iterator[
     ]
     if index:
         lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
-    message = f"{enumerated(subjects)} {'are' if missing else 'is'} not among the `data_files`"
+    message = f"{enumerated(subjects)} {'are' if missing else 'is'} not in `data_files`"
     yield _data_files_problem(codes.INTERFACES_NOT_INSTALLED, message, setup, lines, uses_glob=True)
 
 
@@ -145,7 +145,7 @@ def _data_files_problem(
     return code.at(
         setup.place("data_files"),
         message,
-        hint=f"add {text}{also}" + ("; --fix does" if edits else ""),
+        hint=f"add {text}{also}" + (", or run `idlc check --fix`" if edits else ""),
         edits=(*imports, *edits) if edits else (),
     )
 
@@ -167,12 +167,10 @@ def _missing_packages(package: _Package, view: Layout) -> Iterator[Diagnostic]:
         yield from _absent_folders(package, view)
         return
     listed = enumerated([f"`{name}`" for name in missing])
-    reason = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
+    reason = f"{listed} {'is' if len(missing) == 1 else 'are'} not in `packages`"
     if view.installed.is_nothing:
-        reason = (
-            "nothing names the `packages`, and setuptools does not choose among several folders"
-        )
-    message = f"{reason}: the classes of the interfaces are not installed"
+        reason = "`packages` is not set, and setuptools does not choose among several folders"
+    message = f"{reason}, so the build does not install the interface classes"
     yield _packages_problem(view.installed.place, message, package, view)
 
 
@@ -190,21 +188,22 @@ def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
             continue
         is_support = support not in existing and f"{name}.".startswith(f"{support}.")
         if not (package.kinds and (is_support or name in generated)):  # or the build creates it
-            message = f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`"
+            message = f"`packages` names `{name}`, but `{view.folder(name)}` does not exist"
             yield _packages_problem(span_of(setup.source, item.node), message, package, view)
 
 
 def _packages_problem(place: Span, message: str, package: _Package, view: Layout) -> Diagnostic:
     """Return a problem with the edits that let setuptools find the `packages`."""
-    setup, code = package.setup, codes.CLASSES_NOT_INSTALLED
-    root = view.roots.get("", "")
-    where = f"'{root}', " if root not in ("", ".") else ""
+    setup, code, name = package.setup, codes.CLASSES_NOT_INSTALLED, package.name
+    root = view.roots.get("", "").removesuffix(".")
+    where = f"'{root}', " if root else ""
     if place.source is not setup.source:
         if view.installed and view.installed.finders:
-            hint = "make its `where`, `include` and `exclude` match these packages"
+            hint = "change its `where`, `include` and `exclude` to match these packages"
         elif place.source.path.endswith(".toml"):
-            folders = f'["{root or "."}"]'
-            hint = f"write `packages.find = {{ where = {folders} }}` in [tool.setuptools]"
+            # setuptools takes every folder below `where` for a package, tests and sources, too
+            where = f'where = ["{root}"]' if root else f'include = ["{name.partition(".")[0]}*"]'
+            hint = f"write `packages.find = {{ {where} }}` in [tool.setuptools]"
         else:
             also = f", and `where = {root}` in [options.packages.find]" if root else ""
             hint = f"write `packages = find:`{also}"
@@ -230,7 +229,7 @@ def _packages_problem(place: Span, message: str, package: _Package, view: Layout
             edits = setup_edits.append_elements(setup.source, listed, [own])
             hint = f"add `{own}` to `packages`"
     hint += ", with `from setuptools import find_packages`" if imports else ""
-    hint += "; --fix does" if edits else ""
+    hint += ", or run `idlc check --fix`" if edits else ""
     return code.at(place, message, hint=hint, edits=(*imports, *edits) if edits else ())
 
 
@@ -240,11 +239,11 @@ def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     if setup is None:
         return
     if not facts.marker:
-        message = f"`resource/{facts.name}` is missing, the file by which ROS 2 finds the package"
+        message = f"`resource/{facts.name}` is missing; ROS 2 needs this file to find the package"
         hint = f"create it: `mkdir -p resource && touch resource/{facts.name}`"
         yield codes.NO_RESOURCE_MARKER.at(facts.place, message, hint=hint)
     elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
-        message = f"`resource/{facts.name}` is not among the `data_files`"
+        message = f"`resource/{facts.name}` is not in `data_files`"
         line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
         yield _data_files_problem(codes.NO_RESOURCE_MARKER, message, setup, [line])
 
@@ -269,13 +268,13 @@ def entry_points(facts: Facts, _: Model) -> Iterator[Diagnostic]:
             continue
         elif top not in tops:
             message = f"there is no Python package `{top}` here"
-            hint = f"it is `{facts.name}` by the package.xml"
+            hint = f"package.xml names it `{facts.name}`"
         elif source is None:
             message = f"there is no module `{module}`"
-            hint = "name the file that holds the function"
+            hint = "write the name of the file that contains the function"
         elif not defines(source, function.partition(".")[0]):
-            message = f"`{source.path}` has no `{function}`"
-            hint = f"define it: `def {function}() -> None:`"
+            message = f"`{source.path}` does not define `{function}`"
+            hint = f"add `def {function}() -> None:`"
         else:
             continue
         yield codes.BAD_ENTRY_POINT.at(span_of(facts.setup_py, node), message, hint=hint)
@@ -286,8 +285,8 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     setup = _read(facts.setup_py) if facts.setup_py else None
     name = setup.text(setup.arguments.get("name")) if setup else None
     if setup and name is not None and name.replace("-", "_") != facts.name:
-        message = f"setup.py calls the package `{name}`, package.xml `{facts.name}`"
-        hint = "give both the same name"
+        message = f"setup.py names the package `{name}`, but package.xml names it `{facts.name}`"
+        hint = "use the same name in both files"
         yield codes.NAME_MISMATCH.at(setup.place("name"), message, hint=hint)
     if facts.setup_cfg is None:
         return
@@ -298,7 +297,7 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
         if equals and script and "/lib/" in folder and not folder.endswith(f"/lib/{facts.name}"):
             at = start + line.index(folder)
             span = Span(facts.setup_cfg, at, at + len(folder))
-            message = f"`ros2 run` looks for scripts in `lib/{facts.name}`"
+            message = f"`ros2 run` searches for scripts in `lib/{facts.name}`"
             yield codes.NAME_MISMATCH.at(span, message, hint=f"write `$base/lib/{facts.name}`")
 
 

@@ -267,8 +267,9 @@ def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
         edits = () if asked else argument(setup, f"{KEYWORD}=True")
         yield codes.NO_LIBRARY_INSTALLED.at(
             span_of(setup.source, index[0].node),
-            f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
-            "installs no library for its types",
-            hint=f"pass `{KEYWORD}=True` to setup()" + ("; --fix does" if edits else ""),
+            f"`ros2 bag record` stops at `{package}`: setup.py adds the package to ROS 2's index, "
+            "but does not install a library for its types",
+            hint=f"pass `{KEYWORD}=True` to setup()"
+            + (", or run `idlc check --fix`" if edits else ""),
             edits=edits,
         )

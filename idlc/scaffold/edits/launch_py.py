@@ -58,7 +58,7 @@ def add_node(text: str, node: Started) -> Outcome:
             return Edited(text)
     imported = _imported(file, node.action)
     if imported is None:
-        return Refused(f"`{node.action}` is something else in this file", node.line, WHERE)
+        return Refused(f"`{node.action}` has a different meaning in this file", node.line, WHERE)
     called, imports = imported
     edits: tuple[Edit, ...] = ()
     match [*file.calls_of("LaunchDescription")]:
@@ -70,7 +70,7 @@ def add_node(text: str, node: Started) -> Outcome:
         case [ast.Call(args=[], keywords=[]) as description]:
             edits = tuple(_additions(file, description, node, called))
     if not edits:
-        return Refused("its nodes are not written out in one place", node.line, WHERE)
+        return Refused("its nodes are not in one literal list", node.line, WHERE)
     return Edited(apply(text, (*imports, *edits))[0])
 
 

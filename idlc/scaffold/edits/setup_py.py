@@ -97,7 +97,7 @@ def _inserted(lines: list[str], at: int, new: list[str]) -> Edited:
 
 
 IN_SETUP = f"to `{KEY}` in the `entry_points` of setup()"
-UNKNOWN = "the entry points are written in a way that idlc does not know"
+UNKNOWN = "idlc cannot parse the entry points"
 
 #: The edits of a file, or the reason why there are none.
 Change: TypeAlias = tuple[Edit, ...] | str
@@ -143,7 +143,7 @@ def _with_script(setup: Setup, call: ast.Call, script: Script) -> Change:
     if "entry_points" in passed:
         return _in_entry_points(setup, passed["entry_points"], script)
     if None in passed:
-        return "setup() gets its arguments from elsewhere (`**`)"
+        return "setup() takes its arguments from other code (`**`)"
     points = f"{{'{KEY}': ['{script.line}']}}"
     if is_spread(setup.source, call):
         margin, step = margin_of(setup.source, call), step_of(setup.source)
@@ -160,7 +160,7 @@ def _in_entry_points(setup: Setup, node: ast.expr, script: Script) -> Change:
     if isinstance(value, ast.Dict):
         scripts = dict(zip(map(setup.text, value.keys), value.values, strict=True))
         if KEY not in scripts and None in value.keys:
-            return "the entry points come from elsewhere (`**`)"
+            return "the entry points come from other code (`**`)"
     elif isinstance(value, ast.Call) and name_of_call(value) == "dict":
         scripts = {keyword.arg: keyword.value for keyword in value.keywords}
     else:
@@ -169,7 +169,7 @@ def _in_entry_points(setup: Setup, node: ast.expr, script: Script) -> Change:
         return _in_scripts(setup, scripts[KEY], script)
     if isinstance(value, ast.Dict):
         return append_element(setup.source, value, f"'{KEY}': ['{script.line}']")
-    return _unknown(node, value) or "the entry points are not written out as a dictionary or a text"
+    return _unknown(node, value) or "the entry points are not a literal dictionary or string"
 
 
 def _unknown(node: ast.expr, value: ast.expr | None) -> str:
@@ -202,7 +202,7 @@ def _in_scripts(setup: Setup, node: ast.expr, script: Script) -> Change:
             return already_taken(script, target, IN_SETUP).why
         line = f"'{script.line}'".replace("'", literal[-1])
         return (Edit(Span(setup.source, start, end), f"[{literal}, {line}]"),)
-    return _unknown(node, value) or "the console scripts are not written out as a list"
+    return _unknown(node, value) or "the console scripts are not a literal list"
 
 
 def _is_enclosed(source: Source, node: ast.List | ast.Tuple) -> bool:
@@ -265,7 +265,7 @@ def _line(script: Script) -> str:
 
 def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome:
     """Return a pyproject.toml with another line in `[project.scripts]`, added if missing."""
-    why = "the scripts are written in a way that idlc does not edit"
+    why = "idlc cannot edit the scripts"
     refused = Refused(why, _line(script), f"to [{TABLE}]")
     scripts = project.get("scripts", {})
     if script.name in scripts:
@@ -297,7 +297,7 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
         return Edited(text)
     listed = setup.list_of("data_files")
     if listed is None:
-        return Refused("the data files are not written out as a list", f"{element},", WHERE)
+        return Refused("the data files are not a literal list", f"{element},", WHERE)
     return Edited(apply(text, append_element(setup.source, listed, element))[0])
 
 

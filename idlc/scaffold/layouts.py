@@ -1,0 +1,211 @@
+"""The kinds of folders that `idlc init` knows, and which of them a folder is.
+
+Files are only read: nothing of a package runs, and a value that is computed is not guessed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import msgspec
+
+from idlc.check.package.facts import home_of
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.source import Source
+from idlc.model.names import is_module_name, why_not_package
+from idlc.project.files import entries, is_file
+from idlc.project.find import CLOSING, KIND_FOLDERS, list_files
+from idlc.project.package_xml import declared_name, read_statements
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import SETTINGS_FILE, broken_toml, load_settings, toml
+
+Kind: TypeAlias = Literal["ament_python", "ament_cmake", "library", "empty", "workspace"]
+
+SETUP = "setup.py"
+#: Files that may lie in a folder in which a package begins, and in a package's `src`.
+_PLAIN = re.compile(r"(?i)\..*|(readme|licen[cs]e|copying|notice)\b.*|pyproject\.toml")
+#: Folders of a project that hold no library.
+_NO_LIBRARY = frozenset(
+    "benchmarks build dist doc docs examples launch msg resource scripts test tests tools".split()
+)
+#: The tools behind the first name of a `build-backend`, where that is another name.
+_TOOLS = {"flit_core": "flit", "uv_build": "uv"}
+
+
+class Layout(NamedTuple):
+    """A folder and its kind; `name` is the package's, `home` the Python package's folder in it.
+
+    `backend` builds an installable one. `packages` are the folders in a workspace.
+    """
+
+    kind: Kind
+    folder: Path
+    name: str = ""
+    home: str = ""
+    backend: str = ""
+    packages: tuple[Path, ...] = ()
+
+    def sentence(self, interfaces: str) -> str:
+        """Return the sentence that says what the folder is, with the number of its interfaces."""
+        match self.kind:
+            case "ament_python":
+                return f"{self.name} is an ament_python package with {interfaces}"
+            case "ament_cmake":
+                sentence = f"{self.name} is an ament_cmake package with {interfaces}"
+                return f"{sentence}; CMake still builds it"
+            case "library":
+                tool = self.backend.partition(".")[0]
+                where = f"in {self.home} (built with {_TOOLS.get(tool, tool)})"
+                return f"{self.name} is a Python library {where} with {interfaces}"
+            case "workspace":
+                return f"this is a workspace of {len(self.packages)} packages"
+        return f"this folder has no package yet; idlc creates the ament_python package {self.name}"
+
+
+def layout_of(root: Root, report: Report) -> Layout | None:
+    """Return the layout of a root's folder; `None` after a report on one that is not clear."""
+    folder = root.base
+    if is_file(folder / MANIFEST):
+        return _of_manifest(root, report)
+    document: dict[str, Any] = {}
+    if is_file(folder / SETTINGS_FILE):
+        source = root.read_source(SETTINGS_FILE, SETTINGS_FILE, report)
+        try:
+            document = toml(source.text) if source else {}
+        except ValueError as error:
+            report.add(broken_toml(source or Source(SETTINGS_FILE, ""), str(error)))
+    if report.had_errors:
+        return None
+    tool = document.get("tool", {})
+    is_poetry = isinstance(tool, dict) and "poetry" in tool
+    if "project" in document or "build-system" in document or is_poetry:
+        return _library(root, document, report)
+    if is_file(folder / SETUP):
+        return _library(root, {}, report)
+    packages = list_files((".",), root, report).packages
+    if packages:
+        return Layout("workspace", folder, packages=packages)
+    return _empty(root, report)
+
+
+def _of_manifest(root: Root, report: Report) -> Layout | None:
+    folder = root.base
+    name = declared_name(folder / MANIFEST, root, problems := Report())
+    if not name:
+        hint = "fix it, then run `idlc init` again"
+        report.extend(msgspec.structs.replace(problem, hint=hint) for problem in problems)
+        return None
+    why = why_not_package(name)
+    if why:
+        message = f"`{name}` {why}"
+        report.add(codes.BAD_PACKAGE_XML.of(MANIFEST, message, hint="change its `<name>`"))
+        return None
+    declared = read_statements(folder / MANIFEST, MANIFEST, root, report)
+    types = [statement.text for statement in declared if statement.tag == "build_type"]
+    # packages for both ROS versions have two, each with a condition
+    types = [each for each in types if each in ("ament_python", "ament_cmake")] or types
+    if types == ["ament_python"]:
+        home = home_of(folder, name, root).relative_to(folder).as_posix()
+        return Layout("ament_python", folder, name, home, backend="setuptools.build_meta")
+    if types in ([], ["ament_cmake"]) and is_file(folder / "CMakeLists.txt"):
+        return Layout("ament_cmake", folder, name, f"build/{name}")
+    kind = f"of the build type `{types[0]}`" if types else "without a build type"
+    message = f"`{name}` is a package {kind}, but idlc only sets up ament_python and ament_cmake"
+    hint = f"generate its classes with `idlc gen . -o build/{name}`"
+    report.add(codes.CANNOT_EDIT.of(MANIFEST, message, hint=hint))
+    return None
+
+
+def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | None:
+    """Return the layout of a project without package.xml, by the Python package that it holds."""
+    folder = root.base
+    system, project = (
+        table if isinstance(table := document.get(key), dict) else {}
+        for key in ("build-system", "project")
+    )
+    backend = system.get("build-backend")
+    backend = backend if isinstance(backend, str) else "setuptools.build_meta"
+    if backend == "idlc.backend":
+        message = f"`{backend}` builds ROS 2 packages, but there is no {MANIFEST}"
+        hint = "`idlc scaffold package my_msgs --interfaces` creates a folder that you can build"
+        report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
+        return None
+    base, names = "src/", _python_packages(folder / "src")
+    if not names:
+        base, names = "", _python_packages(folder)
+    own = re.sub(r"[-_.]+", "_", str(project.get("name", ""))).lower()
+    name = own if own in names else next(iter(names), "")
+    config = load_settings(root, report)
+    out = config.out if config.folder == folder else ""
+    if out or (name and (own in names or len(names) == 1)):
+        name = name or own or PurePosixPath(out).parent.name  # without an __init__.py
+        home = str(PurePosixPath(out).parent) if out else f"{base}{name}"
+        return Layout("library", folder, name, home, backend)
+    where = f"`{base or '.'}`"
+    if name:
+        listed = first_few((f"`{each}`" for each in names), 4)
+        message = (
+            f"{where} contains several Python packages ({listed}), but none with the project's name"
+        )
+        hint = "add these lines to pyproject.toml, and set `out` to the package for the classes"
+        files = list_files((".",), root, Report()).files
+        places = sorted({root.shown(file.root) for file in files}) or ["interfaces"]
+        detail = f"[tool.idlc]\npaths = {json.dumps(places)}\n"
+        detail += f'package = "{package_of(name)}"\nout = "{base}{name}/ros"\nvendor-deps = true'
+    else:
+        message, detail = f"{where} has no Python package with an `__init__.py`", ""
+        hint = "write the package first, or set `out` in [tool.idlc] to the folder for the classes"
+        hint += ", then run `idlc init` again"
+    place = SETTINGS_FILE if document else SETUP
+    report.add(codes.CANNOT_EDIT.of(place, message, hint=hint, detail=detail))
+    return None
+
+
+def package_of(library: str) -> str:
+    """Return the name that a library's types have in ROS 2."""
+    return f"{_plain(library)}_msgs".strip("_")
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+
+
+def _python_packages(folder: Path) -> list[str]:
+    """Return the names of the Python packages in a folder, sorted."""
+    named = (path for path in entries(folder) if is_module_name(path.name))
+    return [
+        path.name
+        for path in named
+        if path.name not in _NO_LIBRARY and is_file(path / "__init__.py")
+    ]
+
+
+def _empty(root: Root, report: Report) -> Layout | None:
+    """Return the layout of a folder that holds at most interfaces; its name is the package's."""
+    folder = root.base
+    others = [
+        path.name
+        for path in entries(folder)
+        if not _PLAIN.fullmatch(path.name) and path.name not in KIND_FOLDERS
+        if not any((path / marker).exists() for marker in CLOSING)
+    ]
+    name = _plain(folder.name)
+    why = why_not_package(name)
+    hint = "run `idlc scaffold package my_robot`, then `cd my_robot`"
+    if others:
+        listed = first_few((f"`{other}`" for other in others), 3)
+        message = (
+            "this folder has no package.xml, setup.py or project in pyproject.toml, but other "
+        )
+        message += f"files: {listed}"
+        report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
+    elif why:
+        message = f"the folder's name is not a valid package name: `{name or folder.name}` {why}"
+        report.add(codes.UNIMPORTABLE_PACKAGE.of("", message, hint=hint))
+    else:
+        return Layout("empty", folder, name, name, backend="setuptools.build_meta")
+    return None
