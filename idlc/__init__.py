@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
     from idlc.recordings.load import load
     from idlc.recordings.recording import Recording
+    from idlc.upgrading.library import upgrade
 
 __all__ = [
     "Batch",
@@ -18,23 +19,25 @@ __all__ = [
     "load",
     "split_delimited",
     "split_mcap_chunk",
+    "upgrade",
 ]
 
 #: What programs use, and the modules that are imported when they ask for it.
 _MODULES = {
-    "Batch": "batches",
-    "Recording": "recording",
-    "delimited": "batches",
-    "load": "load",
-    "split_delimited": "batches",
-    "split_mcap_chunk": "batches",
+    "Batch": "recordings.batches",
+    "Recording": "recordings.recording",
+    "delimited": "recordings.batches",
+    "load": "recordings.load",
+    "split_delimited": "recordings.batches",
+    "split_mcap_chunk": "recordings.batches",
+    "upgrade": "upgrading.library",
 }
 
 
 def __getattr__(name: str) -> object:
     """Import what a program asks for."""
     if name in _MODULES:
-        module = __import__(f"idlc.recordings.{_MODULES[name]}", fromlist=[name])
+        module = __import__(f"idlc.{_MODULES[name]}", fromlist=[name])
         return getattr(module, name)
     raise AttributeError(f"module 'idlc' has no attribute {name!r}")
 

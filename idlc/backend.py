@@ -29,10 +29,10 @@ get_requires_for_build_editable = get_requires_for_build_wheel
 
 def build_sdist(sdist_directory: str, config_settings: Settings = None) -> str:
     """Write the archive of the source folder, and return its name."""
-    from idlc.build.hooks import finished, sdist
+    from idlc.build.hooks import archive, sdist
 
     settings = dict(config_settings or {})
-    return finished(lambda report: sdist(sdist_directory, settings, report))
+    return archive(lambda report: sdist(sdist_directory, settings, report))
 
 
 def build_wheel(
@@ -46,10 +46,10 @@ def build_wheel(
     tools are to know it; without it that is the one that is installed here. `libraries=no` makes
     a wheel for every machine, without libraries for these tools.
     """
-    from idlc.build.hooks import finished, wheel
+    from idlc.build.hooks import archive, wheel
 
     settings = dict(config_settings or {})
-    return finished(lambda report: wheel(wheel_directory, settings, report))
+    return archive(lambda report: wheel(wheel_directory, settings, report))
 
 
 build_editable = build_wheel

@@ -30,7 +30,7 @@ from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
 from idlc.project.files import is_folder
-from idlc.project.find import InterfaceFile, find, list_files, no_interfaces
+from idlc.project.find import RULES, InterfaceFile, find, list_files, no_interfaces
 from idlc.project.git import Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
@@ -134,12 +134,12 @@ def not_allowed(
     for entry in options.allowed:
         covered = [at for at, change in enumerate(changes) if entry.covers(change)]
         if not covered and is_all:
-            message = f"no change needs the allowance for `{entry.at}`"
+            message = f"unused allowance for `{entry.at}`"
             hint = "remove the entry"
             report.add(codes.UNUSED_ALLOWANCE.of(options.allowed_in, message, hint=hint))
         elif covered and entry.until.isoformat() < options.today:
-            message = f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})"
-            hint = "take the change back, or decide again and set a new day"
+            message = f"the allowance for `{entry.at}` expired on {entry.until} ({entry.reason})"
+            hint = "revert the change, or set a new date"
             report.add(codes.EXPIRED_ALLOWANCE.of(options.allowed_in, message, hint=hint))
         else:
             allowed.update(covered)
@@ -159,7 +159,7 @@ def _against(options: BreakingOptions, packages: Packages, report: Report) -> Co
         return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
         message = f"no such file or folder: `{options.against}`"
-        hint = f"the git revision is `--against {GIT}{options.against}`"
+        hint = f"for the git revision, use `--against {GIT}{options.against}`"
         report.add(codes.NO_SUCH_PATH.of(options.against, message, hint=hint))
         return None
     return _compare(options, packages, None, report)
@@ -225,14 +225,21 @@ def _compare(
             compare(*(side.get(package) or Model(package, (), {}) for side in (old, new)))
             for package in {**old, **new}
         )
+    homes = [folder for package in packages for folder in package.folders]
+    if any(is_folder(home / RULES) for home in homes):
+        from idlc.upgrading.coverage import rule_folders, with_rules
+
+        places = rule_folders(homes)
+        changes = with_rules(whole.changes, old, new, places, options.scope.root)
+        whole = whole._replace(changes=changes)
     elsewhere = {*map(str, others), *submodules}
     for names, reason, hint in (
-        (map(str, before.broken), f"there are errors in {options.against}", before.error),
-        (elsewhere, "other git repositories hold their history", None),
-        (map(str, skipped), "this sparse checkout leaves them out", _CHECK_OUT),
+        (map(str, before.broken), f"`{options.against}` contains errors", before.error),
+        (elsewhere, "their history is in other git repositories", None),
+        (map(str, skipped), "this sparse checkout omits them", _CHECK_OUT),
     ):
         if listed := first_few(sorted(f"`{name}`" for name in names), 5):
-            message = f"not compared: {listed}; {reason}"
+            message = f"idlc did not compare {listed}: {reason}"
             report.add(codes.NOT_COMPARED.of(options.paths[0], message, hint=hint))
     return whole._replace(left_out=tuple(sorted({*map(str, out), *elsewhere})))
 

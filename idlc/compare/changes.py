@@ -49,7 +49,7 @@ class Change(NamedTuple):
     @property
     def diagnostic(self) -> Diagnostic:
         """The change as a problem to show."""
-        label = (Label(self.old, "this is what it was"),) if self.old and self.span else ()
+        label = (Label(self.old, "old version"),) if self.old and self.span else ()
         return Diagnostic(
             code=self.code.id,
             severity=self.code.severity,

@@ -37,7 +37,7 @@ def compare_with_distro(
     """
     name = against.removeprefix(PREFIX)
     if name not in BY_NAME:
-        message = f"there is no distribution `{name}`"
+        message = f"no such distribution: `{name}`"
         report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
         return None
     other = BY_NAME[name]

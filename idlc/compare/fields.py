@@ -19,6 +19,7 @@ from idlc.compare.changes import (
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Span
 from idlc.model import ir
+from idlc.model.comments import deprecation
 from idlc.model.describe import type_dict
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
@@ -87,29 +88,29 @@ def _changes(sides: Sides) -> Iterator[Change]:
     pairing = pair(sides.old.fields, sides.new.fields, lambda field: field.type)
     yield from _removed(sides, pairing)
     for old, new in pairing.renamed:
-        message = f"field `{old.name}` is called `{new.name}` now"
+        message = f"field `{old.name}` was renamed to `{new.name}`"
         spans = new.name_span, old.name_span
         yield sides.change(codes.FIELD_RENAMED, old, message, ("hash", "source"), *spans)
     yield from _added(sides, pairing)
     for old, new in pairing.kept:
         if new.name in pairing.moved:
             message = f"field `{new.name}` was moved"
-            hint = "put it back; the order of the fields is the order of the bytes"
+            hint = "move it back; the bytes of a message follow the order of its fields"
             spans = new.name_span, old.name_span
             yield sides.change(codes.FIELD_MOVED, new, message, LEVELS[:3], *spans, hint=hint)
     # the first such field stands for the structure
     first = next((field for field in sides.new.fields if field.optional), None)
     if first is not None and not any(field.optional for field in sides.old.fields):
         message = f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file"
-        hint, span = "leave it out; it has no effect", first.name_span
+        hint, span = "remove it; it has no effect", first.name_span
         yield sides.change(codes.OPTIONAL_ADDED, first, message, ("source",), span, hint=hint)
     for old, new in (*pairing.kept, *pairing.renamed):
         yield from _type_changes(sides, old, new)
         if _default(old) != _default(new):
             yield _default_changed(sides, old, new)
         if old.unit and new.unit and old.unit != new.unit:
-            message = f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now"
-            hint = "give the field another name, so that nobody uses the old unit by mistake"
+            message = f"the unit of `{new.name}` changed from [{old.unit}] to [{new.unit}]"
+            hint = "rename the field, so that nobody uses the old unit by mistake"
             spans = new.name_span, old.name_span
             yield sides.change(codes.UNIT_CHANGED, new, message, ("behaviour",), *spans, hint=hint)
 
@@ -122,7 +123,7 @@ def _removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.old.fields)
     last = max((places[old.name] for old, _ in (*pairing.kept, *pairing.renamed)), default=-1)
     kept = [places[old.name] for old, _ in pairing.kept]
-    hint = "keep it and say in its comment that it is no longer used"
+    hint = "keep it for one release with a comment such as `# deprecated: use NAME`"
     for field in pairing.removed:
         place = places[field.name]
         following = bisect_right(kept, place)
@@ -132,13 +133,22 @@ def _removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
         levels: set[Level] = {"hash", "source"} if last < place else {*LEVELS[:3]}
         message, at = f"field `{field.name}` was removed", next(iter(spans), None) or sides.top
         own = field.name_span
-        yield sides.change(codes.FIELD_REMOVED, field, message, levels, at, own, hint=hint)
+        milder = _milder(levels, field)
+        advice = {"hint": hint} if milder == levels else {}
+        yield sides.change(codes.FIELD_REMOVED, field, message, milder, at, own, **advice)
+
+
+def _milder(levels: Iterable[Level], removed: ir.Field | ir.Constant) -> set[Level]:
+    """Return the levels of a removal: code that used what was deprecated has been warned."""
+    if deprecation(removed.comment) is None:
+        return {*levels}
+    return {"behaviour" if level == "source" else level for level in levels}
 
 
 def _added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.new.fields)
     last = max((places[new.name] for _, new in (*pairing.kept, *pairing.renamed)), default=-1)
-    hint = "add a new message instead, if old and new programs must understand each other"
+    hint = "if old and new programs must communicate, define a new message instead"
     for field in pairing.added:
         # positional arguments and patterns refer to other fields if it is not the last
         levels: set[Level] = {"wire", "hash"} if last < places[field.name] else {*LEVELS[:3]}
@@ -172,7 +182,7 @@ def _type_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change
     only_bounds = type(old.type) is type(new.type) and without_bound(before) == without_bound(after)
     code = codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED
     was, now = (spell(field.type, sides.new.name.package) for field in (old, new))
-    message = f"field `{new.name}` was `{was}` and is `{now}` now"
+    message = f"field `{new.name}` changed from `{was}` to `{now}`"
     yield sides.change(code, new, message, levels, new.type_span, old.type_span)
 
 
@@ -183,14 +193,16 @@ def _default(field: ir.Field) -> str | None:
 def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     levels: tuple[Level, ...] = ("behaviour",)
     if old.default is None:
-        message = f"field `{new.name}` has a default value now"
+        message = f"field `{new.name}` now has a default value"
     elif new.default is None:
-        message = f"field `{new.name}` lost its default value, {spell_value(old.default.value)}"
+        message = (
+            f"field `{new.name}` no longer has its default value, {spell_value(old.default.value)}"
+        )
         levels = ("behaviour", "source")
     else:
         message = (
-            f"the default of `{new.name}` was {spell_value(old.default.value)} "
-            f"and is {spell_value(new.default.value)} now"
+            f"the default value of `{new.name}` changed from {spell_value(old.default.value)} "
+            f"to {spell_value(new.default.value)}"
         )
     span = new.default_span or new.name_span
     return sides.change(codes.FIELD_DEFAULT_CHANGED, new, message, levels, span, old.default_span)
@@ -203,22 +215,23 @@ def constant_changes(sides: Sides) -> Iterator[Change]:
     for constant in pairing.removed:
         message = f"constant `{constant.name}` was removed"
         spans = sides.top, constant.name_span
-        yield sides.change(codes.CONSTANT_REMOVED, constant, message, source, *spans)
+        levels = _milder(source, constant)
+        yield sides.change(codes.CONSTANT_REMOVED, constant, message, levels, *spans)
     for old, new in pairing.renamed:
-        message = f"constant `{old.name}` is called `{new.name}` now"
-        hint = f"keep `{old.name}` beside it, with the same value"
+        message = f"constant `{old.name}` was renamed to `{new.name}`"
+        hint = f"keep `{old.name}` as well, with the same value"
         spans = new.name_span, old.name_span
         yield sides.change(codes.CONSTANT_RENAMED, old, message, source, *spans, hint=hint)
     for old, new in pairing.kept:
         if native(old.type) != native(new.type):
             was, now = spell(old.type), spell(new.type)
-            message = f"constant `{new.name}` was `{was}` and is `{now}` now"
+            message = f"constant `{new.name}` changed from `{was}` to `{now}`"
             spans = new.name_span, old.name_span
             yield sides.change(codes.CONSTANT_TYPE_CHANGED, new, message, source, *spans)
         if repr(old.value) != repr(new.value):
             was, now = spell_value(old.value), spell_value(new.value)
-            message = f"constant `{new.name}` was {was} and is {now} now"
-            hint = "both values are in use as long as not everything is rebuilt"
+            message = f"constant `{new.name}` changed from {was} to {now}"
+            hint = "until you rebuild all programs, some use the old value, and others the new one"
             spans, code = (new.value_span, old.value_span), codes.CONSTANT_VALUE_CHANGED
             yield sides.change(code, new, message, ("behaviour",), *spans, hint=hint)
 

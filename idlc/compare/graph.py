@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from idlc.compare.changes import Change, Level
 from idlc.compare.fields import Sides, constant_changes, field_changes, with_wire
@@ -15,6 +16,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import derive, ir
+from idlc.model.describe import DescriptionDict
 from idlc.model.link import Model
 from idlc.wire.compatible import reads_alike
 
@@ -70,7 +72,7 @@ class LocalType(NamedTuple):
     @property
     def label(self) -> str:
         """Its origin, for a sentence."""
-        return "your files" if self.in_files else "what is installed here"
+        return "your files" if self.in_files else "the installed package"
 
 
 class Version(NamedTuple):
@@ -109,6 +111,47 @@ class Version(NamedTuple):
         return not self.endpoints or not all(endpoint.sends for endpoint in self.endpoints)
 
 
+class Question(NamedTuple):
+    """A request to a node to describe a type that it uses, by name and hash."""
+
+    node: str
+    type: str
+    hash: str
+
+
+class Answer(NamedTuple):
+    """A node's description of a type, or the problem with it; `sources` are files by type."""
+
+    description: DescriptionDict | None
+    problem: str = ""
+    sources: Mapping[str, str] = MappingProxyType({})
+
+
+def answer_of(result: Any, is_offered: bool) -> Answer:
+    """Return the answer in a reply of GetTypeDescription; `None` is a missing reply."""
+    if result is None and not is_offered:
+        return Answer(None, "has no ~/get_type_description")
+    if result is None:
+        return Answer(None, "does not reply")
+    if not result.successful:
+        return Answer(None, f"says: {one_line(result.failure_reason)}")
+    sources = {
+        source.type_name: source.raw_file_contents
+        for source in result.type_sources
+        if source.encoding in ir.KINDS
+    }
+    return Answer(_plain(result.type_description), sources=sources)
+
+
+def _plain(value: Any) -> Any:
+    """Return a message as dictionaries by field."""
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    if not hasattr(value, "get_fields_and_field_types"):
+        return value
+    return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+
+
 def several_versions(
     endpoints: Iterable[Endpoint], local: Mapping[str, LocalType]
 ) -> Iterator[tuple[Version, ...]]:
@@ -139,11 +182,16 @@ def interface_of(name: str) -> str:
     return _PART.sub("", name) if "/msg/" not in name else name
 
 
+def service_of(name: str) -> str | None:
+    """Return the service that a structure is a part of, or `None`."""
+    service, _, part = name.rpartition("_")
+    return service if part in ("Request", "Response") and "/msg/" not in name else None
+
+
 def event_of(name: str) -> str | None:
     """Return the event message of the service that a structure is a part of, or `None`."""
-    service, _, part = name.rpartition("_")
-    is_part = part in ("Request", "Response") and "/msg/" not in name
-    return f"{service}_Event" if is_part else None
+    service = service_of(name)
+    return f"{service}_Event" if service else None
 
 
 def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
@@ -158,10 +206,10 @@ def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
             yield Change(
                 codes.SEVERAL_TYPES,
                 name,
-                f"{entity} `{one_line(name)}` has ends of {len(types)} types",
+                f"{entity} `{one_line(name)}` has endpoints with {len(types)} types",
                 frozenset({"hash"}),
                 path=name,
-                hint="endpoints of different types never meet; rename one of them",
+                hint="endpoints of different types never connect; rename one of them",
                 detail="\n".join(
                     line
                     for type_, users in sorted(types.items())
@@ -203,20 +251,20 @@ def version_changes(
     for sender, reader in pairs:
         effect = "misread" if _misreads(sender, reader, models) else "read right"
         if not {sender.key, reader.key} <= models.keys():
-            effect = "may be misread"
+            effect = "might be misread"
         lines.append(f"{sender.label} → {reader.label}: {effect}, or not delivered")
     if structures and structures != [last.type]:
-        lines.append(f"what differs is in {', '.join(f'`{name}`' for name in structures)}")
+        lines.append(f"the differences are in {', '.join(f'`{name}`' for name in structures)}")
     misread = any(_misreads(a, b, models) for a, b in pairs)
     whose = [version.label for version in versions]
     levels: set[Level] = {"hash", "wire"} if misread else {"hash"}
     yield Change(
         codes.SEVERAL_VERSIONS,
         last.type,
-        f"`{last.type}` has {len(versions)} versions: of {', of '.join(whose)}",
+        f"`{last.type}` has {len(versions)} versions: in {'; in '.join(whose)}",
         frozenset(levels),
         path=last.type,
-        hint="build everything that uses it from one version, and start it again",
+        hint="build all these programs with the same version of the type, and restart them",
         detail="\n".join(lines),
     )
     for difference, changes, old, new in sides:
@@ -230,11 +278,11 @@ def version_changes(
 
 
 def _version(version: Version, models: Models, problems: Problems) -> Iterator[str]:
-    where = f", that of {version.local.label}" if version.local else ""
+    where = f", as in {version.local.label}" if version.local else ""
     yield f"{version.hash}{where}:"
     yield from activities(version.endpoints) if version.endpoints else ["  no node"]
     if version.key not in models:
-        yield f"  only its hash is known: {problems.get(version.key, 'nobody was asked')}"
+        yield f"  idlc has only its hash: {problems.get(version.key, 'it asked no node')}"
 
 
 def _misreads(sender: Version, reader: Version, models: Models) -> bool:

@@ -100,7 +100,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
             changes.append(Change(codes.INTERFACE_REMOVED, name, message, levels, path=name))
         elif recorded[name] != after.describer.hash(name):
             message = f"the type hash of `{name}` changed"
-            hint = "compare with a folder or a git revision to see what changed it"
+            hint = "to see the change, compare with a folder or a git revision"
             levels = frozenset(("hash",))
             change = Change(codes.HASH_CHANGED, name, message, levels, path=paths[name], hint=hint)
             changes.append(change)
@@ -132,7 +132,7 @@ def renamed_interface(old: ir.Interface, new: ir.Interface) -> Change:
     return Change(
         codes.INTERFACE_RENAMED,
         str(old.name),
-        f"{_noun(old.name.kind)} `{old.name}` is called `{new.name}` now",
+        f"{_noun(old.name.kind)} `{old.name}` was renamed to `{new.name}`",
         frozenset({"hash", "source"}),
         path=ir.path_of(new),
     )
@@ -197,7 +197,7 @@ class BreakingSettings(msgspec.Struct, frozen=True):
 
 
 def _words(description: str) -> Meta:
-    return Meta(pattern=r"\S", title="a string that is not blank", description=description)
+    return Meta(pattern=r"\S", title="a non-empty string", description=description)
 
 
 class Allowance(msgspec.Struct, frozen=True):
@@ -208,11 +208,11 @@ class Allowance(msgspec.Struct, frozen=True):
     holds for all.
     """
 
-    at: Annotated[str, _words("the type or field that it is about")]
-    reason: Annotated[str, _words("why the change is made nevertheless")]
+    at: Annotated[str, _words("the type or field of the change")]
+    reason: Annotated[str, _words("the reason for the change")]
     until: Annotated[
         datetime.date,
-        Meta(title="a day, as in 2030-12-31", description="its last day, as in 2030-12-31"),
+        Meta(title="a date such as 2030-12-31", description="its last day, such as 2030-12-31"),
     ]
     code: Text = ""
 
@@ -250,7 +250,7 @@ def _allowance(
     day = {"until": until.date()} if isinstance(until, datetime.datetime) else {}
     allowance = read_table({**entry, **day}, Allowance, place, report)
     if allowance and allowance.code not in ("", *(code for code in CODES if code[:4] == "IDL5")):
-        message = f"{place.shown} has `{allowance.code}`, which is no code of a breaking change"
+        message = f"{place.shown} contains `{allowance.code}`, which is not a breaking change"
         place.wrong("code", message, report)
         return None
     return allowance

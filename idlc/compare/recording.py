@@ -64,9 +64,11 @@ def compare_with_recordings(
             }
     if local.unknown:
         names = first_few((f"`{name}`" for name in sorted(local.unknown)), NAMED)
-        report.notes.append(f"not known here, so not compared: {names}")
+        report.notes.append(
+            f"idlc did not find these interfaces, and did not compare them: {names}"
+        )
     if packages and not seen:
-        report.notes.append("none of these interfaces was recorded")
+        report.notes.append("the recordings contain none of these interfaces")
     counts = {"interface": len(seen), "recording": len(recordings)}
     judged = judge([*changes.values()], options, report, concerns=concerns_readers)
     others, hidden = (0, judged.hidden) if options.levels else (judged.hidden, 0)

@@ -13,35 +13,38 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import chain
-from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias, get_args
 
 from idlc.check.compiler import Compiler, stage
 from idlc.compare.breaking import BreakingOptions, error_free_models, judge
 from idlc.compare.graph import (
+    Answer,
     Endpoint,
     Entity,
     LocalType,
+    Question,
     Reported,
     Role,
     Version,
+    answer_of,
     event_of,
     interface_of,
+    service_of,
     several_types,
     several_versions,
     version_changes,
 )
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.diagnostics.text import one_line
 from idlc.model import ir
-from idlc.model.describe import DescriptionDict
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
+from idlc.robot.live.ends import RobotGraph, join_robot
+from idlc.robot.session import is_address
 from idlc.wire.layout import oversized
 
 #: A graph that never comes to rest is watched for this many times the patience.
@@ -57,22 +60,6 @@ _ACTION = "/_action/"
 Roles: TypeAlias = tuple[Role, Role]
 _SERVER: Roles = ("server", "client")
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
-
-
-class Question(NamedTuple):
-    """A request to a node to describe a type that it uses, by name and hash."""
-
-    node: str
-    type: str
-    hash: str
-
-
-class Answer(NamedTuple):
-    """A node's description of a type, or the problem with it; `sources` are .msg files by type."""
-
-    description: DescriptionDict | None
-    problem: str = ""
-    sources: Mapping[str, str] = MappingProxyType({})
 
 
 @contextmanager
@@ -95,8 +82,8 @@ def join_graph(report: Report) -> Iterator[Graph | None]:
             parameter_overrides=[rclpy.Parameter("start_type_description_service", value=False)],
         )
     except ImportError as error:
-        hint = "source your ROS 2 and use its Python, or pip install ros-jazzy-rclpy"
-        report.add(codes.NO_RCLPY.of("graph", f"this needs rclpy: {error}", hint=hint))
+        hint = "source your ROS 2 and use its Python, or run `pip install ros-jazzy-rclpy`"
+        report.add(codes.NO_RCLPY.of("graph", f"rclpy is required: {error}", hint=hint))
     except Exception as error:  # rclpy's errors have no common base
         report.add(codes.NO_RCLPY.of("graph", f"rclpy cannot start a node: {error}"))
     if node is None:
@@ -111,6 +98,9 @@ def join_graph(report: Report) -> Iterator[Graph | None]:
 
 class Graph:
     """The running graph as one node sees it."""
+
+    #: Endpoints of services announce the hashes of the structures that they send and read.
+    has_hashes_of_services = False
 
     def __init__(self, rclpy: Any, node: Any, context: Any) -> None:
         self._rclpy = rclpy
@@ -194,7 +184,7 @@ class Graph:
                 self._node.destroy_client(client)
         names = {name for name, _ in self._node.get_service_names_and_types()}
         offered = {node for node in nodes if f"{node}/get_type_description" in names}
-        return {each: _answer(results.get(each), each.node in offered) for each in questions}
+        return {each: answer_of(results.get(each), each.node in offered) for each in questions}
 
     def _client(self, service: Any, node: str) -> Any:
         with suppress(Exception):  # a name that no rclpy gives itself
@@ -202,35 +192,11 @@ class Graph:
         return None
 
 
-def _answer(result: Any, is_offered: bool) -> Answer:
-    if result is None and not is_offered:
-        return Answer(None, "has no ~/get_type_description")
-    if result is None:
-        return Answer(None, "does not answer")
-    if not result.successful:
-        return Answer(None, f"says: {one_line(result.failure_reason)}")
-    sources = {
-        source.type_name: source.raw_file_contents
-        for source in result.type_sources
-        if source.encoding == "msg"
-    }
-    return Answer(_plain(result.type_description), sources=sources)
-
-
-def _plain(value: Any) -> Any:
-    """Return a message as dictionaries by field."""
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if not hasattr(value, "get_fields_and_field_types"):
-        return value
-    return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
-
-
 #: A structure's full name and type hash.
 Key = tuple[str, str]
-_NO_NODE = "there is no node that could be asked"
+_NO_NODE = "no node has the interface's description"
 _SERVICE_EVENTS = (
-    "a node describes a service only to those who have the same one; to see what differs, give "
+    "a node describes a service only to nodes with the same version; to see the difference, add "
     "its files with -I, or turn on service introspection"
 )
 
@@ -255,7 +221,8 @@ def compare_with_graph(
 ) -> GraphVerdict | None:
     """Report types in which endpoints, or local files, differ; `None` for an empty graph.
 
-    `patience`: seconds without a change; without files, the installed types are compared.
+    `patience`: seconds without a change; without files, the installed types are compared. The graph
+    is that of this machine's rclpy, or of a robot whose address is compared against.
     """
     scope = options.scope
     listing = list_files(options.paths, scope.root, report, scope.exclude)
@@ -265,22 +232,29 @@ def compare_with_graph(
     local_models = error_free_models(packages, scope, report).values()
     if report.had_errors:
         return None
-    with join_graph(report) as graph:
+    is_robot = is_address(options.against)
+    graph: Graph | RobotGraph | None
+    with join_robot(options.against, report, patience) if is_robot else join_graph(report) as graph:
         endpoints = graph.endpoints(patience) if graph else ()
         if graph is None or not endpoints:
             hint = (
-                "compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION with "
-                "those of the nodes, or give it more time with --timeout"
+                "set ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION to the "
+                "nodes' values, or raise --timeout"
             )
-            message = f"no node was found within {patience:g} seconds"
-            report.extend([codes.EMPTY_GRAPH.of("graph", message, hint=hint)] if graph else [])
+            if is_robot:
+                hint = "set ROS_DOMAIN_ID to the nodes' value, or raise --timeout"
+            message = f"no node appeared within {patience:g} seconds"
+            report.extend(
+                [codes.EMPTY_GRAPH.of(options.against, message, hint=hint)] if graph else []
+            )
             return None
-        models, local = _local_versions(local_models, endpoints, scope)
+        whole = graph.has_hashes_of_services
+        models, local = _local_versions(local_models, endpoints, scope, whole)
         versions = list(several_versions(endpoints, local))
-        questions = dict(_questions(versions, endpoints, models))
+        questions = dict(_questions(versions, endpoints, models, whole))
         answers = graph.ask(chain.from_iterable(questions.values()), patience)
     with stage("compare", "graph"):
-        problems = _add_described(questions, answers, models)
+        problems = _add_described(questions, answers, models, whole)
         seen: Reported = set()
         changes = list(several_types(endpoints))
         for several in versions:
@@ -295,23 +269,26 @@ def compare_with_graph(
 
 
 def _local_versions(
-    local_models: Iterable[Model], endpoints: Iterable[Endpoint], scope: Scope
+    local_models: Iterable[Model], endpoints: Iterable[Endpoint], scope: Scope, whole: bool
 ) -> tuple[dict[Key, Model], dict[str, LocalType]]:
     """Return all versions of types on this machine, and the one in use of each type."""
     models: dict[Key, Model] = {}
     local: dict[str, LocalType] = {}
     for model in local_models:
-        local |= {name: LocalType(hash_, True) for name, hash_ in _add(model, models)}
+        local |= {name: LocalType(hash_, True) for name, hash_ in _add(model, models, whole)}
     for model in _installed((endpoint.structure for endpoint in endpoints), scope):
-        for name, hash_ in _add(model, models):
+        for name, hash_ in _add(model, models, whole):
             local.setdefault(name, LocalType(hash_, False))
     return models, local
 
 
-def _add(model: Model, models: dict[Key, Model]) -> Iterator[Key]:
-    """Add the structures of a model to `models`; yield their names and hashes."""
+def _add(model: Model, models: dict[Key, Model], whole: bool) -> Iterator[Key]:
+    """Add the structures of a model to `models`; yield their names and hashes.
+
+    With `whole`, requests and responses get the hash of their whole service.
+    """
     for name in map(str, model.messages):
-        key = (name, model.describer.hash(name))
+        key = (name, model.describer.hash((whole and service_of(name)) or name))
         models.setdefault(key, model)
         yield key
 
@@ -339,6 +316,7 @@ def _questions(
     versions: Iterable[Sequence[Version]],
     endpoints: Iterable[Endpoint],
     models: Mapping[Key, Model],
+    whole: bool,
 ) -> Iterator[tuple[Key, list[Question]]]:
     """Yield the questions about each version without a model.
 
@@ -352,8 +330,9 @@ def _questions(
     for version in chain.from_iterable(versions):
         nodes = version.nodes
         if version.key not in models:
-            questions = [Question(node, *version.key) for node in nodes[:ASKED]]
-            if event := event_of(version.type):
+            type_ = (whole and service_of(version.type)) or version.type
+            questions = [Question(node, type_, version.hash) for node in nodes[:ASKED]]
+            if not whole and (event := event_of(version.type)):
                 ends = [end for end in events.get(event, ()) if end.node in nodes]
                 questions = [Question(end.node, event, end.hash) for end in ends]
             yield version.key, questions
@@ -363,9 +342,11 @@ def _add_described(
     questions: Mapping[Key, Sequence[Question]],
     answers: Mapping[Question, Answer],
     models: dict[Key, Model],
+    whole: bool,
 ) -> dict[Key, str]:
     """Add the described types to `models`; return the problems of the others."""
     problems: dict[Key, list[str]] = {}
+    no_events = _NO_NODE if whole else _SERVICE_EVENTS
     for key, sent in questions.items():
         for question in sent:
             node, name, type_hash = question
@@ -374,14 +355,14 @@ def _add_described(
                 try:
                     model = reported_model(description, sources, name, type_hash, node)
                     if any(oversized(model)):
-                        raise DescriptionError("it is larger than anybody can use")
-                    list(_add(model, models))
+                        raise DescriptionError("it is too large")
+                    list(_add(model, models, whole))
                 except DescriptionError as error:
-                    problem = f"is not believed: {error}"
+                    problem = f"is not plausible: {error}"
             if problem:
                 problems.setdefault(key, []).append(f"`{node}` {problem}")
     return {
-        key: first_few(problems.get(key, [_SERVICE_EVENTS if event_of(key[0]) else _NO_NODE]), 3)
+        key: first_few(problems.get(key, [no_events if event_of(key[0]) else _NO_NODE]), 3)
         for key in questions
         if key not in models
     }

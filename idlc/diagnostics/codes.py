@@ -155,10 +155,18 @@ STALE_GENERATED_CODE = Code("IDL460", "stale-generated-code", WARNING, PACKAGE)
 NO_LIBRARY_INSTALLED = Code("IDL461", "no-library-installed", WARNING, PACKAGE)
 CLASSES_NOT_INSTALLED = Code("IDL462", "classes-not-installed", WARNING, PACKAGE)
 MISSING_CMAKE_DEPENDENCY = Code("IDL463", "missing-cmake-dependency", WARNING, PACKAGE)
+INTERFACE_NOT_GENERATED = Code("IDL464", "interface-not-generated", WARNING, PACKAGE)
+MISSING_INTERFACE_FILE = Code("IDL465", "missing-interface-file", WARNING, PACKAGE)
+MISSING_FIND_PACKAGE = Code("IDL466", "missing-find-package", WARNING, PACKAGE)
+UNUSED_CMAKE_DEPENDENCY = Code("IDL467", "unused-cmake-dependency", WARNING, PACKAGE)
+RUNTIME_NOT_EXPORTED = Code("IDL468", "runtime-not-exported", WARNING, PACKAGE)
+DEPRECATED_ARGUMENT = Code("IDL469", "deprecated-argument", WARNING, PACKAGE)
 
-# remarks that silence others
+# remarks
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)
 IGNORE_WITHOUT_REASON = Code("IDL491", "ignore-without-reason", WARNING)
+ENUM_WITHOUT_CONSTANTS = Code("IDL492", "enum-without-constants", WARNING)
+UNKNOWN_REMARK = Code("IDL493", "unknown-remark", WARNING)
 
 # breaking changes
 INTERFACE_REMOVED = Code("IDL501", "interface-removed", ERROR)
@@ -215,6 +223,7 @@ UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
 INCONSISTENT_INDEX = Code("IDL633", "inconsistent-index", ERROR)
 NO_RCLPY = Code("IDL640", "no-rclpy", ERROR, usage=True)
 EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR, usage=True)
+NO_ANSWER = Code("IDL642", "no-answer", ERROR, usage=True)
 
 # recordings
 UNREADABLE_RECORDING = Code("IDL651", "unreadable-recording", ERROR)
@@ -222,6 +231,15 @@ MISSING_DEFINITION = Code("IDL652", "missing-definition", WARNING)
 SEVERAL_DEFINITIONS = Code("IDL653", "several-definitions", ERROR)
 RECORDED_HASH_DIFFERS = Code("IDL654", "recorded-hash-differs", WARNING)
 NO_SUCH_TOPIC = Code("IDL655", "no-such-topic", ERROR, usage=True)
+
+# upgrades of recordings
+RULE_NEEDED = Code("IDL661", "rule-needed", ERROR)
+DATA_LOST = Code("IDL662", "data-lost", ERROR)
+CONVERSION_FAILED = Code("IDL663", "conversion-failed", ERROR)
+BAD_RULES = Code("IDL664", "bad-rules", ERROR)
+STALE_RULE = Code("IDL665", "stale-rule", WARNING)
+MISSING_RULE = Code("IDL666", "missing-rule", WARNING)
+AMBIGUOUS_RULE = Code("IDL667", "ambiguous-rule", WARNING)
 
 # idlc itself
 INTERNAL_ERROR = Code("IDL901", "internal-error", ERROR)

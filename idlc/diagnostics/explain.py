@@ -35,10 +35,10 @@ _HEADINGS = {
     200: "Names and references",
     300: "Types, bounds and values",
     400: "Style",
-    410: "Surprises of ROS 2's pipeline",
+    410: "Pitfalls of ROS 2's tools",
     420: "Portability",
-    450: "The package around",
-    490: "Remarks that silence others",
+    450: "Packages",
+    490: "Comments for idlc",
     500: "Breaking changes",
     600: "Files and projects",
     900: "idlc itself",
@@ -47,23 +47,25 @@ _HEADINGS = {
 _HEAD = f"""\
 # Rules
 
-What idlc can say, and what to do about it. This file is what `idlc explain --all` prints.
+This page explains every rule of idlc, with examples. `idlc explain --all` prints this page.
 
-Errors are what ROS 2 itself refuses, and cannot be switched off. Warnings are advice:
+An error marks a file that ROS 2 rejects. You cannot disable errors, but you can select warnings:
 
 ```toml
 [tool.idlc.check]
-select = ["all"]            # instead of what is on by default: categories, codes, `IDL40`, slugs
+select = ["all"]            # replaces the default: categories, codes, `IDL40`, names
 ignore = ["wide-string"]
 
 [tool.idlc.check.per-path]
 "msg/legacy/*" = ["style"]
 ```
 
-The categories are {", ".join(CATEGORIES[:-1])} and {CATEGORIES[-1]}. In a file,
-`# idlc: ignore[IDL405] why` silences one warning: after a definition on that line, on a line of
-its own for the next definition, at the head for the whole file. The reason is mandatory. Beside a
-unit write `ignore(IDL405)`, because ROS 2 takes text in square brackets for the unit.
+The categories are {", ".join(CATEGORIES[:-1])} and {CATEGORIES[-1]}.
+
+To ignore one warning in a file, write a comment such as `# idlc: ignore[IDL405] why`. The reason is
+mandatory. After a definition, the comment applies to that line. On a line of its own, it applies to
+the next definition. At the top of the file, it applies to the whole file. Next to a unit, write
+`ignore(IDL405)`, because ROS 2 reads text in square brackets as the unit.
 """
 
 
@@ -82,7 +84,7 @@ def overview() -> Iterator[str]:
         yield heading
         yield from (f"  {code.id}  {code.slug:{width}}  {code.kind}" for code in codes)
         yield ""
-    yield "`idlc explain IDL201` or `idlc explain unknown-type` shows a page."
+    yield "Run `idlc explain IDL201` or `idlc explain unknown-type` to read about a rule."
 
 
 def _by_heading() -> Iterator[tuple[str, Iterator[Code]]]:

@@ -27,14 +27,27 @@ LINE_WIDTH = 100
 TEXT_WIDTH = 1000
 BEFORE_CARET = 40
 
-_STYLES = {"error": "1;31", "warning": "1;33", "hint": "1;36", "frame": "1;34", "bold": "1"}
-
-
-def _coloured(style: str, text: str) -> str:
-    return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if text else ""
-
+_STYLES = {
+    "error": "1;31",
+    "warning": "1;33",
+    "hint": "1;36",
+    "frame": "94",
+    "bold": "1",
+    "good": "32",
+    "bad": "31",
+    "type": "36",
+    "value": "33",
+    "comment": "2",
+}
 
 Paint: TypeAlias = Callable[[str, str], str]
+
+
+def painter(*, colour: bool) -> Paint:
+    """Return the function that gives a text a style, or that returns it as it is."""
+    if not colour:
+        return lambda _, text: text
+    return lambda style, text: f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if text else ""
 
 
 class _Mark(msgspec.Struct, frozen=True):
@@ -48,12 +61,15 @@ class _Mark(msgspec.Struct, frozen=True):
     text: str
 
 
-def text(diagnostics: Iterable[Diagnostic], *, colour: bool = False) -> Iterator[str]:
+def text(
+    diagnostics: Iterable[Diagnostic], *, colour: bool = False, fixable: bool = False
+) -> Iterator[str]:
     """Yield each problem as a block of lines, repeated warnings as a list of lines.
 
-    Ends with a count of those beyond `LIMIT`.
+    With `fixable`, `[*]` marks each problem with an edit. The last block counts the problems
+    beyond `LIMIT`.
     """
-    paint: Paint = _coloured if colour else lambda _, text: text
+    paint = painter(colour=colour)
     diagnostics = list(diagnostics)
     if len(diagnostics) > LIMIT:  # no error is left out for a warning
         diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
@@ -63,22 +79,27 @@ def text(diagnostics: Iterable[Diagnostic], *, colour: bool = False) -> Iterator
     for diagnostic in diagnostics[:LIMIT]:
         shown[diagnostic.code] += 1
         if diagnostic.severity is Severity.WARNING and shown[diagnostic.code] > repeats:
-            repeated.append(_line(diagnostic, paint))
+            repeated.append(_line(diagnostic, paint, fixable))
         else:
-            yield "\n".join(_block(diagnostic, paint)) + "\n"
+            yield "\n".join(_block(diagnostic, paint, fixable)) + "\n"
     if repeated:
         yield "\n".join(("more of these warnings:", *repeated)) + "\n"
     if len(diagnostics) > LIMIT:
         yield f"… and {len(diagnostics) - LIMIT} more; fix the first ones and run again\n"
 
 
-def _line(diagnostic: Diagnostic, paint: Paint) -> str:
+def _star(diagnostic: Diagnostic, paint: Paint, fixable: bool) -> str:
+    return f"{paint('hint', '[*]')} " if fixable and diagnostic.edits else ""
+
+
+def _line(diagnostic: Diagnostic, paint: Paint, fixable: bool) -> str:
     """Return a problem on one line."""
     span = diagnostic.span
     place = _place(_mark(span, "", "")) if span else one_line(diagnostic.path)
     code = paint(diagnostic.severity.name.lower(), diagnostic.code)
     only = f" ({diagnostic.holds_for})" if diagnostic.distros else ""
-    return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}{only}"
+    message = f"{_star(diagnostic, paint, fixable)}{one_line(_shortened(diagnostic.message))}"
+    return f"  {place}: {code} {message}{only}"
 
 
 def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
@@ -89,16 +110,17 @@ def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
         yield f"{number:>{width}}  {code} {CODES[code].slug}\n"
 
 
-def _block(diagnostic: Diagnostic, paint: Paint) -> Iterator[str]:
+def _block(diagnostic: Diagnostic, paint: Paint, fixable: bool) -> Iterator[str]:
     level = diagnostic.severity.name.lower()
     head = paint(level, f"{level}[{diagnostic.code}]")
-    yield f"{head}{paint('bold', ': ' + one_line(_shortened(diagnostic.message)))}"
+    message = paint("bold", one_line(_shortened(diagnostic.message)))
+    yield f"{head}: {_star(diagnostic, paint, fixable)}{message}"
     marks = [_mark(diagnostic.span, "^", "")] if diagnostic.span else []
     if marks:
         marks += [_mark(label.span, "-", label.text) for label in diagnostic.labels]
     margin = " " * max((len(str(mark.line)) for mark in marks), default=1)
     if marks:
-        yield from _snippets(marks, margin, paint)
+        yield from _snippets(marks, margin, level, paint)
     elif diagnostic.path:
         yield f"{margin}{paint('frame', '-->')} {one_line(diagnostic.path)}"
     if diagnostic.detail:
@@ -129,7 +151,7 @@ def _mark(span: Span, sign: str, label: str) -> _Mark:
     return _Mark(span.source, line, start, max(end, start), sign, label)
 
 
-def _snippets(marks: list[_Mark], margin: str, paint: Paint) -> Iterator[str]:
+def _snippets(marks: list[_Mark], margin: str, level: str, paint: Paint) -> Iterator[str]:
     """Yield the lines of a problem, file by file, the file of the first mark first."""
     bar = paint("frame", "|")
     sources = list(dict.fromkeys(mark.source for mark in marks))
@@ -146,7 +168,7 @@ def _snippets(marks: list[_Mark], margin: str, paint: Paint) -> Iterator[str]:
             if mark.line != previous or len(source.line_text(mark.line)) > LINE_WIDTH:
                 number = str(mark.line).rjust(len(margin))
                 yield f"{paint('frame', number)} {bar} {shown}".rstrip()
-            sign = paint("error" if mark.sign == "^" else "frame", mark.sign * width)
+            sign = paint(level if mark.sign == "^" else "frame", mark.sign * width)
             label = f" {one_line(mark.text)}" if mark.text else ""
             yield f"{margin} {bar} {' ' * lead}{sign}{label}"
             previous = mark.line

@@ -112,8 +112,8 @@ def package_hint(name: str, names: Iterable[str]) -> str:
     if near is not None:
         return f"did you mean `{near}`?"
     return (
-        f"`{name}` is not built in; {including('DIR')} with the folder of its sources, "
-        "or source the ROS 2 workspace that has it"
+        f"`{name}` is not built in; {including('DIR')}, where DIR contains its sources, "
+        "or source the ROS 2 workspace that contains it"
     )
 
 

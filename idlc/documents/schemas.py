@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from idlc.generate.idl import file_text
 from idlc.model import derive, ir
+from idlc.model.comments import deprecation
 from idlc.model.ir import spell
 from idlc.model.link import Model
 
@@ -89,6 +90,8 @@ def _object(message: ir.Message) -> Json:
         schema = properties[field.name] = _value(field.type)
         if field.comment:
             schema["description"] = "\n".join(field.comment)
+        if deprecation(field.comment) is not None:
+            schema["deprecated"] = True
         if field.unit:
             schema["x-unit"] = field.unit
         if field.default is not None:

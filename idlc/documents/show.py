@@ -45,8 +45,8 @@ def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | N
     (model, names) = models[0]
     tops = [str(own.name) for own in model.own if str(own.name) in names] or names
     if len(models) > 1 or len(tops) > 1:
-        hint = f"name one of them, such as `idlc describe {tops[0]}`"
-        message = f"`{target}` holds several interfaces"
+        hint = f"choose one, for example with `idlc describe {tops[0]}`"
+        message = f"`{target}` contains several interfaces"
         report.add(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
         return None
     with stage("describe", tops[0]):
@@ -60,7 +60,9 @@ def _with_hashes(scope: Scope, report: Report) -> Scope:
     if not scope.distro.has_hashes:
         first = next(other for other in later(scope.distro) if other.has_hashes)
         message = f"ROS 2 {scope.distro.title} has no type hashes and no type descriptions"
-        hint = f"they came with {first.title}; say for which distribution, as in `--distro jazzy`"
+        hint = (
+            f"{first.title} introduced them; choose a newer distribution, such as `--distro jazzy`"
+        )
         report.add(codes.NO_TYPE_HASHES.of("", message, hint=hint))
     return scope
 
@@ -110,7 +112,7 @@ def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, lis
             yield model, [str(name)]
         else:
             parts = (f"`{name.rpartition('/')[2]}`" for name in names if name != str(interface))
-            hint = f"the parts of `{interface}` are {', '.join(parts)}"
+            hint = f"the types of `{interface}` are {', '.join(parts)}"
             report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))
 
 
@@ -230,8 +232,8 @@ def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
                 with stage("show", str(own.name)):
                     texts.append(shown(own, model, style))
     if not texts and not report.had_errors:
-        message = f"`{target}` is a part of a service or action"
-        hint = f"`idlc show {wholes[0]}` shows the whole" if wholes else None
+        message = f"`{target}` is a section of a service or action"
+        hint = f"`idlc show {wholes[0]}` shows the whole interface" if wholes else None
         report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
     return texts
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from idlc.model import derive, ir
+from idlc.model.comments import deprecation
 from idlc.model.ir import is_range, spell, spell_value
 from idlc.model.link import Model
 
@@ -138,6 +139,7 @@ class Row(NamedTuple):
     unit: str
     value: str
     meaning: Sequence[Block]
+    is_deprecated: bool
 
 
 class Table(NamedTuple):
@@ -256,7 +258,9 @@ def _table(
             unit = element.unit or ""
             value = spell_value(element.default.value) if element.default else ""
         meaning, anchor = blocks(element.comment), before + element.name
-        rows.append(Row(anchor, words(element.name), link, rest, unit, value, meaning))
+        is_deprecated = deprecation(element.comment) is not None
+        name = words(element.name)
+        rows.append(Row(anchor, name, link, rest, unit, value, meaning, is_deprecated))
     kinds = {"range" if is_range(row.unit) else "unit" for row in rows if row.unit}
     return Table(
         rows,

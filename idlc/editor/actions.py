@@ -69,7 +69,7 @@ def actions(state: ServerState, params: parts.CodeActionParams) -> list[CodeActi
             old = edits[0].span.source
             new = keep_layout(old.path, old.text, apply(old.text, edits)[0])
             change = workspace_edit({uri: differences(old.text, new, state.encoding)}, state)
-            title = "Fix all that can be fixed without harm"
+            title = "Apply all safe fixes"
             shown = tuple(problem.shown for problem in fixed)
             offered.append(CodeAction(title, _FIX_ALL, change, shown))
     if _is_requested(protocol.UPDATE_KIND, only):
@@ -161,7 +161,7 @@ def _remark(problem: Problem) -> Edit | None:
     source = snapshot.interfaces[problem.path][1]
     code, span = problem.diagnostic.code, problem.diagnostic.span
     if span is None or not span.text:
-        return Edit(Span(source, 0, 0), f"# idlc: ignore[{code}] TODO: say why\n")
+        return Edit(Span(source, 0, 0), f"# idlc: ignore[{code}] TODO: reason\n")
     number, _ = source.position(span.start)
     start, line = source.line_starts[number - 1], source.line_text(number)
     comment = line.find("#")
@@ -172,7 +172,7 @@ def _remark(problem: Problem) -> Edit | None:
     end = start + len(line.rstrip())
     sign = "  # " if comment < 0 else " "
     # with square brackets, ROS 2 would take it for the unit
-    return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: say why")
+    return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: reason")
 
 
 # Commands.
@@ -221,7 +221,7 @@ def _update(state: ServerState, uri: str) -> None:
     """Generate as `idlc gen` does, and report the outcome; raises RequestError."""
     run, inputs, _ = _generation(state, uri)
     if run is None or inputs is None:
-        raise RequestError(REQUEST_FAILED, "[tool.idlc] does not say where to generate it")
+        raise RequestError(REQUEST_FAILED, "set `out` in [tool.idlc] to generate the package")
     unsaved = []
     for document in state.documents.values():
         context = state.context(document.uri)
@@ -230,7 +230,9 @@ def _update(state: ServerState, uri: str) -> None:
             unsaved.append(f"`{document.path.name}`")
     if unsaved:
         names = first_few(sorted(unsaved), NAMED)
-        raise RequestError(REQUEST_FAILED, f"save first, what is on disk is compiled: {names}")
+        raise RequestError(
+            REQUEST_FAILED, f"save first, because idlc compiles the files on disk: {names}"
+        )
     report = Report()
     try:
         generated = run.make(report)

@@ -25,6 +25,7 @@ from idlc.editor.workspace import Workspace
 from idlc.language import tree
 from idlc.language.parse import parse_definition
 from idlc.model import ir, names
+from idlc.model.comments import deprecation
 from idlc.model.lower_types import STRINGS
 
 #: Numbers that people take for bounds.
@@ -58,20 +59,26 @@ def suggested_values(type_: str) -> Iterator[str]:
             yield from dict.fromkeys(map(str, (0, 1, info.low, info.high)))
 
 
-def suggested_constants(lines: list[str], line: int, type_: str) -> Iterator[tuple[str, str]]:
-    """Yield name and value of the constants of a type in the section around a line."""
-    before = [number for number in range(line) if lines[number].rstrip("\r\n") == "---"]
-    start = before[-1] + 1 if before else 0
+def suggested_constants(lines: list[str], line: int, type_: str) -> Iterator[tuple[str, str, bool]]:
+    """Yield the constants of a type in the section around a line.
+
+    Each has its name and value, and is deprecated or not by the comment beside it.
+    """
+    ends = [number for number in range(line) if lines[number].rstrip("\r\n") == "---"]
+    start = ends[-1] + 1 if ends else 0
     for text in lines[start:]:
         if text.rstrip("\r\n") == "---":
             return
-        code = text.partition("#")[0].replace("\t", " ").rstrip()
+        before, _, comment = text.partition("#")
+        code = before.replace("\t", " ").rstrip()
         body = parse_definition(code) if "=" in code else None
         if isinstance(body, tree.Constant) and body.type.whole.text == type_ and body.value.text:
-            yield body.name.text, body.value.text
+            is_deprecated = deprecation([comment]) is not None
+            yield body.name.text, body.value.text, is_deprecated
 
 
 _KEYWORD, _MODULE, _STRUCT, _VALUE, _UNIT, _FIELD, _SNIPPET = 14, 9, 22, 12, 11, 5, 15
+_DEPRECATED = (1,)
 _AGAIN: dict[str, object] = {"title": "types", "command": "editor.action.triggerSuggest"}
 #: Types of any package that one word may mean; more letters leave fewer.
 MOST = 200
@@ -89,6 +96,7 @@ class Item(Part, frozen=True):
     command: dict[str, object] | None = None
     #: Which type `resolve` describes: the document, and the type's package and name.
     data: tuple[str, str, str] | None = None
+    tags: tuple[int, ...] = ()
 
 
 class TypedLine(NamedTuple):
@@ -238,9 +246,10 @@ def _type(
 def _values(typed: TypedLine, type_: str, word: str, name: str) -> Iterator[Item]:
     """Yield values that fit a type, the constants of the section for a field first."""
     constants = suggested_constants(typed.lines, typed.line, type_) if name else ()
-    for constant, value in constants:
-        edit = typed.replacing(len(word), value)
-        yield Item(constant, _VALUE, edit, value, f"0{constant}", f"{value} {constant}")
+    for constant, value, is_deprecated in constants:
+        edit, tags = typed.replacing(len(word), value), _DEPRECATED if is_deprecated else ()
+        sort, filtered = f"0{constant}", f"{value} {constant}"
+        yield Item(constant, _VALUE, edit, value, sort, filtered, tags=tags)
     for number, value in enumerate(suggested_values(type_)):
         yield Item(value, _VALUE, typed.replacing(len(word), value), sort_text=f"1{number}")
 

@@ -16,6 +16,7 @@ from idlc.editor.parts import DocumentParams, Lens, Position, PositionParams, Ra
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot
 from idlc.model import derive, ir
+from idlc.model.comments import deprecation
 from idlc.model.ir import is_range, spell, spell_value
 from idlc.wire.layout import Placed, layout
 
@@ -55,6 +56,7 @@ def _definition(meaning: ir.Field | ir.Constant, context: InterfaceContext) -> I
         default = spell_value(meaning.default.value)
         value = f" {default}"
     yield code([f"{spell(meaning.type)} {meaning.name}{value}"])
+    yield "**Deprecated**" if deprecation(meaning.comment) is not None else ""
     yield prose(meaning.comment)
     says_range = meaning.unit is not None and is_range(meaning.unit)
     facts = [f"{'range' if says_range else 'unit'}: `{meaning.unit}`"] if meaning.unit else []
@@ -154,7 +156,7 @@ def hints(context: InterfaceContext, params: RangeParams) -> list[dict[str, obje
             hint = {
                 "position": state.range(element.name).end,
                 "label": f"@{place.offset}, {place.size} B",
-                "tooltip": f"{tip}, header not counted",
+                "tooltip": f"{tip}, without the header",
                 "paddingLeft": True,
             }
             shown.append(hint)
@@ -238,11 +240,11 @@ def _what_breaks(context: InterfaceContext) -> str:
     if side.error and not side.models:
         return f"not compared: {side.error}"
     if before is None or name not in {own.name for own in before.own}:
-        return f"nothing to compare with in {against.name}"
+        return f"no version to compare with in {against.name}"
     changes = compare(before.only({name}), after.only({name})).changes
     levels = levels_of(against.not_allowed(changes))
     if not levels:
-        return f"breaks nothing against {against.name}"
+        return f"no breaking changes against {against.name}"
     used = users(name, context.snapshot, context.state)
     count = len({snapshot.path_of(span.source) for snapshot, span in used})
     return f"breaks: {levels} for {counted(count, 'user')} against {against.name}"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check.package.manifest import calls
+from idlc.check.package.cmake import calls
 from idlc.compare.changes import Change, levels_of
 from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
@@ -32,8 +32,8 @@ LONGEST_NAME = 255
 #: Users that a warning names.
 NAMED = 5
 _CANNOT_MOVE = (
-    "a message is renamed with its file, and this editor does not rename files for a server; "
-    "Emacs does with idlc.el, as docs/editors.md says"
+    "renaming a message renames its file, which this editor does not support; "
+    "in Emacs, install rosmsg-mode.el (see docs/editors.md)"
 )
 
 
@@ -82,7 +82,7 @@ def rename(state: ServerState, params: RenameParams) -> dict[str, object] | None
     context = state.context(params.text_document.uri)
     spot = spot_at(context, params.position) if context else None
     if context is None or spot is None or prepare(state, params) is None:
-        raise RequestError(REQUEST_FAILED, "there is no name of this workspace here")
+        raise RequestError(REQUEST_FAILED, "there is no name to rename here")
     if spot.part != "type":
         return _rename_definition(spot.element, context, params.new_name)
     home = _home(spot.element.target, context)
@@ -95,10 +95,10 @@ def _rename_definition(element: Element, context: InterfaceContext, new: str) ->
     valid = names.is_constant_name(new) if is_constant else names.is_field_name(new)
     if not valid:
         hint = names.CONSTANT_HINT if is_constant else names.FIELD_HINT
-        raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {hint}")
+        raise RequestError(REQUEST_FAILED, f"`{new}` is not a valid name: {hint}")
     siblings = element.message.constants if is_constant else element.message.fields
     if any(definition.name == new and definition is not element.meaning for definition in siblings):
-        raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
+        raise RequestError(REQUEST_FAILED, f"`{new}` already exists")
     edits = [Edit(span, new) for span in mentions(element, context)]
     name, path = context.interface.name, context.path
     after = context.workspace.snapshot_with(path, apply(context.source.text, edits)[0])
@@ -120,14 +120,14 @@ def rename_interface(
     """
     state, old, path = home.state, home.interface.name, home.path
     if not names.is_message_name(new):
-        raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
+        raise RequestError(REQUEST_FAILED, f"`{new}` is not a valid name: {names.MESSAGE_HINT}")
     target = path.with_name(f"{new}.{old.kind}")
     if len(target.name) > LONGEST_NAME:
-        raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
+        raise RequestError(REQUEST_FAILED, f"a file name of {len(target.name)} letters is too long")
     if new == old.name:
         return None
     if os.path.lexists(target) or state.document_at(target):
-        raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
+        raise RequestError(REQUEST_FAILED, f"`{target.name}` already exists")
     if not is_file(path):
         raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
     if not can_move_files(state):
@@ -135,7 +135,7 @@ def rename_interface(
     report = Report()
     edits = _edits_of_users(home, new, report)
     if problem := next(iter(report), None):
-        raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
+        raise RequestError(REQUEST_FAILED, f"idlc renamed nothing: {BUILD}: {problem.message}")
     used = users(old, home.snapshot, state)
     spans = (_last(span) for snapshot, span in used if snapshot.path_of(span.source) == asking.path)
     own = dict.fromkeys(Edit(Span(asking.source, span.start, span.end), new) for span in spans)
@@ -172,7 +172,7 @@ def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | 
             if not is_own or uri in state.documents:
                 edits.setdefault(uri, []).extend(some)
     for problem in report:
-        message = f"{BUILD} is left: {problem.message}"
+        message = f"idlc did not edit {BUILD}: {problem.message}"
         state.notify("window/showMessage", {"type": 2, "message": message})
     return workspace_edit(edits, state) if edits else None
 
@@ -231,17 +231,17 @@ def _answer(
 def _what_breaks(changes: Iterable[Change] | None, context: InterfaceContext) -> tuple[str, bool]:
     """Return a sentence on what a rename breaks, and whether it breaks anything."""
     if changes is None:
-        return "there are errors, so idlc cannot say what this breaks", True
+        return "because of errors, idlc cannot determine what this breaks", True
     levels = levels_of(changes)
     if not levels:
-        return "breaks nothing that is sent", False
+        return "no effect on sent messages", False
     name = context.interface.name
     holders: dict[ir.TypeName, set[ir.TypeName]] = {}
     for snapshot, span, target in uses(context.state):
         holder = snapshot.interfaces[snapshot.path_of(span.source)][0].name
         holders.setdefault(target, set()).add(holder)
     direct = sorted(map(str, holders.get(name, ())))
-    what = f"breaks {levels} for whoever uses `{name}`"
+    what = f"breaks {levels} for users of `{name}`"
     what += f": {first_few(direct, NAMED)}" if direct else ""
     if "hash" in levels and context.snapshot.library.distro.has_hashes:
         reached = derive.closure([name], lambda held: holders.get(held, ()))

@@ -154,7 +154,7 @@ class Server:
     def answer(self, name: str, params: object) -> object:
         """Return the answer to a request; raises RequestError."""
         if self._is_shut_down or (self._initialize is not None and name == "initialize"):
-            raise RequestError(protocol.INVALID_REQUEST, f"`{name}` is not for now")
+            raise RequestError(protocol.INVALID_REQUEST, f"`{name}` is not supported")
         if name == "initialize":
             if not isinstance(params, dict):
                 raise RequestError(protocol.INVALID_PARAMS, "`initialize` needs an object")

@@ -325,7 +325,7 @@ class ServerState:
         try:
             self.settings = msgspec.convert(own, Settings)
         except msgspec.ValidationError as error:
-            message = f"the settings of idlc are not used: {error}"
+            message = f"invalid settings for idlc: {error}"
             self.notify("window/showMessage", {"type": 2, "message": message})
         if self.settings != before:
             folders, self._folders = self._folders, {}

@@ -125,8 +125,8 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
         if is_whole and (names := unread_idl(package.folders, options.scope.exclude)):
             files = first_few((f"`{name}`" for name in names), 3)
             report.notes.append(
-                f"idlc does not compile .idl files, so `{package.package}` lacks what these "
-                f"define: {files}"
+                f"idlc does not compile .idl files, so `{package.package}` lacks the "
+                f"types in {files}"
             )
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
@@ -146,7 +146,16 @@ def _targets(
     """Return the folder that each package is written to."""
     scope = options.scope
     distros = tuple(distro.name for distro in scope.distros)
-    output = Output(scope.root, report, options.force, options.runtime, distros, options.check)
+    output = Output(
+        scope.root,
+        report,
+        options.force,
+        options.runtime,
+        distros,
+        options.check,
+        scope.enums,
+        options.again,
+    )
     if not options.ament:
         return folder_targets(packages, options.out, output)
     from idlc.generate.prefix import Overlay  # imported only where one is written

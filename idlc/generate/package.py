@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -18,6 +19,9 @@ from idlc.project import lock
 from idlc.project.library import Library
 from idlc.project.write import Plan
 from idlc.version import __version__
+
+#: A requirement of numpy, which arrays of a fixed size need.
+NUMPY = re.compile(r"\s*numpy(?![\w.-])", re.IGNORECASE)
 
 
 class Package(NamedTuple):
@@ -62,8 +66,11 @@ def package_of(
         runtime = (
             carried_runtime() if target.runtime == "carried" else installed_runtime(model.package)
         )
+        surroundings = VENDORING if copies else ALONE
+        if target.enums:
+            surroundings = surroundings._replace(enums="all")
         rendered = (
-            *render_package(model, VENDORING if copies else ALONE, runtime),
+            *render_package(model, surroundings, runtime),
             *vendored_files(model.package, copies),
         )
         modules = {file.path: file.text.encode() for file in rendered}
@@ -86,6 +93,7 @@ def package_of(
             package=model.package,
             runtime=target.runtime,
             vendor_deps=bool(vendoring),
+            enums=target.enums,
             converts_values=model.distro.converts_values or UNSET,
             vendored=tuple(beside),
             imports=() if copies else tuple(sorted(imports)),
@@ -170,7 +178,7 @@ def with_needs(
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
                 hint=f"{distro.installing(missing)}, or run `{again} --vendor-deps`, "
-                "which writes the types that are used into this one",
+                "which copies the used types into this package",
             )
         )
     return tuple(package._replace(needs=quiet.get(package.out, ())) for package in done)

@@ -64,9 +64,9 @@ def target_of(distro: Distribution) -> tuple[Machine, Layout] | str:
     machine = MACHINES.get(prefixes.machine())
     layout = LAYOUTS.get(distro.name)
     if machine is None:
-        return f"idlc makes libraries for Linux on {' and '.join(MACHINES)}, and this is neither"
+        return f"idlc only generates libraries for Linux on {' and '.join(MACHINES)}"
     if layout is None:
-        return f"idlc does not know this distribution of ROS 2 ({distro.why})"
+        return f"idlc does not support this ROS 2 distribution ({distro.why})"
     return machine, layout
 
 
@@ -98,7 +98,7 @@ def shared(
     files[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
     if libraries.missing:
         report.notes.append(
-            f"`{name}` is not registered in the index of ROS 2, because recorders stop at packages "
+            f"idlc does not add `{name}` to ROS 2's index, because recorders stop at a package "
             f"without a library: {libraries.missing}"
         )
     else:
@@ -148,14 +148,14 @@ class Overlay(Target):
     def beside(self, package: str) -> Overlay:
         """Return another package in the prefix."""
         home = Library((), self._output.root, Report()).home(package)
-        return Overlay(self.name, package, home, self._output._replace(runtime=self.runtime))
+        return Overlay(self.name, package, home, self._for_others)
 
     def cause(self, change: Change) -> str:
         """Say why a library differs, if another distribution is the reason."""
         old, new = (inspect(data or b"") for data in (change.old, change.new))
         if old is None or new is None or old.stamp == new.stamp:
             return ""
-        return "it is for another distribution of ROS 2"
+        return "it is for a different ROS 2 distribution"
 
     def placed(self, model: Model, modules: Mapping[str, bytes]) -> dict[str, bytes]:
         """Return the files of a package by their paths in the prefix.
@@ -189,7 +189,7 @@ def write_setup_scripts(overlay: Target) -> bool:
                 changes += [] if old == new else [Change(path, old, new)]
             else:
                 overlay.report.notes.append(
-                    f"`{overlay.name}/{path}` is not idlc's: put `{overlay.name}` into "
+                    f"`{overlay.name}/{path}` was not written by idlc: add `{overlay.name}` to "
                     "AMENT_PREFIX_PATH"
                 )
     return write.apply(Plan(overlay.path, tuple(changes), {}), overlay.name, overlay.report)

@@ -70,8 +70,8 @@ def _from_files(
         report.add(
             codes.SEVERAL_PACKAGES.of(
                 root.shown(apart[0]),
-                f"these may be one package or {len(apart)}: {names}",
-                hint="give --package NAME to compile them as one, or each folder a package.xml",
+                f"these folders can be one package or {len(apart)} packages: {names}",
+                hint="use --package NAME for one package, or add a package.xml to each folder",
             )
         )
         return ()
@@ -91,21 +91,21 @@ def _from_files(
                     codes.UNIMPORTABLE_PACKAGE.of(
                         "",
                         f"`{name}` (from {origins[0]}) would hide the ROS 2 package",
-                        hint=f"choose another folder; add `--package {name}` if they are its files",
+                        hint=f"choose another folder, or confirm the name with `--package {name}`",
                     )
                 )
             # other commands cannot know that name
             if name != home.name and root.absolute(out).parent not in output_folders(home, root):
                 report.notes.append(
-                    f"the package is called `{name}`, as the folder given with -o; other commands "
-                    f"need `--package {name}`, or a package.xml beside the interfaces"
+                    f"the package is named `{name}`, after the output folder; other commands "
+                    f"need `--package {name}`, or a package.xml next to the interfaces"
                 )
         packages = (inputs.load(name, files, home, root, report),)
     if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
         report.add(
             codes.FOREIGN_FILE.of(
                 out,
-                f"`{out}` holds interface files: generated code would lie among them",
+                f"`{out}` contains interface files; idlc does not write generated code among them",
                 hint="choose another folder with -o",
             )
         )
@@ -182,8 +182,8 @@ def folder_targets(
         beside_others = is_file(top / names[0] / FILE) and not is_file(top / FILE)
         targets = [Target(f"{out}/{names[0]}" if beside_others else out, names[0], output)]
     elif is_file(top / FILE):
-        message = f"`{out}` holds one package, and these are {len(packages)}"
-        hint = "choose a folder for all of them with -o, each gets one of its name there"
+        message = f"`{out}` is a single package, but you are compiling {len(packages)} packages"
+        hint = "choose another folder with -o; idlc writes each package to its own subfolder"
         output.report.add(codes.SEVERAL_PACKAGES.of(out, message, hint=hint))
         return ()
     else:
@@ -257,7 +257,8 @@ class Output(NamedTuple):
     """The manner in which packages are written: with `force` over files that were edited.
 
     With `check` they are only compared, and edited files are among the changes. Without `runtime`,
-    each package keeps its own. `distros` are those that were chosen.
+    each package keeps its own. `distros` are those that were chosen. With `enums`, classes have
+    enums for all fields. `again` is the command for hints that writes them.
     """
 
     root: Root
@@ -266,6 +267,8 @@ class Output(NamedTuple):
     runtime: Runtime | None = None
     distros: tuple[str, ...] = ()
     check: bool = False
+    enums: bool = False
+    again: str = "idlc gen"
 
 
 class Target:
@@ -286,18 +289,28 @@ class Target:
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
-        return Target(name, package, self._output._replace(runtime=self.runtime))
+        return Target(name, package, self._for_others)
+
+    @property
+    def _for_others(self) -> Output:
+        return self._output._replace(runtime=self.runtime, enums=False)
 
     @cached_property
     def lock(self) -> Lock | None:
         """The lock of the last run; reports IDL615 unless everything is to be replaced."""
         report = Report() if self._output.force else self.report
-        return load_lock(self.path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
+        name, again = f"{self.name}/{self.home}".rstrip("/"), self._output.again
+        return load_lock(self.path / self.home, name, report, again)
 
     @property
     def runtime(self) -> Runtime:
-        """How the package has its runtime: as was chosen, or as in the last run."""
+        """Return the runtime mode: the chosen one, or that of the last run."""
         return self._output.runtime or (self.lock.runtime if self.lock else "carried")
+
+    @property
+    def enums(self) -> bool:
+        """True if classes have enums for all fields, not only for those that ask for one."""
+        return self._output.enums
 
     def usable(self) -> bool:
         """Return whether this is or can become a folder; reports IDL612."""
@@ -323,6 +336,7 @@ class Target:
             lock is not None
             and (lock.idlc, lock.package) == (__version__, self.package)
             and lock.runtime == self.runtime
+            and lock.enums == self.enums
             and lock.vendors_as(vendoring)
             and bool(lock.converts_values) == library.distro.converts_values
             and lock.inputs == inputs
@@ -360,7 +374,10 @@ class Target:
         outputs = self.lock.outputs if self.lock else {}
         owned = write.owned_files(outputs)
         force, record = self._output.check or self._output.force, self.home + FILE
-        return plan(self.path, self.name, files, owned, self.report, record=record, force=force)
+        again = f"{self._output.again} --force"
+        return plan(
+            self.path, self.name, files, owned, self.report, record=record, force=force, again=again
+        )
 
     def apply(self, changes: Plan, record: Lock) -> bool:
         """Make planned changes and write the lock; report IDL612 and return `False` otherwise."""
@@ -386,7 +403,7 @@ class Target:
         if self.lock is None:
             if self.report.had_errors:
                 return
-            message = f"there is no {self.home}{FILE} in `{self.name}`, so nothing can be compared"
+            message = f"`{self.name}` has no {self.home}{FILE} to compare with"
             self.report.add(codes.DRIFT.of(self.name, message, hint=hint))
             return
         why = _reasons(self.lock, record) or "idlc itself changed"
@@ -399,7 +416,7 @@ class Target:
             elif change.old is None:
                 message = f"`{path}` is missing" + ("" if wrote else f": {why}")
             elif wrote is None or digest(change.old) not in wrote.split():
-                event = "not written by idlc" if wrote is None else "edited since idlc wrote it"
+                event = "not written by idlc" if wrote is None else "edited after idlc wrote it"
                 message = f"`{path}` was {event}"
                 advice = f"`{again} --force` replaces it, and keeps a copy"
             else:
@@ -428,13 +445,15 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         pairs.append((old.dependencies, new.dependencies))
     reasons = []
     if old.idlc != new.idlc:
-        reasons.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+        reasons.append(f"idlc {old.idlc} wrote it, and this is idlc {new.idlc}")
     if old.converts_values != new.converts_values:
-        reasons.append("it was written for another distribution of ROS 2")
+        reasons.append("idlc wrote it for a different ROS 2 distribution")
     if old.runtime != new.runtime:
-        reasons.append(f"its runtime was {old.runtime}, and is to be {new.runtime}")
+        reasons.append(f"its runtime was {old.runtime}, and is now {new.runtime}")
+    if old.enums != new.enums:
+        reasons.append(f"it was written {'with' if old.enums else 'without'} `enums = true`")
     if old.package != new.package:
-        reasons.append(f"the package was called `{old.package}`")
+        reasons.append(f"the package had the name `{old.package}`")
     if old.vendoring != new.vendoring:
         modes = {
             "": "without `--vendor-deps`",

@@ -39,7 +39,7 @@ def planned(
             target.report.extend(report.errors)
             needed[package] = _needed(whole) - own
             others[package] = None
-            is_accepted = accept_name(package, "what is depended on", target.report)
+            is_accepted = accept_name(package, "the dependencies", target.report)
             if is_accepted and not report.had_errors:
                 place, digests = target.beside(package), as_inputs(interfaces, library)
                 others[package] = package_of(whole, place, digests, library)
@@ -108,7 +108,7 @@ def leftovers(packages: Iterable[Package]) -> Iterator[tuple[Target, Plan | None
         for name in sorted(names & locks.keys()):
             beside = package.target.beside(name)
             package.target.report.notes.append(
-                f"`{beside.name}` is removed: what `{package.target.package}` uses of it is in "
-                f"`{package.target.name}` now"
+                f"`{beside.name}` is removed: the types that `{package.target.package}` uses are "
+                f"now in `{package.target.name}`"
             )
             yield beside, beside.plan({})

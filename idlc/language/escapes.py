@@ -61,10 +61,10 @@ def read_back(literal: str, text: str) -> str:
         literal = literal.encode("latin-1").decode("utf-8")
     except UnicodeError:
         place = _place(text, r"\\[xuUN0-7]|[^\x00-\x7f]")
-        raise EscapeError("a character that they cannot write", *place) from None
+        raise EscapeError("an unsupported character", *place) from None
     quote = re.search(_CLOSING_QUOTE, literal + '"')
     if quote is None or quote.end() <= len(literal):
-        raise EscapeError("a backslash that swallows the closing quote", *_place(text, r"\\+"))
+        raise EscapeError("a backslash that escapes the closing quote", *_place(text, r"\\+"))
     try:
         return inside_literal(literal)
     except ValueError:

@@ -124,21 +124,21 @@ def _fault(text: str, type_: str) -> tree.Fault:
     if text[0].isspace():
         code, end = codes.INDENTED_DEFINITION, len(text) - len(text.lstrip())
         message = "a definition must begin in the first column"
-        hint = "remove the white space before it"
+        hint = "remove the whitespace before it"
     elif text == "---":
         code, message = codes.MALFORMED_SEPARATOR, "a separator must be alone on its line"
-        hint = "remove the blanks or the comment after it"
+        hint = "remove the whitespace or comment after it"
     elif not text.strip("-"):
         code, message = codes.MALFORMED_SEPARATOR, f"`{text}` is not a separator"
         hint = "a separator is a line of exactly three dashes, `---`"
     elif text == type_:
-        code, message = codes.MISSING_NAME, f"`{type_}` has no name after it"
+        code, message = codes.MISSING_NAME, f"missing name after `{type_}`"
         hint = "write `TYPE name`; a comment begins with `#`"
     else:
         code, message = codes.MALFORMED_TYPE, f"malformed type `{type_}`"
         hint = "write `T`, `T[]`, `T[3]`, `T[<=3]`, `string<=10` or `package/Name`"
         if type_.count("[") > 1:
-            hint = "arrays do not nest; put the inner array into a message of its own"
+            hint = "arrays cannot be nested; move the inner array into a message"
         elif "<" in type_ and "<=" not in type_:
             hint = "an upper bound is written `<=`, as in `string<=10` or `int32[<=10]`"
         start = _error(text, end - 1)

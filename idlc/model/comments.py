@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 
 import msgspec
@@ -15,6 +15,7 @@ from idlc.language.tree import Fault
 
 # a comma makes it a range, not a unit
 _UNIT_END = re.compile(r"[,\]]")
+_DEPRECATED = re.compile(r"\s*deprecated:\s*(.*)", re.IGNORECASE)
 
 
 class Comment(msgspec.Struct, frozen=True):
@@ -57,13 +58,22 @@ def brackets(text: str) -> Iterator[tuple[str, str]]:
         at = text.find("[", end.end())
 
 
+def deprecation(lines: Iterable[str]) -> str | None:
+    """Return the text after `deprecated:` at the start of a line of a comment, `None` without it.
+
+    It names what to use instead, in a word or more.
+    """
+    match = next(filter(None, map(_DEPRECATED.match, lines)), None)
+    return None if match is None else match[1].strip() or "no longer used"
+
+
 def problem(comment: Comment) -> tuple[str, Fault] | None:
     """Return the text that breaks ROS 2's pipeline (language 1.4, 1.5), and its fault, or `None`.
 
     The text is a piece of the comment or of its unit.
     """
     if comment.unit is not None and "\n" in comment.unit:
-        message = "this bracket is closed on another line; ROS 2's tools fail on such a unit"
+        message = "ROS 2's tools fail on a unit whose bracket closes on another line"
         hint = "close the bracket on the same line"
         return "[", Fault(codes.UNIT_ACROSS_LINES, message, 0, 1, hint)
     for text in (*comment.lines, *filter(None, [comment.unit])):

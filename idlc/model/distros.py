@@ -68,4 +68,4 @@ def titles(distros: tuple[Distro, ...]) -> str:
 
 def unknown_distro(name: str) -> str:
     """Return the hint for a name that no distribution has."""
-    return did_you_mean(name, BY_NAME) or f"idlc knows {', '.join(BY_NAME)}"
+    return did_you_mean(name, BY_NAME) or f"idlc supports {', '.join(BY_NAME)}"

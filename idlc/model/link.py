@@ -71,7 +71,7 @@ def dependents(
 
 def _check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
     """Add an error for each field that closes a circle."""
-    hint = "ROS 2 has no recursive types; refer to the other message by an id"
+    hint = "ROS 2 does not support recursive types; refer to the other message by an id"
     for path, field in circles(interfaces, pool.references, pool.searched):
         if field.type_span is not None:
             more = [f"{len(path) - NAMED} more"] if len(path) > NAMED else []
@@ -171,8 +171,8 @@ class Pool:
         edges = {own: [(at, to) for to, at in spans.items()] for own, spans in packages.items()}
         for circle, span in circles(sorted(edges), lambda own: edges.get(own, ()), set()):
             names = " → ".join((*circle, circle[0]))
-            message = f"packages that need each other cannot be built: {names}"
-            hint = "move the messages that both use to a package of their own"
+            message = f"packages depend on each other in a cycle: {names}"
+            hint = "move the messages that several of them use into a separate package"
             report.add(codes.PACKAGE_CIRCLE.at(span, message, hint=hint))
 
     @cached_property
@@ -413,8 +413,8 @@ class _UnknownTypes:
                 return hint
         if messages and messages == set(catalog.names(package, distro)):
             return (
-                f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`;"
-                f" if yours does, {including('DIR')} with its sources, or source your ROS 2"
+                f"the built-in `{package}` of ROS 2 {distro.title} has no `{name}`; if your version"
+                f" does, {including('DIR')}, where DIR contains its sources, or source your ROS 2"
             )
         return f"there is no `{name}.msg` in package `{package}`"
 
@@ -439,8 +439,8 @@ def _of_others(target: ir.TypeName) -> str | None:
     if not others:
         return None
     return (
-        f"it is built in for {titles(others)}; if your ROS 2 has it, {including('DIR')} with its "
-        "sources, or source your ROS 2"
+        f"it is built in for {titles(others)}; if your ROS 2 contains it, "
+        f"{including('DIR')}, where DIR contains its sources, or source your ROS 2"
     )
 
 

@@ -102,18 +102,18 @@ class _Section(msgspec.Struct):
         if not self.distro.reads_optional:
             code = codes.OPTIONAL_NEEDS_LYRICAL
             message = (
-                f"ROS 2 {self.distro.title} does not know `@optional`, which came with Lyrical"
+                f"ROS 2 {self.distro.title} does not support `@optional`, which Lyrical introduced"
             )
-            hint = "leave it out; where it is known (`--distro lyrical`), it has no effect"
+            hint = "remove it; it has no effect in Lyrical either"
             blanks = len(line.code) - end - len(line.code[end:].lstrip(" \t"))
             edits = (Edit(self._span(line, 0, end + blanks), ""),)
         elif is_second:
             code = codes.REPEATED_OPTIONAL
-            message, hint = "a definition can have `@optional` only once", "leave it out here"
+            message, hint = "a definition can have `@optional` only once", "remove it here"
         else:
             code = codes.OPTIONAL_WITHOUT_EFFECT
-            message = "`@optional` is accepted and has no effect"
-            hint = "for a value that may be missing use `T[<=1]`, or a bool field beside it"
+            message = "ROS 2 accepts `@optional` and ignores it"
+            hint = "for an optional value, use `T[<=1]` or a second field of type bool"
         self._add(line, 0, Fault(code, message, 0, end, hint), edits)
 
     def _condense(self, texts: list[str], lines: list[tree.Line], *, has_unit: bool) -> Comment:
@@ -144,8 +144,8 @@ class _Section(msgspec.Struct):
     def _warn_hash(self, line: tree.Line, text: str) -> None:
         """Warn when a comment begins between two quotes."""
         if any(text.count(quote) % 2 and quote in line.comment for quote in "\"'"):
-            message = "a comment begins here, although it is inside quotes"
-            hint = "ROS 2 has no way to write `#` in a value; leave it out"
+            message = "a comment begins here, even inside quotes"
+            hint = "remove the `#`; in ROS 2, a value cannot contain this character"
             self._add(line, len(line.code), Fault(codes.HASH_IN_QUOTES, message, 0, 1, hint))
 
     def _span(self, line: tree.Line, start: int, end: int) -> Span:
@@ -171,7 +171,7 @@ class _Section(msgspec.Struct):
         if as_parsed(lowered) != lowered and type_.bound and type_.brackets:
             bound = type_.bound.text
             message = f"ROS 2 reads this as a sequence of at most {bound} elements"
-            hint = f"write `[<={bound}]` to say so, or remove the string's bound"
+            hint = f"write `[<={bound}]` if this is intentional, or remove the bound of the string"
             self._add(
                 line, 0, fault_at(codes.WSTRING_SEQUENCE_BOUND, type_.brackets, message, hint)
             )
@@ -202,7 +202,7 @@ class _Section(msgspec.Struct):
             return None
         if isinstance(element, ir.Ref):
             message = "a field of a message type cannot have a default value"
-            hint = "give the defaults inside that message"
+            hint = "set the default values in that message"
             self._add(line, 0, fault_at(codes.DEFAULT_ON_MESSAGE, piece, message, hint))
             return None
         lowered = default(type_, piece.text)
@@ -307,10 +307,10 @@ def _check_separators(file: tree.File, kind: ir.Kind, report: Report) -> None:
         at = file.separators[needed]
         span = Span(file.source, at, at + 3)
         hint = "remove it" if needed else "put services in .srv and actions in .action files"
-        message += "; this is one more" * (needed > 0)
+        message += "; this one is too many" * (needed > 0)
     else:
         span = Span(file.source, len(file.source.text), len(file.source.text))
-        hint = "write `---` on a line of its own between the parts"
+        hint = "write `---` on a line of its own between the sections"
         message += f"; this file has {_NUMBERS[count] if count else 'none'}"
     report.add(codes.SEPARATOR_COUNT.at(span, message, hint=hint))
 
@@ -333,8 +333,8 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
                 kept.append(constant)
             elif constant.name_span is not None:
                 message = (
-                    f"ROS 2 gives `{constant.name}` to the earlier section only, "
-                    "because it is the same there"
+                    f"ROS 2 keeps `{constant.name}` only in the earlier section, "
+                    "which defines the same constant"
                 )
                 hint = "give it another name or comment"
                 code = codes.REPEATED_SECTION_CONSTANT

@@ -97,7 +97,7 @@ def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
         if values is not None and all(_fits(type_.element, each) for each in values):
             wrong = lower_values.wrong_length(type_, len(values), words)
             return wrong or ir.Default(values, words)
-    message = f"this is no value of type `{ir.spell(type_)}`"
+    message = f"this is not a value of type `{ir.spell(type_)}`"
     return Fault(codes.BAD_VALUE, message, 0, 0)
 
 
@@ -166,7 +166,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
             else:
                 type_ = ir.Array(type_, length)
         if self._typedefs.get(str(name), target._replace(type=type_)).type != type_:
-            self.foreign(piece(name), f"a second `{name}`")
+            self.foreign(piece(name), f"a duplicate `{name}`")
         self._typedefs[str(name)] = target._replace(type=type_)
 
     def sequence(self, element: _Type, bound: Token | None = None) -> _Type:
@@ -210,7 +210,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         name = str(parts[at])
         if message := self._message(parts[at], name):
             if name not in self._missing:
-                self.foreign(piece(parts[at]), f"a second `{name}`")
+                self.foreign(piece(parts[at]), f"a duplicate `{name}`")
                 return
             self._missing.remove(name)
             fields = parts[at + 1 :]
@@ -259,8 +259,9 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         )
 
     def foreign(self, part: Piece | _Value, subject: str) -> None:
-        message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
-        hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
+        message = f"ROS 2 never generates {subject} from a .msg file"
+        advice = f"{including('DIR')}, where DIR contains the package's .msg files"
+        hint = f"idlc reads only IDL that ROS 2 generates; {advice}"
         self._report.add(codes.FOREIGN_IDL.at(self._span(part), message, hint=hint))
 
     def _fault(self, fault: Fault) -> None:

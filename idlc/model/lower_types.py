@@ -60,7 +60,7 @@ _QUALIFIERS = ("const", "constexpr", "final", "optional", "required", "static")
 
 _COMMENTS = ("//", "/*")
 COMMENT_HINT = "a comment begins with `#`"
-_LIST_HINT = "a list of any length is `TYPE[]`, one of at most ten elements `TYPE[<=10]`"
+_LIST_HINT = "write `TYPE[]` for a list of any length, `TYPE[<=10]` for at most ten elements"
 
 
 def type_hint(name: str) -> str | None:
@@ -70,13 +70,13 @@ def type_hint(name: str) -> str | None:
     if word in own:
         return f"did you mean `{word}`?" if word != name else None
     if word in _ANY:
-        return "a field has one type, which a message names: there is none for all values"
+        return "a field has exactly one type; ROS 2 has no type for arbitrary values"
     if word in _LISTS:
         return _LIST_HINT
     if word in _MAPS:
-        return "ROS 2 has no maps and no structures within messages; make a message for its fields"
+        return "ROS 2 has no maps or inline structures; create a message for the fields"
     if word == "enum":
-        return "ROS 2 has no enums; make a uint8 field, and a constant for each of its values"
+        return "ROS 2 has no enums; write a uint8 field and a constant for each value"
     near = word if word in _TYPES else closest(name, own) or closest(name, _NUMBERS)
     return f"did you mean `{_TYPES.get(near, near)}`?" if near else None
 
@@ -120,7 +120,7 @@ def find_slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
 
 def _broken(text: str, fault: Fault, kind: ir.Kind) -> Fault | None:
     if fault.code is codes.MALFORMED_SEPARATOR and kind == "msg":
-        hint = f"a .msg file has no separators; for a line in a comment write `# {text.split()[0]}`"
+        hint = f"a .msg file has no separators; in a comment, write `# {text.split()[0]}`"
         return msgspec.structs.replace(fault, hint=hint)
     word = re.match(r"(?:std::)?(\w+)[<(]", text)
     if fault.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
@@ -145,14 +145,14 @@ def _field(body: tree.Field) -> Fault | None:
     if "," in name.text:
         listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
         definitions = [f"`{type_} {part.strip()}`" for part in listed if part.strip()]
-        hint = f"write each on a line of its own: {', '.join(definitions[:4])}"
-        return fault_at(codes.INVALID_FIELD_NAME, name, "a line defines one field", hint)
+        hint = f"write one line for each: {', '.join(definitions[:4])}"
+        return fault_at(codes.INVALID_FIELD_NAME, name, "a line can define only one field", hint)
     plain, bracket, size = name.text.partition("[")
     if bracket and size.endswith("]"):
-        hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
+        hint = f"write the brackets after the type: `{type_}[{size} {plain}`"
         return _invalid(codes.INVALID_FIELD_NAME, "field", name, hint)
     if type_.endswith(":"):
-        hint = f"the type comes first: `{name.text} {type_[:-1]}`"
+        hint = f"write the type first: `{name.text} {type_[:-1]}`"
         return _invalid(codes.INVALID_TYPE_NAME, "type", body.type.whole, hint)
     return None
 
@@ -166,9 +166,9 @@ def _constant(body: tree.Constant) -> Fault | None:
         code, end = codes.INVALID_CONSTANT_NAME, name.end + 1
         return Fault(code, "a constant has no name", name.start, end, hint)
     if names.is_field_name(name.text):
-        hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
+        hint = f"for a default value, omit the equals sign: `{type_} {name.text} {value}`"
         if type_ in (*ir.PRIMITIVES, *STRINGS):
-            hint += f"; a constant is called `{name.text.upper()}`"
+            hint += f"; for a constant, use the name `{name.text.upper()}`"
         return _invalid(codes.INVALID_CONSTANT_NAME, "constant", name, hint)
     return None
 
@@ -224,7 +224,7 @@ def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
         return bound if isinstance(bound, Fault) else ir.String(STRINGS[name], bound)
     if type_.bound is not None:
         piece = tree.Piece("<=" + type_.bound.text, type_.bound.start - 2)
-        hint = f"for at most {type_.bound.text} elements write `{name}[<={type_.bound.text}]`"
+        hint = f"for at most {type_.bound.text} elements, write `{name}[<={type_.bound.text}]`"
         return fault_at(codes.BOUND_ON_NON_STRING, piece, f"`{name}` cannot have a bound", hint)
     if name in ir.PRIMITIVES:
         return ir.Primitive(name)

@@ -51,7 +51,7 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
                 quoted = True
                 end = ends[quote].after(at)
                 if end == -1:
-                    message = f"no {quote} that ends this element"
+                    message = f"this element has no closing {quote}"
                     hint = (
                         "an element cannot end with an escaped quote; use the other kind of quote"
                     )
@@ -114,7 +114,7 @@ LONG = 1000
 
 
 Number: TypeAlias = bool | int | float
-BACKSLASH_HINT = "write `\\\\\\\\` for each backslash that should stay"
+BACKSLASH_HINT = "write `\\\\\\\\` for each backslash in the value"
 
 
 def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault:
@@ -198,7 +198,7 @@ def _unquote(type_: ir.String, text: str) -> str | Fault:
             break
     if type_.bound is None or len(raw) <= type_.bound:
         return raw
-    message = f"{len(raw)} characters in a string of at most {type_.bound}"
+    message = f"the text has {len(raw)} characters, but the bound is {type_.bound}"
     hint = f"shorten it, or raise the bound to {len(raw)}"
     return _fault(codes.STRING_TOO_LONG, text, message, hint)
 
@@ -206,10 +206,12 @@ def _unquote(type_: ir.String, text: str) -> str | Fault:
 def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fault:
     if not (text.startswith("[") and text.endswith("]")) or text == "[":
         hint = "write `[1, 2, 3]`"
-        return _fault(codes.ARRAY_VALUE, text, "an array's default must stand in brackets", hint)
+        return _fault(
+            codes.ARRAY_VALUE, text, "the default value of an array must be in brackets", hint
+        )
     inside, element = text[1:-1], type_.element
     assert isinstance(element, (ir.Primitive, ir.String))
-    message = f"more than {MAX_ELEMENTS:,} elements in a default"
+    message = f"the default value has more than {MAX_ELEMENTS:,} elements"
     too_many = _fault(codes.TOO_LARGE, text, message, "set the value in code")
     if not isinstance(element, ir.String) and inside.count(",") >= MAX_ELEMENTS:
         return too_many
@@ -273,4 +275,6 @@ def wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault 
     if not wrong:
         return None
     hint = f"give {expected} elements"
-    return _fault(codes.ARRAY_LENGTH, text, f"{count} elements instead of {expected}", hint)
+    return _fault(
+        codes.ARRAY_LENGTH, text, f"the value has {count} elements instead of {expected}", hint
+    )

@@ -13,10 +13,10 @@ _UPPER = re.compile(r"[A-Z](_?[A-Z0-9])*")
 _MESSAGE = re.compile(r"[A-Z][A-Za-z0-9]*")
 _MESSAGE_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
 
-PACKAGE_HINT = "use lower-case letters, digits and single underscores, a letter first"
+PACKAGE_HINT = "use lower-case letters, digits and single underscores, and begin with a letter"
 FIELD_HINT = PACKAGE_HINT
-CONSTANT_HINT = "use capitals, digits and single underscores, a letter first"
-MESSAGE_HINT = "use letters and digits, a capital letter first"
+CONSTANT_HINT = "use capitals, digits and single underscores, and begin with a letter"
+MESSAGE_HINT = "use letters and digits, and begin with a capital letter"
 
 
 def is_package_name(name: str) -> bool:
@@ -60,6 +60,11 @@ def snake_case(name: str) -> str:
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()
 
 
+def is_module_name(name: str) -> bool:
+    """Return whether an import statement can name a module, spelled as its file on every system."""
+    return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
+
+
 #: Modules that a starting Python has loaded, frozen or not, before it looks anywhere else.
 _LOADED = frozenset(
     ("abc", "codecs", "encodings", "genericpath", "io", "ntpath", "os", "posixpath", "site", "stat")
@@ -73,13 +78,11 @@ def why_not_package(name: str) -> str:
     if not is_package_name(name):
         like = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
         suggestion = f"; did you mean `{like}`?" if is_package_name(like) else ""
-        return (
-            f"is not a package name: lower-case letters, digits and single underscores{suggestion}"
-        )
+        return f"is not a package name; {PACKAGE_HINT}{suggestion}"
     if keyword.iskeyword(name):
-        return "is a keyword of Python and cannot be imported"
+        return "is a Python keyword and cannot be imported"
     if name in _LOADED or FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):
-        return "is a module of Python itself, which would be imported instead"
+        return "is a standard library module, which Python would import instead"
     if name in sys.stdlib_module_names or name in _NEEDED:
-        return "is the name of a module that programs import: they would get this package instead"
+        return "is the name of another module; programs would import this package instead"
     return ""

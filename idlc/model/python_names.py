@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import builtins
 import keyword
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import NewType, TypeAlias
 
 from idlc.model import ir
@@ -62,6 +62,14 @@ def class_(name: ir.TypeName) -> ClassName:
 def qualified_class(name: ir.TypeName) -> ClassName:
     """Return a name for another package's class where the plain one is taken."""
     return ClassName(f"{name.package}_{class_(name)}")
+
+
+def enum(stem: str, taken: Container[str] = ()) -> ClassName:
+    """Return the class, within that of a message, for the values of a field of this name."""
+    name = "".join(part.capitalize() for part in stem.split("_"))
+    while name in taken or keyword.iskeyword(name):
+        name += "_"
+    return ClassName(name)
 
 
 def field(name: str) -> FieldName:

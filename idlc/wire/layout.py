@@ -193,16 +193,16 @@ def oversized(*models: Model) -> Iterator[Diagnostic]:
             total += sum(part.fields for part in parts)
             if fields > MAX_FIELDS:
                 number = f"{fields:,}" if fields < 10**12 else "more than 10^12"
-                message = f"`{interface.name}` has {number} fields, nested ones included"
-                hint = f"split it up; code is generated for at most {MAX_FIELDS:,}"
+                message = f"`{interface.name}` has {number} fields, including nested fields"
+                hint = f"split it up; idlc generates code for at most {MAX_FIELDS:,} fields"
             elif depth > MAX_DEPTH:
                 message = f"`{interface.name}` nests messages {depth} deep"
-                hint = f"flatten it; code is generated for a depth of at most {MAX_DEPTH}"
+                hint = f"flatten it; idlc generates code for at most {MAX_DEPTH} levels"
             else:
                 continue
             refused = True
             yield codes.STRUCTURE_TOO_LARGE.of(ir.path_of(interface), message, hint=hint)
         if total > MAX_PACKAGE_FIELDS and not refused:
-            message = f"`{model.package}` has {total:,} fields, nested ones included"
-            hint = f"split it into packages; code is generated for at most {MAX_PACKAGE_FIELDS:,}"
+            message = f"`{model.package}` has {total:,} fields, including nested fields"
+            hint = f"split it; idlc generates at most {MAX_PACKAGE_FIELDS:,} fields for a package"
             yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)

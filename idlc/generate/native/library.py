@@ -238,7 +238,7 @@ class _TypeSupport:
         if not self.cpp:
             return None, None
         image = self.image
-        text = f"{name} was compiled by idlc, not in C++: it can only be handled in serialized form"
+        text = f"{name} was compiled by idlc, not in C++: it exists only in serialized form"
         slot = image.imported("_ZSt21__throw_runtime_errorPKc", "libstdc++.so.6")
         throw = image.function("throw", message=image.string(text), function=slot)
         return throw, image.function("nothing")

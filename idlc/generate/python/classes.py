@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from idlc.generate.python import fields, literals
+from idlc.generate.python import enums, fields, literals
 from idlc.generate.python.fields import Docstring, FieldView, Naming
 from idlc.generate.python.imports import References
 from idlc.model import ir, python_names
@@ -25,12 +25,21 @@ class ConstantView(msgspec.Struct, frozen=True):
     docstring: Docstring = Docstring(Text(""))
 
 
+class EnumView(msgspec.Struct, frozen=True):
+    """A nested class of integers, with the names of the fields whose values these are."""
+
+    name: Code
+    fields: tuple[Code, ...]
+    members: tuple[ConstantView, ...]
+
+
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     """A message class; `usual` is the class of the first field's values."""
 
     name: Code
     docstring: Docstring
     constants: tuple[ConstantView, ...]
+    enums: tuple[EnumView, ...]
     fields: tuple[FieldView, ...]
     usual: Code
     naming: Naming
@@ -47,12 +56,25 @@ class GroupView(msgspec.Struct, frozen=True):
 def message(structure: ir.Message, references: References, purpose: str) -> MessageView:
     """Return the view of a structure's class; `purpose` is its docstring without a comment."""
     naming = Naming.of(structure)
+    class_ = references.name(structure.name)
+    views, classes = [], dict[str, str]()
+    for enum in enums.enums(structure, references.surroundings.enums):
+        names = tuple(Code(python_names.field(field.name)) for field in enum.fields)
+        members = (
+            _constant(member, name, references.file) for name, member in enum.members.items()
+        )
+        views.append(EnumView(Code(enum.name), names, tuple(members)))
+        classes |= {field.name: f"{class_}.{enum.name}" for field in enum.fields}
     usual = [fields.usual_class(field, references, naming) for field in structure.fields[:1]]
     return MessageView(
-        name=Code(references.name(structure.name)),
+        name=Code(class_),
         docstring=fields.message(structure, purpose, references.file),
         constants=tuple(_constants(structure, references.file)),
-        fields=tuple(fields.view(field, references, naming) for field in structure.fields),
+        enums=tuple(views),
+        fields=tuple(
+            fields.view(field, references, naming, classes.get(field.name, ""))
+            for field in structure.fields
+        ),
         usual=usual[0] if usual else Code(""),
         naming=naming,
     )
@@ -60,13 +82,16 @@ def message(structure: ir.Message, references: References, purpose: str) -> Mess
 
 def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
     for constant in structure.constants:
-        value = Code(literals.scalar(constant.type, constant.value))
-        docstring = fields.attribute(constant, file)
-        yield ConstantView(Code(constant.name), value, docstring=docstring)
+        yield _constant(constant, constant.name, file)
     for field in structure.fields:
         if default := field.default:
             name = Code(fields.default_name(field))
             yield ConstantView(name, *fields.default(field.type, default.value))
+
+
+def _constant(constant: ir.Constant, name: str, file: str) -> ConstantView:
+    value = Code(literals.scalar(constant.type, constant.value))
+    return ConstantView(Code(name), value, docstring=fields.attribute(constant, file))
 
 
 def group(interface: ir.Service | ir.Action) -> GroupView:

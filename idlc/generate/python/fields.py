@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from textwrap import dedent
+from typing import NamedTuple
 
 import msgspec
 
 from idlc.generate.idl import idl_text
 from idlc.generate.python import literals
 from idlc.generate.python.imports import References
-from idlc.model import ir, python_names
+from idlc.model import comments, ir, python_names
 from idlc.model.ir import spell
 from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES
@@ -100,7 +101,9 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
 
     `fresh` is the default of a field whose parameter is None without an argument. Assigning to a
     field of `numbers` takes longer than to its slot, because it converts them. `is_array`: the
-    field is equal to another with the same elements, whatever holds them.
+    field is equal to another with the same elements, whatever holds them. A deprecated field has
+    the name of a descriptor, which type checkers see, and says what to use: it is read as `read`
+    and takes `values`.
     """
 
     name: Code
@@ -114,6 +117,10 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
     numbers: bool
     is_scalar: bool
     is_array: bool
+    descriptor: Code
+    deprecation: Code
+    read: Code
+    values: Code
 
 
 class Naming(msgspec.Struct, frozen=True):
@@ -154,28 +161,34 @@ def numeric_class(type_: ir.FieldType, info: ir.PrimitiveInfo) -> str:
     return f"_idlc.{stem}Sequence" if isinstance(type_, ir.Sequence) else f"_arrays.{stem}Array"
 
 
-def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
-    """Return the view of a field.
+def view(field: ir.Field, references: References, naming: Naming, enum: str = "") -> FieldView:
+    """Return the view of a field; `enum` is the class of its values.
 
     If the class converts values, `None` is the default, and a list is made of any iterable.
     """
     name = python_names.field(field.name)
-    annotation, parameter, fresh = _shape(field, references, naming)
-    # type checkers take a field of a method's name for a mistake
-    ignored = "  # type: ignore[assignment]" if name in python_names.METHODS else ""
+    shape = _shape(field, references, naming, enum)
+    deprecation = comments.deprecation(field.comment)
+    ignored = ""
+    if name in python_names.METHODS:  # type checkers take that for a mistake
+        ignored, deprecation = "  # type: ignore[assignment]", None
     is_list = isinstance(field.type, (ir.Array, ir.Sequence))
     return FieldView(
         name=Code(name),
         wire_name=Code(field.name),
         slot=Code(python_names.slot(field.name)),
         idl=Code(idl_text(field.type)),
-        annotation=Code(annotation + ignored),
-        parameter=Code(parameter),
-        fresh=Code(fresh),
+        annotation=Code(shape.annotation + ignored),
+        parameter=Code(f"{shape.values} = {shape.default}"),
+        fresh=Code(shape.fresh),
         docstring=attribute(field, references.file),
         numbers=number_info(field.type) is not None,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
         is_array=is_list and isinstance(ir.element_of(field.type), ir.Primitive),
+        descriptor=Code(f"{python_names.slot(field.name)}_" if deprecation else ""),
+        deprecation=Code(literals.string_literal(deprecation or "")),
+        read=Code(shape.read),
+        values=Code(shape.values.removesuffix(" | None")),
     )
 
 
@@ -188,30 +201,41 @@ def usual_class(field: ir.Field, references: References, naming: Naming) -> Code
     return Code(_builtin(_element(field.type, references), naming))
 
 
-def _shape(field: ir.Field, references: References, naming: Naming) -> tuple[str, str, str]:
-    """Return a field's annotation, its parameter and its fresh default."""
+class _Shape(NamedTuple):
+    """The type, annotation, parameter values and default of a field."""
+
+    read: str
+    annotation: str
+    values: str
+    default: str = "None"
+    fresh: str = ""
+
+
+def _shape(field: ir.Field, references: References, naming: Naming, enum: str) -> _Shape:
     element = _builtin(_element(ir.element_of(field.type), references), naming)
     if isinstance(field.type, (ir.Primitive, ir.String)):
+        element = f"{enum} | {element}" if enum else element
         declared = field.default and default(field.type, field.default.value)[0]
         value = declared or zero(field.type)
         if references.converts:
-            return element, f"{element} | None = None", value
-        return element, f"{element} = {value}", ""
+            return _Shape(element, element, f"{element} | None", fresh=value)
+        return _Shape(element, element, element, value)
     if isinstance(field.type, ir.Ref):
-        return element, f"{element} | None = None", f"{element}()"
+        return _Shape(element, element, f"{element} | None", fresh=f"{element}()")
+    read = f"{naming.builtins}list[{element}]"
     if info := number_info(field.type):
-        annotation, values, fresh = _numbers(field.type, info)
+        read, annotation, values, fresh = _numbers(field.type, info)
     elif references.converts:
         inside = getattr(ir.element_of(field.type), "name", "")
-        read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
-        annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({read})"
+        function = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
+        annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({function})"
         values, fresh = f"_idlc.Iterable[{element}]", _fresh_list(field, references)
     else:
-        annotation = values = f"{naming.builtins}list[{element}]"
+        annotation = values = read
         fresh = _fresh_list(field, references)
     if field.default is not None:
         fresh = f"{naming.receiver}.{default_name(field)}"
-    return annotation, f"{values} | None = None", fresh
+    return _Shape(read, annotation, f"{values} | None", fresh=fresh)
 
 
 def _builtin(name: str, naming: Naming) -> str:
@@ -246,14 +270,16 @@ def _fresh_list(field: ir.Field, references: References) -> str:
     return "[]"
 
 
-def _numbers(type_: ir.FieldType, info: ir.PrimitiveInfo) -> tuple[str, str, str]:
-    """Return the annotation of an array of numbers, what it takes, and its fresh default."""
+def _numbers(type_: ir.FieldType, info: ir.PrimitiveInfo) -> tuple[str, str, str, str]:
+    """Return what an array of numbers is read as, its annotation, values and fresh default."""
     descriptor = numeric_class(type_, info)
     if isinstance(type_, ir.Array):
         fresh = f"_arrays.zeros({type_.size}, _arrays.{info.dtype.upper()})"
-        return f"{descriptor} = {descriptor}({type_.size})", "_arrays.Values", fresh
-    values = "_idlc.Integers" if info.low is not None else "_idlc.Floats"
-    return f"{descriptor} = {descriptor}()", values, f'_array("{info.code}")'
+        annotation = f"{descriptor} = {descriptor}({type_.size})"
+        return f"_NDArray[_np.{info.dtype}]", annotation, "_arrays.Values", fresh
+    number, values = ("int", "Integers") if info.low is not None else ("float", "Floats")
+    annotation = f"{descriptor} = {descriptor}()"
+    return f"_idlc.array[{number}]", annotation, f"_idlc.{values}", f'_array("{info.code}")'
 
 
 def default_name(field: ir.Field) -> str:

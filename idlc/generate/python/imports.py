@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from idlc.generate.python import enums
 from idlc.model import derive, ir, link, python_names
 from idlc.project.templates import Code, Text
 from idlc.wire.layout import Messages
@@ -45,7 +46,7 @@ _TAKEN = {*dir(builtins), "Any"}
 
 
 class Surroundings(NamedTuple):
-    """The position of what a generated package imports from outside of itself.
+    """The position of what a generated package imports from outside of itself, and its enums.
 
     `runtime` is the folder of the runtime, relative to modules of messages. `others` is the prefix
     of other packages' names; one that begins with a dot is relative to the generated package.
@@ -53,6 +54,7 @@ class Surroundings(NamedTuple):
 
     runtime: str = ".."
     others: str = ""
+    enums: enums.Choice = "marked"
 
     @property
     def vendors(self) -> bool:
@@ -69,8 +71,8 @@ class Surroundings(NamedTuple):
 ALONE = Surroundings()
 #: A package that comes with the types that it uses.
 VENDORING = Surroundings(others=".vendor.")
-#: One of those that come with another package.
-VENDORED = Surroundings(runtime="....", others="...vendor.")
+#: One of those that come with another package. The installed one may have no enums.
+VENDORED = Surroundings(runtime="....", others="...vendor.", enums="none")
 
 
 class References:
@@ -214,7 +216,7 @@ def package(
         imports += statements(f".{module}", own, 4)
         names += [NameView(Code(name), Code(module), Code(value)) for name, value in values.items()]
     return PackageView(
-        title=Text(f"{TITLES[kind]} of {model.package}, imported when they are asked for."),
+        title=Text(f"{TITLES[kind]} of {model.package}, imported on first use."),
         runtime=Code(surroundings.runtime),
         imports=tuple(map(Code, imports)),
         names=tuple(sorted(names, key=lambda view: natural(view.name))),

@@ -130,7 +130,7 @@ _json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
 
 
 class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
-    """A module of classes or of codecs; `imports` are lines.
+    """A module of classes or of codecs; `imports` and those for type checkers are lines.
 
     `converts` says that classes convert values as Lyrical's do.
     """
@@ -140,6 +140,7 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     title: Text
     runtime: Code
     imports: tuple[Code, ...] = ()
+    type_imports: tuple[Code, ...] = ()
     messages: tuple[MessageView, ...] = ()
     codecs: tuple[CodecView, ...] = ()
     group: GroupView | None = None
@@ -180,15 +181,17 @@ def module_views(
     is_foreign = references.others and not surroundings.vendors
     is_hiding = any(field.name in python_names.METHODS for field in every)
     purposes = zip(written, fields.purposes(interface), strict=True)
+    views = tuple(
+        classes.message(structure, references, purpose) for structure, purpose in purposes
+    )
     view = ModuleView(
         origin=Text(f"{name}.{name.kind}"),
         pragmas=(PRAGMAS if is_foreign else ()) + (HIDING_PRAGMAS if is_hiding else ()),
         title=Text(f"The classes of {name}."),
         runtime=Code(surroundings.runtime),
-        imports=_code(_imports(references, written)),
-        messages=tuple(
-            classes.message(structure, references, purpose) for structure, purpose in purposes
-        ),
+        imports=_code(_imports(references, written, views)),
+        type_imports=_code(_type_imports(views)),
+        messages=views,
         group=None if isinstance(interface, ir.Message) else classes.group(interface),
         converts=converts,
     )
@@ -207,12 +210,25 @@ def module_views(
     yield Module("codec", f"{name.kind}/{python_names.codec_module(home)}.py", view)
 
 
-def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
+def _type_imports(views: Iterable[MessageView]) -> Iterator[str]:
+    deprecated = [field for view in views for field in view.fields if field.descriptor]
+    if any("_np." in field.read for field in deprecated):
+        yield "import numpy as _np"
+        yield "from numpy.typing import NDArray as _NDArray"
+    if deprecated:
+        yield "from typing_extensions import deprecated as _deprecated"
+
+
+def _imports(
+    references: References, structures: tuple[ir.Message, ...], views: Iterable[MessageView]
+) -> Iterator[str]:
     every = [field for message in structures for field in message.fields]
     numeric = [field for field in every if fields.number_info(field.type)]
     standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
     if any(isinstance(field.type, ir.Sequence) and not field.default for field in numeric):
         standard.append("from array import array as _array")
+    if any(view.enums for view in views):
+        standard.append("from enum import IntEnum as _IntEnum")
     inside, outside = references.imports(references.direct)
     yield from (*standard, "") if standard else ()
     runtime = references.surroundings.runtime

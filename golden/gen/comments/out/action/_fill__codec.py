@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def fill_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Fill_Goal in one byte order."""
+    """Return the functions that write and read Fill_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_goal = _idlc.maker(kind, 0x9773abef)
@@ -38,7 +38,7 @@ def fill_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Code
 
 
 def fill_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Fill_Result in one byte order."""
+    """Return the functions that write and read Fill_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_result = _idlc.maker(kind, 0x9f5ba657)
@@ -61,7 +61,7 @@ def fill_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Co
 
 
 def fill_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Fill_Feedback in one byte order."""
+    """Return the functions that write and read Fill_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_feedback = _idlc.maker(kind, 0x9773abef)
@@ -84,7 +84,7 @@ def fill_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
 
 
 def fill_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Fill_SendGoal_Request in one byte order."""
+    """Return the functions that write and read Fill_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._fill import Fill_Goal
 
@@ -128,7 +128,7 @@ def fill_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) 
 
 
 def fill_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Fill_GetResult_Response in one byte order."""
+    """Return the functions that write and read Fill_GetResult_Response in one byte order."""
     from ._fill import Fill_Result
 
     encapsulation = _idlc.HEADERS[order]
@@ -161,7 +161,7 @@ def fill_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading
 
 
 def fill_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Fill_FeedbackMessage in one byte order."""
+    """Return the functions that write and read Fill_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._fill import Fill_Feedback
 

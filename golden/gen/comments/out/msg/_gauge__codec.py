@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Gauge in one byte order."""
+    """Return the functions that write and read Gauge in one byte order."""
     from .._idlc import arrays as _arrays
 
     encapsulation = _idlc.HEADERS[order]

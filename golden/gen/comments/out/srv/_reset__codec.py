@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def reset_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Reset_Request in one byte order."""
+    """Return the functions that write and read Reset_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_reset_request = _idlc.maker(kind, 0xfefd57b0)
@@ -47,7 +47,7 @@ def reset_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.
 
 
 def reset_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Reset_Response in one byte order."""
+    """Return the functions that write and read Reset_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack

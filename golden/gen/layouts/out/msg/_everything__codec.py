@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Everything in one byte order."""
+    """Return the functions that write and read Everything in one byte order."""
     from .._idlc import arrays as _arrays
     from ._inner import Inner
     from ._nothing import Nothing

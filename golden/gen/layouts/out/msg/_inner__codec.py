@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def inner_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Inner in one byte order."""
+    """Return the functions that write and read Inner in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
     write_head = _idlc.Texts(order, "4sBdI*I")

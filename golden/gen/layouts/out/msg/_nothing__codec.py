@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def nothing_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Nothing in one byte order."""
+    """Return the functions that write and read Nothing in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
     new_nothing = _idlc.maker(kind, 0xa3a6bf43)

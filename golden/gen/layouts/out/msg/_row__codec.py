@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def row_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Row in one byte order."""
+    """Return the functions that write and read Row in one byte order."""
     from .._idlc import arrays as _arrays
 
     encapsulation = _idlc.HEADERS[order]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def texts_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Texts in one byte order."""
+    """Return the functions that write and read Texts in one byte order."""
     from ._pair import Pair
     from ._titled import Titled
 

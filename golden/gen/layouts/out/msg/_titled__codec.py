@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def titled_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Titled in one byte order."""
+    """Return the functions that write and read Titled in one byte order."""
     from ._pair import Pair
 
     encapsulation = _idlc.HEADERS[order]

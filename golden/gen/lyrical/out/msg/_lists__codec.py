@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Lists in one byte order."""
+    """Return the functions that write and read Lists in one byte order."""
     from .._idlc import arrays as _arrays
     from ._words import Words
 

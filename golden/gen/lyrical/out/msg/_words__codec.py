@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def words_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Words in one byte order."""
+    """Return the functions that write and read Words in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.Texts(order, "4sI*ic?d")

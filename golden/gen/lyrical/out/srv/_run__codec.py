@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def run_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Run_Request in one byte order."""
+    """Return the functions that write and read Run_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4s", align=4).pack
     write_args = _idlc.text_block(order)
@@ -46,7 +46,7 @@ def run_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Co
 
 
 def run_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Run_Response in one byte order."""
+    """Return the functions that write and read Run_Response in one byte order."""
     with _idlc.importing():
         from builtin_interfaces.msg import Time
 

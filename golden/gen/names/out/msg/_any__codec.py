@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def any_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Any in one byte order."""
+    """Return the functions that write and read Any in one byte order."""
     with _idlc.importing():
         from geometry_msgs.msg import (
             Point,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads FooBar in one byte order."""
+    """Return the functions that write and read FooBar in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_foo_bar = _idlc.maker(kind, 0xb9a005aa)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def foo_bar_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads FOOBar in one byte order."""
+    """Return the functions that write and read FOOBar in one byte order."""
     from ._foo_bar_2 import FooBar
 
     encapsulation = _idlc.HEADERS[order]

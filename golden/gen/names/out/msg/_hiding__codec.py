@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def hiding_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Hiding in one byte order."""
+    """Return the functions that write and read Hiding in one byte order."""
     from .._idlc import arrays as _arrays
     from ._point import Point
 

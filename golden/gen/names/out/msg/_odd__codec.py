@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def odd_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Odd in one byte order."""
+    """Return the functions that write and read Odd in one byte order."""
     from .._idlc import arrays as _arrays
     from ._point import Point
 

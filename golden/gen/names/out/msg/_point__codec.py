@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def point_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Point in one byte order."""
+    """Return the functions that write and read Point in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sdd").pack
     new_point = _idlc.maker(kind, 0x4f9f45f5)

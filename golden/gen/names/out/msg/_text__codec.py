@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def text_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Text in one byte order."""
+    """Return the functions that write and read Text in one byte order."""
     from ._any import Any as names_msgs_Any
     from ._point import Point as names_msgs_Point
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def none_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads None_Request in one byte order."""
+    """Return the functions that write and read None_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
     new_none_request = _idlc.maker(kind, 0xa3a6bf43)
@@ -31,7 +31,7 @@ def none_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.C
 
 
 def none_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads None_Response in one byte order."""
+    """Return the functions that write and read None_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sx").pack
     new_none_response = _idlc.maker(kind, 0xa3a6bf43)
