@@ -1,4 +1,4 @@
-"""Install my_robot_controller: `colcon build` and `pip install` both come here."""
+"""Install my_robot_controller: `colcon build` and `pip install` both run this file."""
 
 from glob import glob
 
@@ -23,7 +23,7 @@ setup(
         ('share/' + package_name + '/srv', glob('srv/*.srv')),
         ('share/' + package_name + '/action', glob('action/*.action')),
     ],
-    idlc_interfaces=True,  # `pip install idlc` for builds that compile msg/, srv/ and action/
+    idlc_interfaces=True,  # if idlc is installed, compile msg/, srv/ and action/
     install_requires=['numpy', 'setuptools'],
     zip_safe=False,
     maintainer='The idlc authors',

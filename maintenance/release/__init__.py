@@ -1,1 +1,1 @@
-"""What RELEASING.md does by program: prepare a release, and rehearse it as far as one can."""
+"""The automated steps of RELEASING.md: prepare a release, and rehearse it."""

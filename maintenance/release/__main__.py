@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from maintenance.release import agreement, archives, forms, prepare
+from maintenance.release import agreement, archives, extension, forms, prepare
 from maintenance.release.archives import Archives, RuntimeArchives
 from maintenance.release.project import FailedError, Project
 
@@ -67,6 +67,8 @@ def main() -> int:
     checking = commands.add_parser("check", help="rehearse a release")
     checking.add_argument("--tag", help="what is about to be uploaded: nothing may be left to do")
     checking.add_argument("--keep", type=Path, metavar="DIR", help="copy the archives there")
+    opening = commands.add_parser("extension", help="check the archive of `make vscode`")
+    opening.add_argument("vsix", type=Path)
     placing = commands.add_parser("repository", help="say where the project is published")
     placing.add_argument("url", metavar="https://github.com/OWNER/NAME")
     dating = commands.add_parser("version", help="give a version and its day to all files")
@@ -76,6 +78,9 @@ def main() -> int:
     try:
         if given.command == "check":
             check(given.tag, given.keep)
+        elif given.command == "extension":
+            extension.is_complete(HERE, given.vsix)
+            _passed(extension.is_complete)
         elif given.command == "repository":
             prepare.publish_at(HERE, given.url)
         else:

@@ -1,4 +1,4 @@
-"""What several files say has to be the same: version, changelog, citation, Pythons, repository."""
+"""Facts that several files must agree on: version, changelog, citation, Pythons, repository."""
 
 from __future__ import annotations
 

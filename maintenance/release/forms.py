@@ -1,4 +1,4 @@
-"""What GitHub reads, such as workflows and forms: held to its schemas, and to zizmor."""
+"""Check workflows and forms of GitHub against its schemas and with zizmor."""
 
 from __future__ import annotations
 

@@ -10,22 +10,34 @@ from maintenance.release.project import EXTENSION, EXTENSION_FILES, RUNTIME, Fai
 
 #: The paragraphs that say what to do as long as there is no repository and no index.
 _UNTIL = re.compile(r"<!-- until idlc is published -->\n.*?<!-- end -->\n\n?", re.DOTALL)
-#: What documents tell people to paste: as long as there is none, and from then on.
+_GITHUB = {"uses: ./tools/idlc": "uses: {name}@v{version}"}
+_GITLAB = {"wheels/idlc-*.whl": "idlc=={version}"}
+_PRE_COMMIT = {"repo: ../idlc": "repo: {repository}", "rev: HEAD": "rev: v{version}"}
+_PLACE = {"https://github.com/OWNER/NAME": "{repository}"}
+#: What documents, and templates of `idlc init`, have people paste: before there is one, and after.
 PASTED = {
     "README.md": {
-        "    pip install .            # '.[ros]'": "    pip install idlc         # 'idlc[ros]'",
+        "pip install .\n": "pip install idlc\n",
+        "pip install '.[ros]'": "pip install 'idlc[ros]'",
     },
-    "docs/ci.md": {
-        "wheels/idlc-*.whl": "idlc=={version}",
-        "repo: ../idlc": "repo: {repository}",
-        "rev: HEAD": "rev: v{version}",
-        "uses: ./tools/idlc": "uses: {name}@v{version}",
-    },
+    "docs/ci.md": {**_GITHUB, **_GITLAB, **_PRE_COMMIT},
+    "docs/contributing/templates.md": {**_GITHUB, **_GITLAB, **_PRE_COMMIT},
+    "templates/ci/github.yml.jinja": _GITHUB,
+    "templates/ci/gitlab.yml.jinja": _GITLAB,
+    "templates/ci/pre_commit.yaml.jinja": _PRE_COMMIT,
+    "docs/editors.md": {},
     "docs/install.md": {},
     "docs/interface-packages.md": {},
+    "docs/publish.md": {},
+    "editors/README.md": {**_PLACE, '"OWNER/NAME"': '"{name}"'},
+    "editors/emacs/rosmsg-mode.el": _PLACE,
+    "editors/mason/package.yaml": _PLACE,
+    "editors/neovim/lsp/idlc.lua": _PLACE,
 }
 #: How an earlier release is named in the same places.
-_EARLIER = re.compile(r"(idlc==|rev: v|uses: [\w.-]+/[\w.-]+@v)\d+\.\d+\.\d+(?![\w.])")
+_EARLIER = re.compile(
+    r"(idlc==|rev: v|uses: [\w.-]+/[\w.-]+@v|pkg:pypi/idlc@|;; Version: )\d+\.\d+\.\d+(?![\w.])"
+)
 _URLS = """
 [project.urls]
 Repository = "{repository}"
@@ -43,13 +55,13 @@ _REPOSITORY = re.compile(r"https://github\.com/([\w.-]+/[\w.-]+)")
 
 
 class _Edits(NamedTuple):
-    """What is to be written, by path: all of it, or nothing if something is wrong."""
+    """The files with their edits, all of which are written, or none."""
 
     project: Project
     texts: dict[str, str]
 
     def text(self, path: str) -> str:
-        """Return what a file will hold."""
+        """Return the text that a file will have."""
         return self.texts[path] if path in self.texts else self.project.text(path)
 
     def write(self, path: str, text: str) -> None:

@@ -11,11 +11,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 #: What a source distribution holds besides the package.
 BESIDE = ("LICENSE", "README.md", "pyproject.toml")
 #: The folder that describes idlc-runtime.
@@ -43,7 +38,12 @@ class Project(NamedTuple):
 
     @property
     def metadata(self) -> dict[str, object]:
-        """What `[project]` says."""
+        """The table `[project]`."""
+        if sys.version_info >= (3, 11):  # here, because `make vscode` does without packages
+            import tomllib
+        else:
+            import tomli as tomllib
+
         found: dict[str, object] = tomllib.loads(self.text("pyproject.toml"))["project"]
         return found
 

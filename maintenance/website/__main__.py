@@ -7,4 +7,4 @@ from maintenance.website.build import build
 
 if __name__ == "__main__":
     build(Path(sys.argv[1]))
-    sys.stdout.write(f"begin with {sys.argv[1]}/index.html\n")
+    sys.stdout.write(f"open {sys.argv[1]}/index.html\n")

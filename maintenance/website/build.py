@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from maintenance.website import dialect, interfaces, rules, sources
+from maintenance.website import colours, dialect, interfaces, landing, playground, rules, sources
 
 HERE = Path(__file__).parent
 #: The head of a page that the search leaves out.
@@ -27,10 +27,10 @@ def build(out: Path) -> None:
         files = {**sources.files(), **rules.pages()}
         for place in sources.unsearched(files):
             files[place] = NOT_SEARCHED + files[place]
-        _write(work / "docs", files)
+        _write(work / "docs", {**files, landing.PLACE: landing.page()})
         shutil.copytree(HERE / "assets", work / "docs" / "assets")
         shutil.copytree(HERE / "theme", work / "theme")
-        interfaces.write(work / "docs" / interfaces.PLACE)
+        interfaces.write(work / "docs")
         config = (HERE / "zensical.toml").read_text(encoding="utf-8")
         nav = _navigation(files)
         config = config.replace("nav = []", f"nav = {nav}", 1)
@@ -53,15 +53,18 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
         path = folder / place
         path.parent.mkdir(parents=True, exist_ok=True)
         if place.endswith(".md"):
-            data = dialect.translated(data.decode("utf-8")).encode("utf-8")
+            text = playground.with_links(place, data.decode("utf-8"))
+            data = dialect.translated(colours.with_colours(text)).encode("utf-8")
         path.write_bytes(data)
 
 
 def _navigation(files: Mapping[str, bytes]) -> str:
-    """Return the navigation as a value in TOML: the sections of the index, and the example."""
-    sections = [("Start", "index.md"), *sources.navigation(files)]
-    look_up = dict(sections)["To look up"]
-    look_up.append(("The interfaces of ROS 2", f"{interfaces.PLACE}/index.html"))
+    """Return the navigation as a value in TOML: the sections of docs/index.md, and the example."""
+    sections = [("Home", landing.PLACE), ("All pages", sources.place(sources.START))]
+    sections += sources.navigation(files)
+    look_up = dict(sections)["Reference"]
+    look_up.append(("Playground", playground.PLACE))
+    look_up.append(("The interfaces of ROS 2", f"{interfaces.PLACE}/index.md"))
     return _list(sections)
 
 

@@ -1,4 +1,6 @@
-"""Pictures of a terminal: what commands really print, as SVG.
+"""Pictures of a terminal: what commands really print, as SVG for dark and light screens.
+
+The commands of a scene appear one after the other, except for readers who asked for less motion.
 
 `IDLC_REFRESH=docs/pictures pytest tests/website` makes those in docs/pictures anew.
 """
@@ -18,13 +20,49 @@ from typing import NamedTuple
 
 _ROOT = Path(__file__).parents[2]
 _SIZE, _WIDTH, _HEIGHT, _EDGE = 14, 8.43, 20, 18
+#: Seconds between two commands.
+_PAUSE = 1.6
 #: What the codes of a terminal mean, in the style sheet of a picture.
-_CLASSES = {"1": "b", "2": "d", "31": "r", "32": "g", "33": "y", "34": "u", "35": "m", "36": "c"}
-_STYLE = f"""
-.box {{ fill: #10151c }} .b {{ font-weight: bold }} .d {{ fill: #8a97a8 }} .r {{ fill: #ff7b72 }}
-text {{ font: {_SIZE}px ui-monospace, Menlo, Consolas, monospace; fill: #d7dee8 }}
-.g {{ fill: #7ee787 }} .y {{ fill: #e3b341 }} .u {{ fill: #79c0ff }} .m {{ fill: #d2a8ff }}
-.c {{ fill: #76e3ea }}"""
+_CLASSES = {
+    "1": "b",
+    "2": "d",
+    "31": "r",
+    "32": "g",
+    "33": "y",
+    "34": "u",
+    "94": "u",
+    "35": "m",
+    "36": "c",
+}
+#: Colours by class, for a light screen and a dark one; each has a contrast of 4.5 or more.
+COLOURS = {
+    "box": ("#f6f8fa", "#10151c"),
+    "t": ("#1f2328", "#d7dee8"),
+    "d": ("#59636e", "#8a97a8"),
+    "r": ("#cf222e", "#ff7b72"),
+    "g": ("#116329", "#7ee787"),
+    "y": ("#7d4e00", "#e3b341"),
+    "u": ("#0550ae", "#79c0ff"),
+    "m": ("#8250df", "#d2a8ff"),
+    "c": ("#0e6a75", "#76e3ea"),
+}
+
+
+def style(font: str, more: str = "") -> str:
+    """Return the style sheet of a picture, which follows the screen of the reader."""
+    light, dark = (
+        " ".join(f".{name} {{ fill: {pair[number]} }}" for name, pair in COLOURS.items())
+        for number in (0, 1)
+    )
+    return (
+        f"<style>\ntext {{ font: {font} }} .b {{ font-weight: bold }}\n{light}\n"
+        f"@media (prefers-color-scheme: dark) {{ {dark} }}{more}\n</style>"
+    )
+
+
+_MOTION = """
+@keyframes appear { from { opacity: 0 } }
+@media (prefers-reduced-motion: no-preference) { g { animation: appear .3s backwards } }"""
 _CODE = re.compile(r"\x1b\[([\d;]*)m")
 
 
@@ -36,6 +74,15 @@ class Scene(NamedTuple):
 
 
 SCENES = {
+    "first": Scene(
+        {"interfaces/msg/Drive.msg": "flot64 speed 0.5  # forward [m/s]\n"},
+        (
+            "idlc check interfaces",
+            "sed -i s/flot64/float64/ interfaces/msg/Drive.msg",
+            "idlc gen interfaces -o my_robot",
+            "python -c 'from my_robot.msg import Drive; print(Drive().serialize().hex())'",
+        ),
+    ),
     "check": Scene(
         {
             "my_robot/msg/Scan.msg": "# One turn of the scanner.\n\n"
@@ -64,21 +111,23 @@ SCENES = {
 
 def picture(scene: Scene) -> str:
     """Return a scene as SVG."""
-    lines = []
+    steps = []
     with tempfile.TemporaryDirectory() as folder:
         for path, text in scene.files.items():
             (Path(folder) / path).parent.mkdir(parents=True, exist_ok=True)
             (Path(folder) / path).write_text(text, encoding="utf-8")
         for command in scene.commands:
-            lines += [f"\x1b[2m$\x1b[0m \x1b[1m{command}\x1b[0m", *_printed(command, folder)]
-    return _svg(lines)
+            lines = [f"\x1b[2m$\x1b[0m \x1b[1m{command}\x1b[0m", *_printed(command, folder)]
+            steps.append(lines)
+    return _svg(steps)
 
 
 def _printed(command: str, folder: str) -> list[str]:
-    _, *words = shlex.split(command)
+    python = shlex.quote(sys.executable)
+    programs = f'idlc() {{ {python} -m idlc "$@"; }}; python() {{ {python} "$@"; }}\n'
     environment = {**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "", "PYTHONPATH": str(_ROOT)}
     done = subprocess.run(
-        [sys.executable, "-m", "idlc", *words],
+        ["/bin/sh", "-c", programs + command],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,
@@ -90,26 +139,30 @@ def _printed(command: str, folder: str) -> list[str]:
     return done.stdout.rstrip("\n").splitlines()
 
 
-def _svg(lines: list[str]) -> str:
-    columns = max(len(_CODE.sub("", line)) for line in lines)
-    width = round(columns * _WIDTH + 2 * _EDGE)
-    height = len(lines) * _HEIGHT + 2 * _EDGE
-    texts = [
-        f'<text x="{_EDGE}" y="{_EDGE + _SIZE + number * _HEIGHT}" xml:space="preserve" '
-        f'textLength="{len(_CODE.sub("", line)) * _WIDTH:.0f}">{_spans(line)}</text>'
-        for number, line in enumerate(lines)
-        if line
-    ]
-    size = f'width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
-    return "\n".join(
-        [
-            f'<svg xmlns="http://www.w3.org/2000/svg" {size}>',
-            f"<style>{_STYLE}\n</style>",
-            '<rect class="box" width="100%" height="100%" rx="8"/>',
-            *texts,
-            "</svg>\n",
+def _svg(steps: list[list[str]]) -> str:
+    columns = max(len(_CODE.sub("", line)) for lines in steps for line in lines)
+    groups, number = [], 0
+    for step, lines in enumerate(steps):
+        texts = [
+            f'<text class="t" x="{_EDGE}" y="{_EDGE + _SIZE + row * _HEIGHT}" xml:space="preserve" '
+            f'textLength="{len(_CODE.sub("", line)) * _WIDTH:.0f}">{_spans(line)}</text>'
+            for row, line in enumerate(lines, number)
+            if line
         ]
-    )
+        delay = f' style="animation-delay: {step * _PAUSE:.1f}s"' if len(steps) > 1 else ""
+        groups += [f"<g{delay}>", *texts, "</g>"] if delay else texts
+        number += len(lines)
+    font = f"{_SIZE}px ui-monospace, Menlo, Consolas, monospace"
+    sheet = style(font, _MOTION if len(steps) > 1 else "")
+    return svg(round(columns * _WIDTH + 2 * _EDGE), number * _HEIGHT + 2 * _EDGE, sheet, groups)
+
+
+def svg(width: int, height: int, sheet: str, parts: list[str]) -> str:
+    """Return a picture of a size, with a box behind its parts."""
+    size = f'width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+    box = '<rect class="box" width="100%" height="100%" rx="8"/>'
+    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" {size}>', sheet, box, *parts, "</svg>\n"]
+    return "\n".join(lines)
 
 
 def _spans(line: str) -> str:

@@ -22,8 +22,9 @@ def pages() -> dict[str, bytes]:
 def _page(code: str) -> str:
     title, _, text = (page(code) or "").partition("\n")
     text = re.sub(r"(?m)^## (.*)$", r"**\1**", text)
-    kind = f"*{CODES[code].kind}*: one of the [rules](index.md)"
-    return f"{title}\n\n{kind}; in a terminal, `idlc explain {code}`.\n{text}"
+    kind = CODES[code].kind.capitalize()
+    line = f"{kind} · `idlc explain {code}` prints this page · [All rules](index.md)"
+    return f"{title}\n\n{line}\n{text}"
 
 
 def _overview() -> Iterator[str]:
@@ -31,7 +32,7 @@ def _overview() -> Iterator[str]:
     yield head
     for section in sections:
         heading, _, text = section.partition("\n")
-        yield f"## {heading}\n\n| code | name | | what it says |\n|---|---|---|---|"
+        yield f"## {heading}\n\n| code | name | severity | meaning |\n|---|---|---|---|"
         for code, slug, kind, first in _SECTION.findall(text):
             yield f"| [{code}]({code}.md) | `{slug}` | {kind} | {' '.join(first.split())} |"
         yield ""

@@ -10,7 +10,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 START = "docs/index.md"
 #: Where documents outside of docs/ are on the site; the others keep their names, in lower case.
-PLACES = {"README.md": "about.md", "examples/my_robot_controller/README.md": "tutorial.md"}
+PLACES = {
+    START: "contents.md",
+    "README.md": "about.md",
+    "examples/my_robot_controller/README.md": "tutorial.md",
+}
 RULES = "docs/rules.md"
 
 _CODE = re.compile(r"(?ms)^ *(```+).*?^ *\1$|`[^`\n]+`")
@@ -21,7 +25,7 @@ def place(path: str) -> str:
     """Return where a file of the repository is on the site."""
     if path == RULES:
         return "rules/index.md"
-    if path.startswith("docs/"):
+    if path.startswith("docs/") and path != START:
         return path.removeprefix("docs/")
     if path.endswith(".md"):
         return PLACES.get(path, path.lower())
@@ -78,9 +82,9 @@ def outside_code(text: str, change: Callable[[str], str]) -> str:
 
 
 def navigation(found: Mapping[str, bytes]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Return the sections of the index, each with the titles and places of its pages."""
+    """Return the sections of docs/index.md, each with the titles and places of its pages."""
     sections = []
-    for section in found["index.md"].decode("utf-8").split("\n## ")[1:]:
+    for section in found[place(START)].decode("utf-8").split("\n## ")[1:]:
         heading, _, text = section.partition("\n")
         entries = re.findall(r"(?<!!)\[([^\]]+)\]\(([^)\s#]+)\)", text)
         titles = {there: title[:1].upper() + title[1:] for title, there in reversed(entries)}
@@ -92,7 +96,7 @@ def navigation(found: Mapping[str, bytes]) -> list[tuple[str, list[tuple[str, st
 def unsearched(found: Mapping[str, bytes]) -> Iterator[str]:
     """Yield the pages that repeat what others say, or are for people who change idlc."""
     yield from (place(RULES), place("CHANGELOG.md"), place(START))
-    yield from (there for _, there in dict(navigation(found))["To change idlc"])
+    yield from (there for _, there in dict(navigation(found))["Contributing"])
 
 
 def _resolved(path: str, target: str) -> str:

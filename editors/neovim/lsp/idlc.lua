@@ -1,12 +1,23 @@
--- The server, for `vim.lsp.enable('idlc')`. `rosidlc` is idlc; Cyclone DDS has another program of that name.
+---@brief
+---
+--- https://github.com/OWNER/NAME
+---
+--- `idlc`, a compiler and language server for ROS 2 interface files (`.msg`, `.srv`, `.action`)
+---
+--- Install it with `pip install idlc`, and add the file type:
+---
+--- ```lua
+--- vim.filetype.add({ extension = { msg = 'rosmsg', srv = 'rosmsg', action = 'rosmsg' } })
+--- ```
+
+---@type vim.lsp.Config
 return {
+  -- `rosidlc` is idlc; Cyclone DDS has another program of that name
   cmd = { 'rosidlc', 'lsp' },
   filetypes = { 'rosmsg' },
-  -- the whole workspace if it is a repository, so that users in other packages are found
+  -- the whole repository, for references from other packages
   root_markers = { '.git', 'package.xml' },
   settings = { idlc = {} },
-  -- tell the server of other buffers at once: a rename reads them all
+  -- a rename edits other buffers too: send their changes at once
   flags = { debounce_text_changes = 0 },
-  -- what is built into the server opens as a document that it has the text of: see plugin/idlc.lua
-  capabilities = { workspace = { textDocumentContent = { dynamicRegistration = false } } },
 }

@@ -80,6 +80,7 @@ vim.api.nvim_create_autocmd('BufReadCmd', {
   end,
 })
 
+vim.lsp.config('idlc', { capabilities = { workspace = { textDocumentContent = { dynamicRegistration = false } } } })
 vim.lsp.enable('idlc')
 on_build_file(function(buffer, root)
   vim.lsp.start(vim.tbl_extend('force', vim.lsp.config.idlc, { root_dir = root }), { bufnr = buffer })

@@ -25,7 +25,7 @@ class CountdownActionServer(Node):
     """
     The node countdown_action_server.
 
-    It works on goals for countdown.
+    It executes goals of countdown.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class CountdownActionServer(Node):
         )
 
     def accept_countdown_goal(self, goal: Countdown.Goal) -> GoalResponse:
-        """Accept a goal for countdown, or reject one that cannot be reached."""
+        """Accept a goal for countdown, or reject an unreachable one."""
         return GoalResponse.ACCEPT if goal.target_count > 0 else GoalResponse.REJECT
 
     def begin_countdown_goal(self, goal_handle: ServerGoalHandle) -> None:
@@ -64,7 +64,7 @@ class CountdownActionServer(Node):
         self,
         goal_handle: ServerGoalHandle,
     ) -> Countdown.Result:
-        """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
+        """Execute a goal step by step, until it succeeds, is cancelled or is aborted."""
         goal: Countdown.Goal = goal_handle.request
         result = Countdown.Result(
             # The last number reached; 0 unless cancelled

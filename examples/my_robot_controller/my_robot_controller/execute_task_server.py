@@ -25,7 +25,7 @@ class ExecuteTaskServer(Node):
     """
     The node execute_task_server.
 
-    It works on goals for execute_task.
+    It executes goals of execute_task.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class ExecuteTaskServer(Node):
         )
 
     def accept_execute_task_goal(self, goal: ExecuteTask.Goal) -> GoalResponse:
-        """Accept a goal for execute_task, or reject one that cannot be reached."""
+        """Accept a goal for execute_task, or reject an unreachable one."""
         return GoalResponse.ACCEPT if goal.task_name else GoalResponse.REJECT
 
     def begin_execute_task_goal(self, goal_handle: ServerGoalHandle) -> None:
@@ -64,7 +64,7 @@ class ExecuteTaskServer(Node):
         self,
         goal_handle: ServerGoalHandle,
     ) -> ExecuteTask.Result:
-        """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
+        """Execute a goal step by step, until it succeeds, is cancelled or is aborted."""
         goal: ExecuteTask.Goal = goal_handle.request
         result = ExecuteTask.Result(
             success=False,

@@ -15,7 +15,7 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
-#: How many seconds to wait for something to happen.
+#: Seconds to wait for an event.
 PATIENCE = 20.0
 
 
@@ -60,7 +60,7 @@ class Running:
             rclpy.spin_once(self._observer, timeout_sec=0.05)
 
     def leave(self) -> None:
-        """Terminate the node; one that is killed stays visible to others for a while."""
+        """Terminate the node; others would see a killed node for some time."""
         self.process.terminate()
         try:
             self.process.wait(timeout=5)

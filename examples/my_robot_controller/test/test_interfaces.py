@@ -1,4 +1,4 @@
-"""The interfaces of my_robot_controller are valid, and what idlc made of them is current."""
+"""The interfaces of my_robot_controller are valid, and their generated code is up to date."""
 
 from pathlib import Path
 import subprocess
@@ -7,12 +7,12 @@ import sys
 import pytest
 
 PACKAGE = Path(__file__).parents[1]
-REASON = 'idlc is not installed: the classes are used as they were committed'
+REASON = 'idlc is not installed, so nothing can check the committed classes'
 pytest.importorskip('idlc', reason=REASON)
 
 
 def succeeds(*words: str) -> None:
-    """Run idlc in the package; fail with its report if it finds anything wrong."""
+    """Run idlc in the package; fail with its report if it reports an error."""
     done = subprocess.run(
         [sys.executable, '-m', 'idlc', *words],
         cwd=PACKAGE,
@@ -28,11 +28,11 @@ def succeeds(*words: str) -> None:
 
 @pytest.mark.linter
 def test_the_interfaces_are_valid() -> None:
-    """`idlc check` finds no error; `idlc explain` knows every code that it names."""
+    """`idlc check` reports no errors; `idlc explain CODE` explains a code."""
     succeeds('check', '.')
 
 
 @pytest.mark.linter
 def test_the_classes_are_current() -> None:
-    """`idlc gen` would write what is there; if not, run it and commit what it writes."""
+    """The generated code is up to date; if not, run `idlc gen` and commit the result."""
     succeeds('gen', '--check')

@@ -17,7 +17,7 @@ FILES = [
 @pytest.mark.flake8
 @pytest.mark.linter
 def test_flake8() -> None:
-    """No line is one that ament_flake8 objects to."""
+    """ament_flake8 reports no problems."""
     pytest.importorskip('ament_flake8.main')
     # in a process of its own: flake8 forks, which rclpy's threads do not survive
     program = 'import sys; from ament_flake8.main import main; sys.exit(main(sys.argv[1:]))'
@@ -30,6 +30,6 @@ def test_flake8() -> None:
 @pytest.mark.linter
 @pytest.mark.pep257
 def test_pep257() -> None:
-    """No docstring is one that ament_pep257 objects to."""
+    """ament_pep257 reports no problems."""
     pep257 = pytest.importorskip('ament_pep257.main')
     assert pep257.main(argv=FILES) == 0

@@ -58,6 +58,8 @@ def _to_dict(message: Any, structure: Structure) -> dict[str, Any]:
 def _plain(value: Any, field: FieldInfo) -> Any:
     if field.nested:
         return _to_dict(value, field.nested)
+    if isinstance(value, int) and not isinstance(value, bool):
+        return int(value)  # what YAML knows, of a member of an enum
     is_byte = field.primitive is not None and field.primitive.code == "c"
     return value[0] if is_byte and isinstance(value, bytes) else value
 

@@ -175,8 +175,8 @@ class importing:
         raise MissingPackageError(
             f"this message needs {package}, which cannot be imported ({error}). "
             f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
-            f"{package.replace('_', '-')}), or let those who generate this code run "
-            f"`idlc gen` with --vendor-deps: then it comes with what it needs.",
+            f"{package.replace('_', '-')}), or generate this code "
+            f"again with `idlc gen --vendor-deps`, which copies the types that it needs.",
             name=error.name,
             path=error.path,
         ) from error

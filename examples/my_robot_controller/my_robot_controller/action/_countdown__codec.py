@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def countdown_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Countdown_Goal in one byte order."""
+    """Return the functions that write and read Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_countdown_goal = _idlc.maker(kind, 0x2d0dd675)
@@ -38,7 +38,7 @@ def countdown_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc
 
 
 def countdown_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Countdown_Result in one byte order."""
+    """Return the functions that write and read Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4si?").pack
@@ -66,7 +66,7 @@ def countdown_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _id
 
 
 def countdown_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Countdown_Feedback in one byte order."""
+    """Return the functions that write and read Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_countdown_feedback = _idlc.maker(kind, 0x3d9ecb22)
@@ -89,7 +89,7 @@ def countdown_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _
 
 
 def countdown_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Countdown_SendGoal_Request in one byte order."""
+    """Return the functions that write and read Countdown_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._countdown import Countdown_Goal
 
@@ -133,7 +133,7 @@ def countdown_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Read
 
 
 def countdown_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Countdown_GetResult_Response in one byte order."""
+    """Return the functions that write and read Countdown_GetResult_Response in one byte order."""
     from ._countdown import Countdown_Result
 
     encapsulation = _idlc.HEADERS[order]
@@ -169,7 +169,7 @@ def countdown_get_result_response_codec(kind: Any, order: str, reading: _idlc.Re
 
 
 def countdown_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Countdown_FeedbackMessage in one byte order."""
+    """Return the functions that write and read Countdown_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._countdown import Countdown_Feedback
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def execute_task_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads ExecuteTask_Goal in one byte order."""
+    """Return the functions that write and read ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_goal = _idlc.maker(kind, 0x9ddd0061)
@@ -49,7 +49,7 @@ def execute_task_goal_codec(kind: Any, order: str, reading: _idlc.Reading) -> _i
 
 
 def execute_task_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads ExecuteTask_Result in one byte order."""
+    """Return the functions that write and read ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack
@@ -73,7 +73,7 @@ def execute_task_result_codec(kind: Any, order: str, reading: _idlc.Reading) -> 
 
 
 def execute_task_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads ExecuteTask_Feedback in one byte order."""
+    """Return the functions that write and read ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_feedback = _idlc.maker(kind, 0x6625b17a)
@@ -104,7 +104,7 @@ def execute_task_feedback_codec(kind: Any, order: str, reading: _idlc.Reading) -
 
 
 def execute_task_send_goal_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads ExecuteTask_SendGoal_Request in one byte order."""
+    """Return the functions that write and read ExecuteTask_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
     from ._execute_task import ExecuteTask_Goal
 
@@ -156,7 +156,7 @@ def execute_task_send_goal_request_codec(kind: Any, order: str, reading: _idlc.R
 
 
 def execute_task_get_result_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads ExecuteTask_GetResult_Response in one byte order."""
+    """Return the functions that write and read ExecuteTask_GetResult_Response in one byte order."""
     from ._execute_task import ExecuteTask_Result
 
     encapsulation = _idlc.HEADERS[order]
@@ -190,7 +190,7 @@ def execute_task_get_result_response_codec(kind: Any, order: str, reading: _idlc
 
 
 def execute_task_feedback_message_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads ExecuteTask_FeedbackMessage in one byte order."""
+    """Return the functions that write and read ExecuteTask_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
     from ._execute_task import ExecuteTask_Feedback
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def robot_command_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads RobotCommand in one byte order."""
+    """Return the functions that write and read RobotCommand in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*ff", align=4)
     write_text = _idlc.Texts(order, "I*")

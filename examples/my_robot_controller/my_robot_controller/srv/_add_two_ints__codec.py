@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def add_two_ints_request_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads AddTwoInts_Request in one byte order."""
+    """Return the functions that write and read AddTwoInts_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sqq").pack
     new_add_two_ints_request = _idlc.maker(kind, 0x3ccd4833)
@@ -40,7 +40,7 @@ def add_two_ints_request_codec(kind: Any, order: str, reading: _idlc.Reading) ->
 
 
 def add_two_ints_response_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads AddTwoInts_Response in one byte order."""
+    """Return the functions that write and read AddTwoInts_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sq").pack
     new_add_two_ints_response = _idlc.maker(kind, 0x7e0fc315)
