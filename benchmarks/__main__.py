@@ -38,10 +38,10 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--list", action="store_true", help="only name the rows")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the run here")
     parser.add_argument(
-        "--keep", action="store_true", help="make this the run that README.md and docs tell of"
+        "--keep", action="store_true", help="make this the run that the documents show"
     )
     parser.add_argument(
-        "--documents", action="store_true", help="only write README.md and docs from the kept run"
+        "--documents", action="store_true", help="only write the documents from the kept run"
     )
     found = parser.parse_args(words)
     if found.quick:

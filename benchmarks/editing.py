@@ -27,7 +27,7 @@ TIMES = 200
 
 def rows(work: Work) -> Iterator[Row]:
     start = Goal(at_most=3, than="bare interpreter")
-    yield Row("editor", "start, until it can be asked", partial(starting, work), start, rounds=15)
+    yield Row("editor", "start, until ready to answer", partial(starting, work), start, rounds=15)
     second = Goal(at_most=1)
     yield Row("editor", "open 1,000 files", partial(opening, work), second, rounds=5)
     change = Goal(at_most=0.02)

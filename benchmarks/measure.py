@@ -49,7 +49,7 @@ class Row:
 
 
 class Result(NamedTuple):
-    """What was measured of a row."""
+    """The measurements of a row."""
 
     group: str
     name: str

@@ -81,7 +81,7 @@ def mcap_schema(name: str) -> str:
 
 
 class Implementation:
-    """What the rows ask for; what an implementation does not have is left out of the row."""
+    """The operations that rows measure; rows skip implementations without the operation."""
 
     def message(self, row: str, raw: bytes) -> object | None:
         """Return the row's message, made of this implementation's classes."""
@@ -97,7 +97,7 @@ class Implementation:
 
 
 class Idlc(Implementation):
-    """What idlc generates of the catalogue."""
+    """The packages that idlc generates from the catalogue."""
 
     def __init__(self, generated: Path) -> None:
         sys.path.insert(0, str(generated))

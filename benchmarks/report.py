@@ -1,7 +1,7 @@
-"""How results are shown: in the terminal, in README.md and in docs."""
+"""Results as lines for the terminal and as tables for docs/."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from benchmarks import recordings
@@ -9,9 +9,6 @@ from benchmarks.measure import IDLC, Result
 from benchmarks.results import REFERENCES, Run, standing
 
 ROOT = Path(__file__).resolve().parents[1]
-#: The groups that README.md shows, one column each, and the messages, one row each.
-COLUMNS = ("serialize", "deserialize", "construct", "compare")
-ROWS = ("String", "PoseStamped", "JointState(20)", "Image(640x480x3)")
 
 
 def amount(seconds: float) -> str:
@@ -23,96 +20,87 @@ def amount(seconds: float) -> str:
 
 
 def head(run: Run) -> str:
-    known = ", ".join(f"{who} {version}" for who, version in run.versions.items())
-    return f"{run.python}, {run.machine}; {known}"
+    versions = ", ".join(f"{library} {version}" for library, version in run.versions.items())
+    return f"{run.python}, {run.machine}; {versions}"
 
 
 def line(result: Result) -> str:
     """Return a line of the terminal's table."""
-    found = standing(result)
+    rank = standing(result)
     mine = result.times[IDLC]
-    ratio = f"{found.ratio:6.2f}x {found.peer}" if found.peer else ""
+    ratio = f"{rank.ratio:6.2f}x {rank.peer}" if rank.peer else ""
     others = "; ".join(
         f"{who} {amount(times.median)}" for who, times in result.times.items() if who != IDLC
     )
     spread = f"{amount(mine.low)} to {amount(mine.high)}"
     return (
-        f"{found.verdict:4} {result.group + ': ' + result.name:37} {amount(mine.median):>8} "
-        f"({spread:20}) {ratio:23} {found.said:35} | {others}"
+        f"{rank.verdict:4} {result.group + ': ' + result.name:37} {amount(mine.median):>8} "
+        f"({spread:20}) {ratio:23} {rank.said:35} | {others}"
     ).rstrip()
 
 
 def summary(run: Run) -> str:
-    verdicts = [standing(one).verdict for one in run.results]
-    return f"{verdicts.count('ok')} goals are reached, {verdicts.count('MISS')} are missed"
+    verdicts = [standing(result).verdict for result in run.results]
+    return f"{verdicts.count('ok')} goals reached, {verdicts.count('MISS')} missed"
 
 
 # generated parts of documents
 
 
-def readme_table(run: Run) -> Iterator[str]:
-    """Yield one line per message: idlc's time, and how many times the fastest peer's it is."""
-    found = {(one.group, one.name): one for one in run.results}
-    yield "| | " + " | ".join(COLUMNS) + " |"
-    yield "|---|" + "---:|" * len(COLUMNS)
-    for name in ROWS:
-        cells = [cell(found.get((column, name))) for column in COLUMNS]
-        yield f"| {name} | " + " | ".join(cells) + " |"
-
-
-def cell(result: Result | None) -> str:
-    if result is None:
-        return ""
-    found = standing(result)
-    ratio = f", **{found.ratio:.1f}×**" if found.ratio else ""
-    return amount(result.times[IDLC].median) + ratio
-
-
-def readme_part(run: Run) -> str:
-    return "\n".join([*readme_table(run), "", head(run) + "."])
-
-
 def full_table(run: Run) -> str:
-    """Return every row but those of recordings, and how many times idlc's time others take."""
-    found = [one for one in run.results if not of_recordings(one)]
-    return table(found, REFERENCES, run)
+    """Return the tables of all rows except those about recordings."""
+    results = [result for result in run.results if not of_recordings(result)]
+    return tables(results, REFERENCES, run)
 
 
 def recordings_table(run: Run) -> str:
-    """Return the rows of recordings, what nobody can do without among the others."""
-    return table(filter(of_recordings, run.results), (), run)
+    """Return the tables about recordings, with columns for copying and decompression."""
+    return tables(filter(of_recordings, run.results), (), run)
 
 
 def of_recordings(result: Result) -> bool:
     return result.group.startswith(recordings.GROUP)
 
 
-def table(found: Iterable[Result], left_out: Collection[str], run: Run) -> str:
-    """Return rows, with every implementation's time and how many times idlc's that is."""
-    found = list(found)
-    used = dict.fromkeys(who for one in found for who in one.times)
+def tables(results: Iterable[Result], left_out: Collection[str], run: Run) -> str:
+    """Return a table for each group; each cell is a multiple of idlc's time."""
+    groups: dict[str, list[Result]] = {}
+    for result in results:
+        groups.setdefault(result.group, []).append(result)
+    parts = [table(group, rows, left_out) for group, rows in groups.items()]
+    return "\n\n".join([*parts, head(run) + "."])
+
+
+def table(group: str, rows: Iterable[Result], left_out: Collection[str]) -> str:
+    rows = list(rows)
+    used = dict.fromkeys(who for row in rows for who in row.times)
     peers = [who for who in used if who not in (IDLC, *left_out)]
     lines = [
-        f"| | idlc | quartiles | {' | '.join(peers)} | goal | |",
-        "|---|---:|---:|" + "---:|" * len(peers) + "---|---|",
+        f"| {' | '.join([group, 'idlc (quartiles)', *peers, 'goal'])} |",
+        f"|---|{'---:|' * (len(peers) + 1)}---|",
     ]
-    for one in found:
-        mine, said = one.times[IDLC], standing(one)
-        cells = [
-            f"{amount(one.times[who].median)}, {one.times[who].median / mine.median:.1f}×"
-            if who in one.times
-            else ""
-            for who in peers
+    for row in rows:
+        mine = row.times[IDLC]
+        _, _, verdict, goal = standing(row)
+        low, high = amount(mine.low), amount(mine.high)
+        unit = amount(mine.median).split()[1]
+        if unit == low.split()[1] == high.split()[1]:
+            low, high = low.split()[0], high.split()[0]
+        factors = [
+            factor(row.times[who].median / mine.median) if who in row.times else "" for who in peers
         ]
-        spread = f"{amount(mine.low)} to {amount(mine.high)}"
-        words = [f"{one.group} {one.name}", amount(mine.median), spread, *cells]
-        lines.append("| " + " | ".join([*words, said.said, said.verdict]) + " |")
-    return "\n".join([*lines, "", head(run) + "."])
+        missed = ", MISS" * (verdict == "MISS")
+        cells = [row.name, f"{amount(mine.median)} ({low}–{high})", *factors, goal + missed]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
 
 
-#: A document, and what stands in it between `<!-- benchmarks -->` and `<!-- end -->`.
+def factor(ratio: float) -> str:
+    return f"{ratio:.1f}×" if ratio >= 0.1 else f"{ratio:.2f}×"
+
+
+#: Each document, and the function for its text between `<!-- benchmarks -->` and `<!-- end -->`.
 PARTS = {
-    ROOT / "README.md": readme_part,
     ROOT / "docs" / "performance.md": full_table,
     ROOT / "docs" / "recorded-data.md": recordings_table,
 }
@@ -120,7 +108,7 @@ PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
 def written(path: Path, run: Run) -> str:
-    """Return the text of a document with its generated part made anew."""
+    """Return the text of a document with its generated part replaced."""
     text, count = PART.subn(lambda _: PARTS[path](run) + "\n", path.read_text(encoding="utf-8"))
     assert count == 1, path
     return text

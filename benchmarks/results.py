@@ -12,7 +12,7 @@ import idlc
 from benchmarks.measure import IDLC, Goal, Result, Times
 from benchmarks.peers import versions
 
-#: The run that README.md and docs/performance.md tell of.
+#: The run that the documents show.
 KEPT = Path(__file__).with_name("results.json")
 #: Candidates that compete with nobody.
 REFERENCES = {
@@ -82,12 +82,12 @@ def judge(result: Result, mine: float, ratio: float | None) -> tuple[str, str]:
     if goal.times is not None:
         if ratio is None:
             return "", "no peer is here"
-        return ("ok" if ratio >= goal.times else "MISS"), f"at least {goal.times:g}x"
+        return ("ok" if ratio >= goal.times else "MISS"), f"≥ {goal.times:g}×"
     if goal.than is None:
-        return ("ok" if mine <= goal.at_most else "MISS"), f"at most {goal.at_most * 1e3:g} ms"
+        return ("ok" if mine <= goal.at_most else "MISS"), f"≤ {goal.at_most * 1e3:g} ms"
     reached = mine / result.times[goal.than].median
     verdict = "ok" if reached <= goal.at_most else "MISS"
-    return verdict, f"{reached:.2f} of {goal.than}, at most {goal.at_most:g}"
+    return verdict, f"{reached:.2f} of {goal.than}, ≤ {goal.at_most:g}"
 
 
 def save(run: Run, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the groups of rows share: generated packages, and each implementation's messages."""
+"""Input shared by groups of rows: generated packages, and each implementation's messages."""
 
 import shutil
 from functools import cached_property, lru_cache

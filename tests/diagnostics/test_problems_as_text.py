@@ -48,6 +48,13 @@ def test_the_caret_stands_under_the_span(text, start, end, line, caret):
     assert block[-1] == "  = hint: do this"
 
 
+def test_carets_have_the_colour_of_their_level():
+    span = Span(Source("a.msg", "flot64 a"), 0, 6)
+    for code, colour in ((codes.UNKNOWN_TYPE, "1;31"), (codes.WIDE_STRING, "1;33")):
+        (block,) = terminal.text([code.at(span, "wrong")], colour=True)
+        assert f"\x1b[{colour}m^^^^^^\x1b[0m" in block
+
+
 def test_labels_in_the_same_file_and_in_another():
     source, other = (
         Source("a.msg", "".join(f"int8 f{n}\n" for n in range(12))),

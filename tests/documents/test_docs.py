@@ -100,6 +100,18 @@ def test_a_page_says_what_there_is_to_say(site, capsys):
     assert "Empty." in read(site, "demo/action-Go.html")
 
 
+def test_what_is_deprecated_is_struck_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write("demo/msg/Old.msg", "uint8 A=1  # deprecated: <b>\nuint8 b  # deprecated:\nuint8 c\n")
+    assert main(["docs", "demo", "-o", "site"]) == 0
+    text = read(Path("site"), "demo/msg-Old.html")
+    assert re.findall(r'<code id="\w+">(.*?)</code>', text) == ["<s>A</s>", "<s>b</s>", "c"]
+    capsys.readouterr()
+    assert main(["show", "demo/msg/Old.msg", "--format", "jsonschema"]) == 0
+    fields = json.loads(capsys.readouterr().out)["properties"]
+    assert [name for name in fields if fields[name].get("deprecated")] == ["b"]
+
+
 def test_text_of_files_stays_text(site):
     for path in site.rglob("*.html"):
         page = Page(read(site, path))
@@ -152,7 +164,7 @@ def test_several_packages_have_a_page_each(tmp_path, monkeypatch, capsys):
         fields = f"part{(number + 1) % 10}_msgs/Thing{(number + 1) % 500} next\n" * (number % 2)
         write(f"src/{package}/msg/Thing{number}.msg", f"# A thing.\n\nint8 a  # [m]\n{fields}")
     assert main(["docs", "src", "-o", "site"]) == 0
-    assert capsys.readouterr().out.startswith("511 pages in site")
+    assert capsys.readouterr().out.startswith("511 pages written")
     site = Path("site")
     front = Page(read(site, "index.html"))
     assert "part3_msgs/index.html" in front.links
@@ -225,7 +237,9 @@ def test_what_has_errors_is_left_out_and_the_rest_written(site, capsys):
     assert main(["docs", "demo", "-o", "elsewhere"]) == 1
     said = capsys.readouterr().err
     assert "[IDL201]" in said
-    assert "left out, because of errors: `demo/msg/Uses`, `demo/msg/Wrong`" in said
+    assert (
+        "idlc skipped these interfaces because of errors: `demo/msg/Uses`, `demo/msg/Wrong`" in said
+    )
     pages = {path.name for path in Path("elsewhere").rglob("*.html")}
     assert pages == {path.name for path in site.rglob("*.html")}
 

@@ -135,11 +135,23 @@ def test_a_dependency_is_declared_in_its_own_file(opened):
     assert "<depend>std_msgs</depend>" in applied(edits["package.xml"], FILES["package.xml"])
 
 
+def test_a_new_file_is_added_to_cmake(opened):
+    one, _, open_ = opened
+    uri = open_("bool new\n", "msg/Fresh.msg")
+    (problem,) = [each for each in one.pull(uri) if each.code == "IDL464"]
+    assert "does not pass `msg/Fresh.msg` to `rosidl_generate_interfaces`" in problem.message
+    found = actions(one, uri, between(0, 0, 1))
+    edits = edits_of(found["Add `msg/Fresh.msg` to the files in this call"].edit)
+    assert applied(edits["CMakeLists.txt"], FILES["CMakeLists.txt"]) == (
+        'rosidl_generate_interfaces(demo "msg/Wheel.msg" "msg/Drive.msg" "msg/Fresh.msg")\n'
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("wstring x\n", "wstring x  # idlc: ignore(IDL421) TODO: say why\n"),
-        ("wstring x  # text\n", "wstring x  # text idlc: ignore(IDL421) TODO: say why\n"),
+        ("wstring x\n", "wstring x  # idlc: ignore(IDL421) TODO: reason\n"),
+        ("wstring x  # text\n", "wstring x  # text idlc: ignore(IDL421) TODO: reason\n"),
         (
             "wstring<=3[] x  # idlc: ignore(IDL423) it is so\n",
             "wstring<=3[] x  # idlc: ignore(IDL423, IDL421) it is so\n",
@@ -224,9 +236,9 @@ def test_an_interface_is_renamed_with_its_file_and_users(opened):
 @pytest.mark.parametrize(
     ("line", "character", "new", "why"),
     [
-        (2, 9, "Speed", "cannot be such a name"),
+        (2, 9, "Speed", "is not a valid name"),
         (2, 9, "mode", "already"),
-        (0, 7, "fast", "cannot be such a name"),
+        (0, 7, "fast", "is not a valid name"),
     ],
 )
 def test_names_that_cannot_be_are_refused(opened, line, character, new, why):

@@ -126,6 +126,13 @@ def test_a_constant_is_written_as_its_value(typing):
     assert "OTHER" not in typing("uint8 OTHER=3\n---\nuint8 mode |", "srv/Stop.srv")
 
 
+def test_deprecated_constants_are_marked(typing):
+    text = "uint8 FAST=2\nuint8 QUICK=2  # Deprecated: use FAST\nuint8 mode |"
+    items = typing(text)
+    assert items["QUICK"].tags == (lsp.CompletionItemTag.Deprecated,)
+    assert items["FAST"].tags is None
+
+
 def test_a_type_comes_with_its_definition(typing):
     items = typing("std_msgs/He|")
     answer = typing.editor.ask(lsp.COMPLETION_ITEM_RESOLVE, items["std_msgs/Header"])

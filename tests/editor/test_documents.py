@@ -175,7 +175,7 @@ def test_settings_of_the_editor_count(opened):
     assert one.pull(uri) == []
     settle(one, {"idlc": {"ignore": 3}})
     assert one.pull(uri) == []  # a mistake changes nothing
-    assert "settings of idlc are not used" in one.told[-1]
+    assert "invalid settings for idlc" in one.told[-1]
     settle(one, {"idlc": {}})
     assert codes(one.pull(uri)) == ["IDL405"]
 

@@ -88,7 +88,7 @@ def test_an_error_is_told_and_changes_nothing(opened):
 def test_without_settings_it_goes_where_it_is(opened, monkeypatch, capsys):
     one, folder, uri = opened
     assert offered(one, uri) == []
-    with pytest.raises(JsonRpcException, match="does not say where"):
+    with pytest.raises(JsonRpcException, match="set `out` in "):
         update(one, uri)
     monkeypatch.chdir(folder)
     main(["gen", ".", "-o", "demo"])

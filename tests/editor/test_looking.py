@@ -156,6 +156,14 @@ def test_a_range_in_brackets_is_called_one(opened):
         assert f"unit: `{text}`" in hover(opened, 0, 6)[0]
 
 
+def test_hover_marks_what_is_deprecated(opened):
+    one, uri, _ = opened
+    one.change(uri, "float64 x  # [m] deprecated: use y\nfloat64 y  # is not deprecated: x is\n")
+    shown, _ = hover(opened, 0, 8)
+    assert "**Deprecated**\n\ndeprecated: use y" in shown
+    assert "**Deprecated**" not in hover(opened, 1, 8)[0]
+
+
 def test_a_definition_is_found_where_it_is(opened):
     one, uri, folder = opened
     for method in (lsp.TEXT_DOCUMENT_DEFINITION, lsp.TEXT_DOCUMENT_TYPE_DEFINITION):

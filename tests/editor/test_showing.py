@@ -88,7 +88,7 @@ def test_lenses_say_hash_users_and_what_changes_break(server):
     type_hash, users, breaks = lenses(one, uri)
     assert type_hash.startswith("RIHS01_")
     assert users == "1 use"
-    assert breaks == "breaks nothing against git:HEAD"
+    assert breaks == "no breaking changes against git:HEAD"
     one.change(uri, "uint8 side\nfloat32 radius\n")
     assert lenses(one, uri)[2] == "breaks: wire, hash, source for 1 user against git:HEAD"
     one.change(uri, "uint8 side\nfloat33 radius\n")
@@ -223,7 +223,7 @@ def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
     one = editor(folder, capabilities=WATCHES)
     asked = one.answer_all()
     uri, old = (one.open(folder / f"msg/{name}.msg", "int16 x\n") for name in ("New", "Old"))
-    assert lenses(one, old)[2] == "breaks nothing against git:HEAD"
+    assert lenses(one, old)[2] == "no breaking changes against git:HEAD"
     assert lenses(one, uri)[2] == "breaks: wire, hash, source for 0 users against git:HEAD"
     (folder / "msg/New.msg").write_text("int16 x\n")
     git(folder, "commit", "-aqm", "second")
@@ -231,7 +231,7 @@ def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
     while lsp.WORKSPACE_CODE_LENS_REFRESH not in [method for method, _ in asked]:
         assert time.monotonic() < until
         time.sleep(0.1)
-    assert lenses(one, uri)[2] == "breaks nothing against git:HEAD"
+    assert lenses(one, uri)[2] == "no breaking changes against git:HEAD"
 
 
 def test_what_cannot_be_compared_is_said(editor, package):

@@ -96,6 +96,21 @@
 (push (cons "language" (symbol-name major-mode)) seen)
 (apply #'eglot--connect (eglot--guess-contact))
 
+(defun faces (text)
+  "Return the parts of a TEXT that have a face, each with its face."
+  (with-temp-buffer
+    (insert text)
+    (delay-mode-hooks (rosmsg-mode))
+    (font-lock-ensure)
+    (let ((start (point-min)) parts)
+      (while (< start (point-max))
+        (let ((end (next-single-property-change start 'face nil (point-max)))
+              (face (get-text-property start 'face)))
+          (when face (push (vector (buffer-substring-no-properties start end) face) parts))
+          (setq start end)))
+      (vconcat (nreverse parts)))))
+
+(look "faces" (faces (getenv "TEXT")))
 (look "diagnostic"
       (open "msg/Broken.msg")
       (vconcat (mapcar (lambda (one)

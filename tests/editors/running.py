@@ -53,12 +53,17 @@ LOOKS = (
 )
 
 
-def neovim(program: object, package: Path, first: str = "msg/Drive.msg", look: str = LOOKS) -> Any:
-    """Return what Neovim with the plugin saw."""
-    plugin = f"set runtimepath+={ROOT / 'editors' / 'neovim'} noswapfile"
+def neovim(
+    program: object,
+    package: Path,
+    first: str = "msg/Drive.msg",
+    look: str = LOOKS,
+    setup: str = f"set runtimepath+={ROOT / 'editors' / 'neovim'}",
+) -> Any:
+    """Return what Neovim saw with the plugin, or after another command."""
     script = f"luafile {HERE / 'neovim.lua'}"
-    words = (program, "--headless", "--clean", "--cmd", plugin, "-c", script)
-    return see(package, *words, FIRST=first, LOOK=look)
+    commands = ("--cmd", "set noswapfile", "--cmd", setup, "-c", script)
+    return see(package, program, "--headless", "--clean", *commands, FIRST=first, LOOK=look)
 
 
 def neovim_renames(program: object, workspace: Path) -> dict[str, Any]:

@@ -2,16 +2,23 @@
 
 import json
 import re
+import sys
 
 import msgspec
 import pytest
+import yaml
 
 from idlc.editor.workspace import Settings
 from idlc.model.ir import PRIMITIVES
 from idlc.model.lower_types import STRINGS
 from idlc.project.find import KINDS
 from idlc.version import __version__
-from tests.support.paths import ROOT
+from tests.support.paths import DOCS, ROOT
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 FOLDER = ROOT / "editors" / "vscode"
 MANIFEST = json.loads((FOLDER / "package.json").read_text(encoding="utf-8"))
@@ -47,6 +54,33 @@ def test_each_command_has_a_function():
     (table,) = re.findall(r"const commands: .*? = \{\n(.*?)\n  \};", text, re.DOTALL)
     names = re.findall(r"^    (\w+): ", table, re.MULTILINE)
     assert [one["command"] for one in CONTRIBUTED["commands"]] == [f"idlc.{name}" for name in names]
+
+
+def test_helix():
+    """Helix is not in Debian: its documentation has the keys."""
+    text = (ROOT / "editors/helix/languages.toml").read_text(encoding="utf-8")
+    assert f"```toml\n{text}```\n" in (DOCS / "editors.md").read_text(encoding="utf-8")
+    entry = tomllib.loads(text)
+    (language,) = entry["language"]
+    assert set(language["file-types"]) == {kind.removeprefix(".") for kind in KINDS}
+    assert language["name"] == "rosmsg"
+    assert language["language-servers"] == list(entry["language-server"]) == ["idlc"]
+    assert entry["language-server"]["idlc"] == {"command": "rosidlc", "args": ["lsp"]}
+
+
+def test_mason():
+    """Its schema has these keys."""
+    entry = yaml.safe_load((ROOT / "editors/mason/package.yaml").read_text(encoding="utf-8"))
+    assert entry["name"] == entry["neovim"]["lspconfig"] == "idlc"
+    assert entry["source"] == {"id": f"pkg:pypi/idlc@{__version__}"}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert entry["bin"].keys() <= project["scripts"].keys()
+    assert entry["licenses"] == [project["license"]]
+
+
+def test_emacs_has_the_version():
+    text = (ROOT / "editors/emacs/rosmsg-mode.el").read_text(encoding="utf-8")
+    assert f"\n;; Version: {__version__}\n" in text
 
 
 @pytest.mark.parametrize(

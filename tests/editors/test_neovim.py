@@ -1,10 +1,13 @@
 """What people see most, in the Neovim of a wheel with the plugin in editors/neovim."""
 
+import re
+import shutil
 from importlib.metadata import files
 
 import pytest
 
 from tests.editors import running, scenario
+from tests.support.paths import ROOT
 
 
 @pytest.fixture
@@ -28,3 +31,20 @@ def test_neovim(program, package):
     assert seen["built_in"]["language"] == seen["language"] == "rosmsg"
     assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
     assert "builtin_interfaces/Time stamp" in seen["tag"]
+
+
+@pytest.mark.ros
+def test_neovim_with_the_entry_for_lspconfig(program, package):
+    """Without the plugin: the file to send, and the line in its description."""
+    entry = ROOT / "editors/neovim/lsp/idlc.lua"
+    (line,) = re.findall(r"(?m)^--- (vim\.filetype\..*)$", entry.read_text(encoding="utf-8"))
+    (package.parent / "lsp").mkdir()
+    shutil.copy(entry, package.parent / "lsp")
+    setup = package.parent / "init.lua"
+    config = f"vim.opt.runtimepath:append('{package.parent}')\n{line}\nvim.lsp.enable('idlc')\n"
+    setup.write_text(config, encoding="utf-8")
+    looks = "diagnostic hover definition built_in completion rename"
+    seen = running.neovim(program, package, look=looks, setup=f"luafile {setup}")
+    known = {name: scenario.EXPECTED[name] for name in looks.split() if name != "built_in"}
+    assert scenario.normal(seen) == known
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]

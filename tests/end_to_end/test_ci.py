@@ -128,7 +128,7 @@ def test_the_action_is_content_with_a_good_pull_request(pull_request, here):
     assert (done.returncode, done.stderr) == (0, "1 file already formatted\n")
     token, again, notice = done.stdout.splitlines()
     assert token.removeprefix("::stop-commands") == again[:-2]
-    assert notice.startswith("::notice title=idlc breaking::nothing breaks")
+    assert notice.startswith("::notice title=idlc breaking::no breaking changes")
     assert [one["results"] for one in runs_of((here / "idlc.sarif").read_text())] == [[], []]
     assert (here / "output").read_text() == "sarif=idlc.sarif\n"
 
@@ -145,7 +145,7 @@ def test_the_action_annotates_what_is_wrong_and_what_breaks(pull_request, here):
     assert "title=IDL507 field-type-changed::field `speed`" in done.stdout
     annotation = next(line for line in done.stdout.splitlines() if "IDL507" in line)
     assert "%0Abreaks: wire, hash" in annotation
-    assert "::notice title=idlc breaking::breaks: 1 wire, 1 hash" in done.stdout
+    assert "::notice title=idlc breaking::1 breaking change (1 wire, 1 hash" in done.stdout
     check, breaking = runs_of((here / "idlc.sarif").read_text())
     assert [one["ruleId"] for one in check["results"]] == ["IDL421"]
     assert [one["ruleId"] for one in breaking["results"]] == ["IDL507"]
@@ -260,6 +260,6 @@ def test_the_pytest_plugin():
     assert done.returncode == 1
     assert "1 failed, 2 passed, 1 warning" in done.stdout
     assert "error[IDL201]: unknown type `flot64`" in done.stdout
-    assert "IDL421: middlewares" in done.stdout
+    assert "IDL421: the encoding of a wstring" in done.stdout
     assert "Traceback" not in done.stdout
     assert "2 failed, 1 passed" in run_pytest("--idlc-strict", "demo").stdout

@@ -47,7 +47,7 @@ def repository(tmp_path_factory):
     clone(home)
     folder = home / "team"
     folder.mkdir()
-    shell(f"git init -q -b main .\n{block('has idlc yet', 'sh')}", folder)
+    shell(f"git init -q -b main .\n{block('is not published yet', 'sh')}", folder)
     write(folder / "src/demo/msg/Drive.msg", "float64 speed  # [m/s]\n")
     write(folder / "pyproject.toml", '[tool.idlc]\npaths = ["src/demo"]\nout = "demo"\n')
     git("add", "--all", cwd=folder, home=home)

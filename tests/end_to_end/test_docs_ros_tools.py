@@ -26,7 +26,7 @@ def rows(text, heading):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
 
 
-TABLE = rows(TOOLS, "| tool | works | how it is known | command |")
+TABLE = rows(TOOLS, "| tool | works | evidence | command |")
 
 
 def blocks(text, language):

@@ -73,7 +73,7 @@ def test_a_package_is_compiled_where_setup_py_takes_it_from(files, home):
 def test_other_folders_need_a_place(capsys):
     write_all({"loose/msg/A.msg": "bool a\n"})
     assert main(["gen", "loose"]) == 2
-    assert "give -o OUT" in capsys.readouterr().err
+    assert "missing -o OUT" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("place", ["ws/bot", "ws"])

@@ -148,6 +148,17 @@ def test_many_files_are_one_run(tidy):
     assert said.count("[IDL453]") == 1, said
 
 
+@pytest.mark.parametrize("name", ["package.xml", "CMakeLists.txt"])
+def test_a_file_that_describes_a_package_is_checked_with_it(name, tidy):
+    tidy.write("other/package.xml", '<package format="3">\n  <name>demo</name>\n</package>\n')
+    tidy.write("other/CMakeLists.txt", "rosidl_generate_interfaces(demo msg/Wheel.msg)\n")
+    tidy.write("other/msg/Drive.msg", TIDY)
+    _, said = tidy.run("run", "idlc-check", "--verbose", "--files", f"other/{name}")
+    assert results(said) == {"idlc check": "Passed"}, said
+    assert "[IDL465]: [*] no such file: `msg/Wheel.msg`" in said
+    assert "idlc gen" not in said
+
+
 def test_one_more_run_is_enough_after_hooks_have_changed_files(tidy):
     """Comments and blanks are part of generated code: it comes after the layout."""
     tidy.write("demo/msg/Drive.msg", LOOSE.replace("[m/s]", "how fast [m/s]"))

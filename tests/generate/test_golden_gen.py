@@ -150,6 +150,8 @@ import numpy as np
 from comments_msgs.action import Fill, Fill_Feedback, Fill_FeedbackMessage, Fill_SendGoal_Request
 from comments_msgs.msg import Gauge
 from comments_msgs.srv import Reset, Reset_Event
+from enums_msgs.msg import Drive
+from enums_msgs.srv import Set
 from layouts_msgs.msg import Everything, Inner
 from lyrical_msgs.msg import Lists, Words
 from names_msgs.msg import Hiding, Odd, Point
@@ -207,6 +209,35 @@ assert_type(lists.words[0].text, str)
 assert_type(lists.raw, list[bytes])
 assert_type(Lists().three, list[Words])
 
+drive = Drive(Drive.Mode.MOVING, drive=Drive.Drive_.LEFT, plan=[Drive.Mode.IDLE, 9])
+assert_type(Drive.deserialize(drive.serialize()).drive, Drive.Drive_ | int)
+assert_type(dataclasses.replace(drive, mode=Drive.Mode.IDLE, previous_mode=7), Drive)
+reply = Set.Response(result=Set.Response.Result.FAILED)
+
+
+def steer(drive: Drive) -> None:
+    drive.previous_mode = drive.mode
+    drive.mode = 9
+    drive.mode = Drive.MODE_IDLE
+    drive.mode = Drive.Mode.MOVING
+    drive.plan.append(Drive.Mode.IDLE)
+
+
+def described(drive: Drive) -> str:
+    assert_type(drive.mode, Drive.Mode | int)
+    if drive.mode == Drive.Mode.IDLE or drive.previous_mode == Drive.MODE_MOVING:
+        return Drive.Mode(drive.mode).name
+    match drive.mode:
+        case Drive.Mode.IDLE:
+            return "idle"
+        case Drive.MODE_MOVING:
+            return "moving"
+        case Drive.Mode.MODE_3D:
+            return "3d"
+        case number:
+            return str(number + 1)
+
+
 request: Reset.Request = Reset.Request(reason="why")
 goal: Fill.Goal = Fill.Goal(1.0)
 assert_type(request.reason, str)
@@ -227,6 +258,7 @@ names = [field.name for field in dataclasses.fields(gauge)]
 MISTAKES = """
 from comments_msgs.action import Fill, Fill_FeedbackMessage
 from comments_msgs.msg import Gauge
+from enums_msgs.msg import Drive
 from lyrical_msgs.msg import Lists, Words
 
 gauge = Gauge("fast")
@@ -242,10 +274,14 @@ Fill_FeedbackMessage(feedback=1)
 Fill_FeedbackMessage().feedback = Fill.Goal()
 Fill.Impl.GetResultService.Response(goal_id=None)
 Fill.Impl.SendGoalService.Response(accepted="yes")
+Drive(mode="idle")
+Drive().mode = None
+Drive.Mode.FLAG
+Drive().mode.name
 """
 
 
-MISTAKEN = set(range(6, 19))
+MISTAKEN = set(range(7, 24))
 
 
 @pytest.fixture(scope="module")
@@ -278,9 +314,66 @@ def test_user_code_and_generated_code_pass_basedpyright(user):
     assert wrong_lines(result.stdout) == MISTAKEN, result.stdout
 
 
-def wrong_lines(output):
-    """Return the numbers of the lines in mistakes.py that a checker complains of."""
-    found = (
-        line.split("mistakes.py:")[1] for line in output.splitlines() if "mistakes.py:" in line
-    )
+USES = """
+import numpy as np
+from array import array
+from enums_msgs.msg import Old
+from enums_msgs.srv import Set
+from geometry_msgs.msg import Point
+from lyrical_msgs.msg import Former, Words
+from numpy.typing import NDArray
+from typing_extensions import assert_type
+
+
+def uses(old: Old) -> None:
+    assert_type(old.velocity, float)
+    assert_type(old.speeds, "array[float]")
+    assert_type(old.three, "NDArray[np.float64]")
+    assert_type(old.names, list[str])
+    assert_type(old.where, Point)
+    assert_type(old.points, list[Point])
+    assert_type(old.int, str)
+    old.velocity = 1
+    old.speeds = range(2)
+    old.three = (1, 2, 3)
+    old.names = ["a"]
+    old.where = Point()
+    old.points = []
+    old.int = "a"
+    Set.Request().kind = 2
+    Former().names = ("a", "b")
+    assert_type(Former().names, list[str])
+    assert_type(Former().count, int)
+    assert_type(Former().one, Words)
+
+
+def others(old: Old) -> Old:
+    old.speed = 2
+    print(old.point, old.serialize(), Former(names=["a"], one=None).kind)
+    return Old(velocity=1, speeds=range(3))
+"""
+
+
+DEPRECATED = set(range(13, 32))
+
+
+@pytest.mark.long
+def test_type_checkers_report_uses_of_deprecated_fields(trees):
+    (trees / "uses.py").write_text(USES, encoding="utf-8")
+    flags = ["--strict", "--cache-dir", trees / ".mypy", "--enable-error-code", "deprecated"]
+    result = run("mypy", *flags, "uses.py", cwd=trees)
+    assert "Old._velocity_.__get__ is deprecated: use speed" in result.stdout
+    assert wrong_lines(result.stdout, "uses.py") == DEPRECATED, result.stdout
+    settings = '{"typeCheckingMode": "standard", "reportDeprecated": "error"}'
+    (trees / "pyrightconfig.json").write_text(settings, encoding="utf-8")
+    code = ["enums_msgs/msg/_old.py", "enums_msgs/srv/_set.py", "lyrical_msgs/msg/_former.py"]
+    result = run("basedpyright", "--pythonpath", sys.executable, "uses.py", *code, cwd=trees)
+    assert wrong_lines(result.stdout, "uses.py") == DEPRECATED, result.stdout
+    assert "_msgs/" not in result.stdout  # its own code uses none of them
+    (trees / "uses.py").unlink()
+
+
+def wrong_lines(output, name="mistakes.py"):
+    """Return the numbers of the lines in a file that a checker complains of."""
+    found = (line.split(f"{name}:")[1] for line in output.splitlines() if f"{name}:" in line)
     return {int(line.split(":")[0]) for line in found}

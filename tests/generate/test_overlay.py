@@ -94,7 +94,7 @@ def test_what_others_wrote_stays(idlc, tmp_path):
     leg = {path: data for path, data in tree(out).items() if "leg" in path}
     status, said = idlc("gen", "arm", "--ament", "out")
     assert status == 0
-    assert "`out/setup.bash` is not idlc's" in said
+    assert "`out/setup.bash` was not written by idlc" in said
     found = tree(out)
     assert not [path for path in found if "wave" in path.lower()]
     assert {path: found[path].decode() for path in mine} == mine
@@ -155,7 +155,7 @@ def test_without_a_library_it_is_not_in_the_index(missing, idlc, tmp_path, monke
         monkeypatch.setattr("idlc.generate.prefix.distribution", lambda _: strange)
     status, said = idlc("gen", "arm", "--ament", "out")
     assert status == 0
-    assert "`arm` is not registered in the index of ROS 2" in said
+    assert "idlc does not add `arm` to ROS 2's index" in said
     assert "zazzy" in said or "Linux on x86_64 and aarch64" in said
     for kind in ("packages", "rosidl_interfaces"):
         assert not (tmp_path / "out" / INDEX / kind / "arm").exists()
@@ -230,7 +230,7 @@ def test_a_full_disk_changes_nothing(machine, versions):
         if found["status"]:
             assert CANNOT_WRITE.id in found["said"]
             left = machine.tree
-            assert left == old or "undoing failed as well" in found["said"]
+            assert left == old or "restoring the old files failed, too" in found["said"]
             for path, data in left.items():
                 known = (old.get(path), new.get(path))
                 assert data in known or path.endswith("idlc.lock")

@@ -81,7 +81,9 @@ def test_what_is_compared(style, against, accepted):
     lines = said.stdout.splitlines()
     if style == "github":
         assert len(lines) > 100
-        assert re.match("::notice title=idlc breaking::breaks: [^:]+$", lines.pop())
+        assert re.match(
+            r"::notice title=idlc breaking::\d+ breaking changes \([^:]+: [^:]+$", lines.pop()
+        )
         assert all(
             re.match(r"::(error|warning|notice) file=\w+/msg/A\d+\.msg,", one) for one in lines
         )

@@ -108,8 +108,10 @@ def test_what_services_and_actions_imply():
         for interface in [model.interfaces[ir.TypeName.parse(f"demo/{name}")]]
         for structure in derive.structures(interface)
     }
-    rows = TEXT.partition("A service `X` and an action `A` imply:")[2].partition("For hashing")[0]
-    rows += TEXT.partition("For hashing alone")[2].partition("Your own fields")[0]
+    rows = TEXT.partition("A service `X` and an action `A` become:")[2].partition(
+        "Only for hashing"
+    )[0]
+    rows += TEXT.partition("Only for hashing")[2].partition("Your own fields")[0]
     told = {
         name: re.findall(r"`(\S+) (\w+)`", cells)
         for names, cells in re.findall(r"^\| (`.*`) \| (.*) \|$", rows, re.MULTILINE)
@@ -136,7 +138,7 @@ def spelled(type_: ir.FieldType) -> str:
 
 def test_the_table_of_reserved_words():
     """idlc's warnings are held to what was compiled by test_spec_cases."""
-    for words, *fails in table("a field called"):
+    for words, *fails in table("a field named"):
         for word in code(words):
             text = f"int32 {word}\nint32 other\n"
             example = language_book.Example("", text, (), "msg")

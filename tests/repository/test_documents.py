@@ -1,12 +1,13 @@
 """The reference documents say what is: commands, settings, the API of generated classes, links.
 
-`IDLC_REFRESH=docs/command-line pytest tests/repository/test_documents.py` writes that page anew,
+`IDLC_REFRESH=docs/command-line pytest tests/repository/test_documents.py` rewrites that page,
 `IDLC_REFRESH=docs/templates` the generated part of docs/contributing/templates.md,
 and fails.
 """
 
 import json
 import re
+import shlex
 import sys
 from functools import partial
 from pathlib import Path
@@ -136,7 +137,7 @@ def test_the_defaults_of_settings():
         value = getattr(Config(root=Root.here()), key.replace("-", "_"))
         assert default == ("false" if value is False else "none")
         assert not value
-    (listed,) = re.findall(r"Only if it is selected idlc gives (.*?)\.\n", SETTINGS, re.DOTALL)
+    (listed,) = re.findall(r"These rules are off by\s+default: (.*?)\.\n", SETTINGS, re.DOTALL)
     assert set(re.findall(r"IDL\d+", listed)) == {
         code.id for code in CODES.values() if not code.default
     }
@@ -156,7 +157,7 @@ def test_the_variables_of_the_environment():
         for name in read.findall(path.read_text(encoding="utf-8"))
         if not path.name.startswith("typesupport")
     }
-    listed = SETTINGS.partition("\n## In the environment\n")[2]
+    listed = SETTINGS.partition("\n## Environment variables\n")[2]
     assert found == set(re.findall(r"`([A-Z_]{3,})`", listed))
 
 
@@ -168,7 +169,7 @@ def generated(tmp_path_factory) -> Path:
     """Return the folder in which the files of docs/generated-api.md were compiled."""
     folder = tmp_path_factory.mktemp("api")
     files = re.findall(r"^```(demo_msgs/\S+)\n(.*?)^```$", API, re.MULTILINE | re.DOTALL)
-    assert len(files) == 3
+    assert len(files) == 4
     for path, text in files:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
@@ -229,6 +230,16 @@ def test_links_lead_somewhere(page):
 def test_the_index_lists_every_page():
     linked = {(DOCS / link.partition("#")[0]).resolve() for link in links(DOCS / "index.md")}
     assert set(DOCS.rglob("*.md")) - {DOCS / "index.md"} <= linked
+
+
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=lambda p: p.name
+)
+def test_commands_can_be_pasted_into_zsh(page):
+    """The shell of macOS reads a comment as arguments: `#` is a word like any other."""
+    text = page.read_text(encoding="utf-8")
+    for block in re.findall(r"^ *```sh\n(.*?)^ *```$", text, re.DOTALL | re.MULTILINE):
+        assert not [word for word in shlex.split(block) if word.startswith("#")], block
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not in a repository")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from maintenance.release import agreement, archives, forms, prepare
+from maintenance.release import agreement, archives, extension, forms, prepare
 from maintenance.release.project import FailedError, Project
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
@@ -96,6 +96,15 @@ def test_documents_take_the_repository_from_one_place(published):
             assert not re.search(r"\.\./idlc|tools/idlc|wheels/|OWNER|someone/(?!idlc)", text), path
     assert f"\n  - repo: {REPOSITORY}\n    rev: v{HERE.version}\n" in published.text("docs/ci.md")
     assert f"uses: someone/idlc@v{HERE.version}\n" in published.text("docs/ci.md")
+    for path in sorted((published.root / "templates/ci").iterdir()):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"\.\./idlc|tools/idlc|wheels/", text), path
+        assert HERE.version in text, path
+    entries = [path for path in published.root.glob("editors/*/*") if path.is_file()]
+    entries += [published.root / "editors/README.md", *published.root.glob("editors/neovim/*/*")]
+    named = [path for path in entries if REPOSITORY in path.read_text("utf-8", "replace")]
+    assert len(named) == 5
+    assert not [path for path in entries if "OWNER" in path.read_text("utf-8", "replace")]
     assert f"\nrepository-code: {REPOSITORY}\n" in published.text("CITATION.cff")
     with pytest.raises(FailedError, match=r"names .* already"):
         prepare.publish_at(published, REPOSITORY)
@@ -112,6 +121,8 @@ def test_the_next_release_is_named_in_the_same_places(published, tmp_path):
     assert project.text("CITATION.cff").count("date-released: 2031-01-02\n") == 1
     assert project.text("docs/ci.md").count("0.10.1") == 4
     assert HERE.version not in project.text("docs/ci.md").replace("0.10.1", "")
+    assert "\n;; Version: 0.10.1\n" in project.text("editors/emacs/rosmsg-mode.el")
+    assert "pkg:pypi/idlc@0.10.1\n" in project.text("editors/mason/package.yaml")
     lock = json.loads(project.text("editors/vscode/package-lock.json"))
     assert lock["version"] == lock["packages"][""]["version"] == "0.10.1"
     manifest = json.loads(project.text("editors/vscode/package.json"))
@@ -218,6 +229,46 @@ def test_a_missing_and_a_superfluous_file_are_noticed(tmp_path):
     fat = made_by_hand(tmp_path, wheel, [*sdist, "tests/x.py"])
     with pytest.raises(FailedError, match=r"a.tar.gz has what nobody needs: tests/x.py"):
         fat.is_complete()
+
+
+VSIX = {
+    "[Content_Types].xml": b"",
+    "extension.vsixmanifest": b"",
+    "extension/package.json": (ROOT / "editors/vscode/package.json").read_bytes(),
+    "extension/icon.png": (ROOT / "editors/vscode/icon.png").read_bytes(),
+    "extension/LICENSE.txt": (ROOT / "LICENSE").read_bytes(),
+    "extension/readme.md": b"",
+    "extension/language-configuration.json": b"{}",
+    "extension/syntaxes/rosmsg.tmLanguage.json": b"{}",
+    "extension/dist/extension.js": b"",
+    "extension/dist/licenses.txt": b"vscode-languageclient 11.0.0",
+}
+
+
+@pytest.mark.parametrize(
+    ("path", "content", "message"),
+    [
+        ("extension/readme.md", None, "too few or too many files: extension/readme.md"),
+        ("extension/node_modules/x.js", b"", "too many files: extension/node_modules/x.js"),
+        ("extension/package.json", b"{}", "another package.json"),
+        ("extension/icon.png", b"<svg/>", "icon.png is not a PNG"),
+        ("extension/LICENSE.txt", b"", "another LICENSE"),
+        ("extension/dist/licenses.txt", b"", "lacks the licences"),
+    ],
+)
+def test_an_extension_with_missing_or_superfluous_parts_is_noticed(
+    tmp_path, path, content, message
+):
+    def packed(name, files):
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            for inside, data in files.items():
+                archive.writestr(inside, data)
+        return tmp_path / name
+
+    extension.is_complete(HERE, packed("whole.vsix", VSIX))
+    changed = {name: data for name, data in {**VSIX, path: content}.items() if data is not None}
+    with pytest.raises(FailedError, match=re.escape(message)):
+        extension.is_complete(HERE, packed("changed.vsix", changed))
 
 
 def test_archives_that_differ_are_noticed(tmp_path):

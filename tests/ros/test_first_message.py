@@ -1,22 +1,31 @@
-"""docs/first-message.md: its files, in an empty folder, are two nodes that talk."""
+"""The files of docs/first-message.md, and those of the README, are nodes that talk."""
 
 import re
 import subprocess
 import sys
+from html import unescape
 from threading import Timer
+
+import pytest
 
 from tests.support import programs
 from tests.support.paths import DOCS, ROOT
 
 PAGE = (DOCS / "first-message.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_nodes_of_the_page_talk(tmp_path, lonely_environment):
+@pytest.mark.parametrize("page", ["first-message", "readme"])
+def test_the_nodes_of_the_page_talk(page, tmp_path, lonely_environment):
     files = re.findall(r"^```(\S+\.\w+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     assert [name for name, _ in files] == ["interfaces/msg/Drive.msg", "talker.py", "listener.py"]
     for name, text in files:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
+    if page == "readme":
+        pair = map(unescape, re.findall(r"<pre[^>]*>\n(.*?)</pre>", README, re.DOTALL))
+        for text in pair:
+            (tmp_path / text.split()[1]).write_text(text, encoding="utf-8")
     (command,) = re.findall(r"^idlc (gen .*)$", PAGE, re.MULTILINE)
     programs.run(sys.executable, "-m", "idlc", *command.split(), cwd=tmp_path)
     (shown,) = re.findall(r"^\$ python listener.py\n(.*)$", PAGE, re.MULTILINE)

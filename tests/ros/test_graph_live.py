@@ -97,7 +97,7 @@ def look(lonely_environment, tmp_path, nodes):
                 check=False,
             )
             assert "Traceback" not in done.stderr
-            seen = re.search(r'looked at (\d+) node|"node": (\d+)[,}]', done.stdout)
+            seen = re.search(r'compared (\d+) node|"node": (\d+)[,}]', done.stdout)
             if not nodes or (seen and int(seen[1] or seen[2]) == len(nodes)):
                 break
         return done.returncode, done.stdout
@@ -119,15 +119,15 @@ def test_two_versions_are_told_field_by_field(start, look, packages):
     status, said = look()
     assert status == 1
     for expected in (
-        "`demo_msgs/msg/Drive` has 2 versions: of",
+        "`demo_msgs/msg/Drive` has 2 versions: in",
         "`/talker` publishes on topic `/robot/drive`",
-        "what differs is in `demo_msgs/msg/Part`",
+        "the differences are in `demo_msgs/msg/Part`",
         "field `colour` was added (`/talker` → `/listener`)",
-        "constant `RED` was 1 and is 2 now (`/talker` → `/listener`)",
+        "constant `RED` changed from 1 to 2 (`/talker` → `/listener`)",
         "`demo_msgs/srv/Go_Request` has 2 versions",
-        "field `to` was `float32` and is `float64` now (`/listener` → `/talker`)",
+        "field `to` changed from `float32` to `float64` (`/listener` → `/talker`)",
         "`demo_msgs/action/Fly_FeedbackMessage` has 2 versions",
-        "field `left` was `float64` and is `float32` now (`/talker` → `/listener`)",
+        "field `left` changed from `float64` to `float32` (`/talker` → `/listener`)",
         "`/talker` serves action `/robot/fly`",
     ):
         assert expected in said
@@ -158,9 +158,9 @@ def test_who_does_not_answer_is_known_by_hash(start, look):
     status, said = look(patience="4")
     assert status == 1
     assert "`demo_msgs/msg/Drive` has 4 versions" in said
-    assert "only its hash is known: `/dead` does not answer" in said
-    assert "only its hash is known: `/still` does not answer" in said
-    assert "only its hash is known: `/mute` has no ~/get_type_description" in said
+    assert "idlc has only its hash: `/dead` does not reply" in said
+    assert "idlc has only its hash: `/still` does not reply" in said
+    assert "idlc has only its hash: `/mute` has no ~/get_type_description" in said
     assert "Go_Request" not in said
 
 
@@ -171,7 +171,7 @@ def test_a_service_without_events_is_told_by_files(start, look, packages):
     assert "service introspection" in said
     status, said = look(packages / "sources/two/demo_msgs", "-I", packages / "sources/one")
     assert status == 1
-    assert "field `to` was `float32` and is `float64` now (your files → `/server`)" in said
+    assert "field `to` changed from `float32` to `float64` (your files → `/server`)" in said
 
 
 def test_nodes_that_agree_are_no_finding(start, look, packages):
@@ -194,7 +194,7 @@ def test_two_types_on_one_topic(start, look):
     start("one", "other", "subscription:std_msgs/msg/Empty:/chat")
     status, said = look()
     assert status == 1
-    assert "error[IDL531]: topic `/chat` has ends of 2 types" in said
+    assert "error[IDL531]: topic `/chat` has endpoints with 2 types" in said
 
 
 def test_nobody_is_there(look):

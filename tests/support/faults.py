@@ -12,6 +12,8 @@ tell of, whichever function makes them: opening for writing, moving, making and 
     {"user": N}                      run as another user
     {"cwd": "pkg"}                   run in a folder below
 
+With `rewrite`, a recording and a target, it rewrites that instead of running words.
+
 It answers with {"status": …, "points": …, "said": …}; status -9 is a killed process.
 """
 
@@ -96,10 +98,26 @@ def run(folder, order, answer):
     out = io.StringIO()
     sys.addaudithook(fault.hook)
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-        status = main_main(order["words"])
+        recordings = order.get("rewrite")
+        status = rewritten(*recordings) if recordings else main_main(order["words"])
     fault.order = {}
     text = json.dumps({"status": status, "points": fault.count, "said": out.getvalue()})
     os.write(answer, text.encode())
+
+
+def rewritten(source, target):
+    from idlc.recordings.containers.source import RecordingError
+    from idlc.recordings.rewrite import Conversion, rewrite
+
+    def convert(raws, _):
+        return [bytes(raw) * 2 for raw in raws]
+
+    try:
+        rewrite(source, target, {"/imu": Conversion("a/msg/B", "ros2msg", "", "RIHS01_b", convert)})
+    except RecordingError as error:
+        print(error)
+        return 1
+    return 0
 
 
 def main():

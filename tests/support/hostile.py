@@ -74,7 +74,7 @@ PAYLOADS = {
 }
 OTHER_LINE_ENDS = "\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
 
-_SGR = re.compile(r"\x1b\[(0|1|32|31|36|1;31|1;33|1;36|1;34)m")
+_SGR = re.compile(r"\x1b\[(0|1|2|31|32|33|36|94|1;31|1;33|1;36)m")
 
 
 class Said(NamedTuple):

@@ -1,5 +1,6 @@
 """Nodes in processes of their own, and what they print."""
 
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 PATIENCE = 40.0
+#: Python's report of an exception in a destructor or in a callback of its own. A signal that
+#: interrupts a constructor of rclpy leaves an object that its `__del__` cannot handle. No node can
+#: prevent that.
+IGNORED = re.compile(
+    r"Exception ignored in: .*\nTraceback .*\n"
+    r"(?:  File \".*/rclpy/.*\n(?:  .*\n)+\w.*\n|(?:  .*\n)+KeyboardInterrupt: *\n)"
+)
 
 
 class Running:
@@ -28,6 +36,11 @@ class Running:
     @property
     def output(self) -> str:
         return self.log.read_text()
+
+    @property
+    def fails(self) -> bool:
+        """Whether the node printed a traceback that it could have prevented."""
+        return "Traceback" in IGNORED.sub("", self.output)
 
     def said(self) -> list[str]:
         """Return what the node logged, without times and names."""

@@ -29,6 +29,8 @@ class RecordedGraph:
     `sources` has the texts that a node tells, by type.
     """
 
+    has_hashes_of_services = False
+
     def __init__(self, ends, told=None, sources=None):
         self.sources = sources or {}
         self.ends = tuple(sorted(ends))

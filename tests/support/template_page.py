@@ -13,6 +13,8 @@ from jinja2.runtime import Macro
 
 from idlc.cli.main import main
 from idlc.project.templates import code, environment, html
+from idlc.scaffold.init import SERVICES
+from tests.support import recorded_text
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 
@@ -25,6 +27,7 @@ FILES = {
     "  <depend>std_msgs</depend>\n</package>\n",
     "demo/msg/Drive.msg": "# How fast to drive.\nfloat64 speed 0.5  # forward [m/s]\n"
     "string[] names\nuint8 FAST=1\n",
+    "old/demo/msg/Drive.msg": "float32 speed\n",
     "bare/msg/Level.msg": "uint8 level\n",
     "more/package.xml": '<package format="3">\n  <name>more</name>\n'
     "  <depend>std_msgs</depend>\n</package>\n",
@@ -74,6 +77,15 @@ COMMANDS = [
             *("--action-client", "example_interfaces/Fibonacci:count"),
         ),
     ),
+    (".", ("upgrade", "rec.mcap", "--to", "bare", "--write-rules", "bare/upgrade")),
+    (
+        "robot",
+        (
+            *("scaffold", "node", "bridge", "--translate", "../old/demo", "../demo"),
+            *("--topic", "demo/Drive:drive:drive_v2"),
+        ),
+    ),
+    *[("robot", ("init", "--ci", service, "--yes")) for service in SERVICES],
 ]
 
 
@@ -109,6 +121,7 @@ def _outputs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[in
     monkeypatch.setattr("sys.prefix", str(folder / "nowhere"))
     for path, text in FILES.items():
         write(folder / path, text)
+    recorded_text.write(folder / "rec.mcap", "@ /level bare/msg/Level\nuint8 height\n")
     for place, words in COMMANDS:
         started.append(words)
         monkeypatch.chdir(folder / place)

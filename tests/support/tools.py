@@ -10,6 +10,7 @@ import pytest
 #: The Debian packages that have them; for another machine, those of compilers end in its name.
 PACKAGES = {
     "as": "binutils",
+    "cmake": "cmake",
     "eu-elflint": "elfutils",
     "g++": "g++",
     "gcc": "gcc",

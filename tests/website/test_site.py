@@ -4,18 +4,19 @@ import re
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote
+from urllib.parse import parse_qs, unquote
 
 import pytest
 
 from idlc.diagnostics.codes import CODES
-from maintenance.website import sources
+from maintenance.website import colours, sources
 from maintenance.website.build import build
 from maintenance.website.dialect import translated
-from tests.support.paths import DOCS, ROOT
+from tests.support.paths import DOCS, GOLDEN, ROOT
 
 #: Elements that load what they name.
 LOADS = {"script", "link", "img", "iframe", "source", "video", "object", "embed"}
+PLAYGROUND = "playground/index.html"
 CODE = {"pre", "code", "script", "style"}
 
 
@@ -51,8 +52,8 @@ def test_every_link_leads_somewhere(site, pages):
     dead = []
     for path, page in pages.items():
         for link in {*page.links, *page.loads}:
-            if re.match(r"https?:|mailto:", link):
-                continue
+            if re.match(r"https?:|mailto:", link) or PLAYGROUND in link:
+                continue  # `make playground` writes the last
             target, _, anchor = unquote(link).partition("#")
             there = (path.parent / target).resolve() if target else path
             if not there.is_file() or (anchor and anchor not in ids(there)):
@@ -66,6 +67,23 @@ def test_nothing_is_loaded_from_another_host(site, pages):
     for path in site.rglob("*.css"):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"@import|url\(\s*['\"]?(\w+:(?<!data:)|//)", text), path
+
+
+def test_blocks_of_interfaces_open_in_the_playground(site, pages):
+    links = {
+        code: [
+            link for link in pages[site / f"rules/{code}.html"].links if f"{PLAYGROUND}#" in link
+        ]
+        for code in ("IDL201", "IDL504")
+    }
+    bad, good = links["IDL201"]
+    assert bad == "../playground/index.html#msg/Example?text=flot64%20ranges%0A"
+    assert good.endswith("text=float64%20ranges%0A")
+    assert any(
+        f"{PLAYGROUND}#msg/Drive" in link for link in pages[site / "first-message.html"].links
+    )
+    values = parse_qs(links["IDL504"][0].partition("?")[2])
+    assert values == {"text": ["float64 velocity\n"], "before": ["float64 speed\n"]}
 
 
 def test_every_document_has_a_page(site, pages):
@@ -85,9 +103,30 @@ def test_no_markdown_is_left(pages):
 def test_pages_are_reached_from_the_navigation(site, pages):
     start = site / "index.html"
     linked = {(start.parent / link.partition("#")[0]).resolve() for link in pages[start].links}
+    text = pages[start].text
+    assert all(title in text for title in ("Tutorials", "Guides", "Reference", "Concepts"))
     named = [there for _, part in sources.navigation(sources.files()) for _, there in part]
     assert len(named) > 25
     assert {(site / there).with_suffix(".html") for there in named} <= linked
+
+
+def test_the_landing_page_shows_parts_of_the_readme(site, pages):
+    text = (site / "index.html").read_text(encoding="utf-8")
+    assert "{{" not in text
+    assert {"pictures/first.svg", "pictures/speed.svg"} <= set(pages[site / "index.html"].loads)
+    for words in ("idlc-env", "create_node", '<span class="kt">float64</span>'):
+        assert words in text
+    assert PLAYGROUND in pages[site / "index.html"].links
+
+
+def test_pages_of_interfaces_are_pages_of_the_site(site, pages):
+    page = site / "interfaces/sensor_msgs/msg-Imu.html"
+    start, packages, package = "../../index.html", "../index.html", "../sensor_msgs/index.html"
+    assert {start, packages, package} <= set(pages[page].links)
+    text = page.read_text(encoding="utf-8")
+    assert 'id="angular_velocity"' in text
+    assert '<span class="kt">float64</span>' in text
+    assert "<title>sensor_msgs/msg/Imu - idlc</title>" in text
 
 
 def test_only_a_site_is_replaced(tmp_path):
@@ -95,6 +134,26 @@ def test_only_a_site_is_replaced(tmp_path):
     with pytest.raises(SystemExit, match="something else"):
         build(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+# the colours
+
+
+def test_colours_leave_the_text_as_it_is():
+    files = sorted((GOLDEN / "rosidl").rglob("*.msg"))
+    assert len(files) > 10
+    for path in files:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            assert "".join(text for text, _ in colours.tokens(line)) == line
+
+
+def test_colours_are_those_of_the_grammar(site):
+    scopes = dict(colours.tokens("std_msgs/Header[<=3] header  # where [m]"))
+    assert scopes["Header"] == "entity.name.type.rosmsg"
+    assert scopes["header"] == "variable.other.member.rosmsg"
+    assert scopes["[m]"] == "constant.other.unit.rosmsg"
+    page = (site / "rules/IDL201.html").read_text(encoding="utf-8")
+    assert '<span class="kt">float64</span> <span class="n">ranges</span>' in page
 
 
 # the dialect
@@ -135,7 +194,7 @@ def test_what_is_no_list_stays(text):
     ("link", "moved"),
     [
         ("ci.md", "../ci.md"),
-        ("../README.md#use", "../about.md#use"),
+        ("../README.md#try-it", "../about.md#try-it"),
         ("../action.yml", "../files/action.yml"),
         ("rules.md", "../rules/index.md"),
         ("rules.md#idl405-unusual-unit-warning-style", "../rules/IDL405.md"),

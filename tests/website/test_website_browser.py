@@ -114,6 +114,16 @@ def test_nothing_is_wider_than_the_window(light, dark):
         assert one["over"] == [], (one["page"], one["width"])
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("pattern", ["*", "contributing/*", "rules/*", "interfaces/**/*"])
+def test_no_page_is_wider_than_a_phone(site, pattern):
+    pages = sorted(path.relative_to(site).as_posix() for path in site.glob(f"{pattern}.html"))
+    assert len(pages) > 5
+    for page in browser.measured(site, pages, [PHONE], MEASURE):
+        assert page["scroll"] <= page["client"] == PHONE, page
+        assert page["over"] == [], page["page"]
+
+
 def test_all_pictures_are_shown_and_nothing_comes_from_elsewhere(light):
     for one in light:
         assert one["pictures"] == [], one["page"]

@@ -64,12 +64,12 @@ def wrong_values(case):
     return sends(case.idlc) and isinstance(element, str) and "text" not in case.value
 
 
-def other_sizes(case):
+def arrays_of_another_size(case):
     """rosidl sends arrays of another size or shape, cut or with what lies after them."""
     return bool(case.field) and case.field[0] == "array" and refuses(case.idlc)
 
 
-def columns(case):
+def arrays_with_one_column(case):
     """A column of the right size is stored flat."""
     return (
         bool(case.field)
@@ -79,12 +79,12 @@ def columns(case):
     )
 
 
-def texts_with_zeros(case):
+def strings_with_null_characters(case):
     """rosidl cuts a text at a zero character."""
     return case.value == "text NUL" and sends(case.idlc)
 
 
-def nothing_is_the_default(case):
+def none_as_a_default(case):
     """None in the place of a message or of elements is the default, where rosidl fails later."""
     return case.constructed and case.value == "None" and not refuses(case.idlc)
 
@@ -94,12 +94,12 @@ def unknown_keywords(case):
     return case.key.endswith("unknown keyword")
 
 
-def positions(case):
+def positional_arguments(case):
     """Fields may be given by position."""
     return case.key.endswith(("by position", "filled by a text"))
 
 
-def more_is_taken(case):
+def more_accepted_values(case):
     """idlc sends more kinds of sequences and texts than rosidl."""
     return bool(case.field) and refuses(case.official) and sends(case.idlc)
 
@@ -115,11 +115,11 @@ def slots(case):
 DIFFERENCES = (
     slots,
     unknown_keywords,
-    positions,
-    nothing_is_the_default,
-    texts_with_zeros,
-    columns,
-    other_sizes,
+    positional_arguments,
+    none_as_a_default,
+    strings_with_null_characters,
+    arrays_with_one_column,
+    arrays_of_another_size,
     wrong_values,
-    more_is_taken,
+    more_accepted_values,
 )

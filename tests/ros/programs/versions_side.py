@@ -1,0 +1,52 @@
+"""Nodes of one version of my_msgs: versions_side.py old|new.
+
+old  publishes on drive and calls ask, until a server answers that it has received a message
+new  listens to drive_v2 and serves ask_v2, until the test ends it
+"""
+
+import sys
+
+import rclpy
+from my_msgs.msg import Drive, Wheel
+from my_msgs.srv import Ask
+
+received = []
+
+
+def receive(message):
+    received.append(message)
+    if len(received) == 1:
+        print("message:", message.to_dict(), flush=True)
+
+
+def answer(request, response):
+    response.count, response.why = int(bool(received)), f"{request.name}!"
+    return response
+
+
+rclpy.init()
+node = rclpy.create_node(sys.argv[1])
+if sys.argv[1] == "new":
+    node.create_subscription(Drive, "drive_v2", receive, 10)
+    node.create_service(Ask, "ask_v2", answer)
+    print("ready", flush=True)
+    rclpy.spin(node)
+publisher = node.create_publisher(Drive, "drive", 10)
+client = node.create_client(Ask, "ask")
+message = Drive(speed=-3, raw=[1, 2], pair=[0.5, 2.5], wheels=[Wheel(radius=0.25, name="left")])
+response, count = None, 0
+while not count:
+    client.wait_for_service()
+    future = client.call_async(Ask.Request(name="Ada"))
+    while not future.done():
+        publisher.publish(message)
+        rclpy.spin_once(node, timeout_sec=0.05)
+    response = future.result()
+    count = response.count
+print("response:", response.to_dict())
+(info,) = node.get_subscriptions_info_by_topic("/drive")
+(own,) = node.get_publishers_info_by_topic("/drive")
+print(info.topic_type, info.topic_type_hash == own.topic_type_hash)
+(info,) = node.get_publishers_info_by_topic("/drive_v2")
+print(info.topic_type, info.topic_type_hash == own.topic_type_hash)
+rclpy.shutdown()
