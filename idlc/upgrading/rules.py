@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from hashlib import sha256
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -209,10 +208,11 @@ def run_rules(file: Path) -> Mapping[str, Any]:
         package = ModuleType(home)
         package.__path__ = [str(file.resolve().parent)]
         sys.modules[home] = package
-    spec = spec_from_file_location(f"{home}.{file.stem}", file)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{file} is not a Python file")
-    module = module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    # not by the import system, which runs the cached bytecode of a file of the same size and second
+    module = ModuleType(f"{home}.{file.stem}")
+    module.__file__ = str(file)
+    module.__package__ = home
+    sys.modules[module.__name__] = module
+    code = compile(file.read_bytes(), str(file), "exec", dont_inherit=True)
+    exec(code, vars(module))  # noqa: S102 - the user named the file in order to run it
     return {name: value for name, value in vars(module).items() if callable(value)}

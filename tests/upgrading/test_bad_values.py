@@ -107,6 +107,20 @@ def test_paths_lead_to_nested_fields(types, tmp_path, capsys):
     assert "wheels[].size: the rule raised ZeroDivisionError" in capsys.readouterr().err
 
 
+def test_the_text_of_rules_is_run_and_no_cached_bytecode(types, tmp_path, monkeypatch, capsys):
+    """A file can change within the second and the size by which Python knows its bytecode."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    old, new = types
+    pair = PAIR.format(key_of(old.Drive), key_of(new.Drive))
+    words = ["upgrade", "a.mcap", "--to", "new/drive_msgs", "--rules", "rules.py", "-o", "out"]
+    for number in "12":
+        Path("rules.py").write_text(f"{pair}def few(old): return ['{number}']\n", encoding="utf-8")
+        os.utime("rules.py", (10**9, 10**9))
+        assert main(words) == 1
+        assert f"not '{number}'" in capsys.readouterr().err
+    assert not (tmp_path / "__pycache__").exists()
+
+
 def test_rules_that_end_the_process_are_an_error(types, tmp_path, capsys):
     old, new = types
     assert upgraded(old.Drive, new.Drive, "def few(old): return []", "raise SystemExit(0)") == 1
