@@ -5,11 +5,14 @@ new  listens to drive_v2 and serves ask_v2, until the test ends it
 """
 
 import sys
+import time
 
 import rclpy
 from my_msgs.msg import Drive, Wheel
 from my_msgs.srv import Ask
 
+#: Seconds for which it waits for a response.
+PATIENCE = 5.0
 received = []
 
 
@@ -38,11 +41,13 @@ response, count = None, 0
 while not count:
     client.wait_for_service()
     future = client.call_async(Ask.Request(name="Ada"))
-    while not future.done():
+    end = time.monotonic() + PATIENCE
+    while not future.done() and time.monotonic() < end:
         publisher.publish(message)
         rclpy.spin_once(node, timeout_sec=0.05)
+    # the response is lost if the server has not discovered the client: then it asks again
     response = future.result()
-    count = response.count
+    count = response.count if response else 0
 print("response:", response.to_dict())
 (info,) = node.get_subscriptions_info_by_topic("/drive")
 (own,) = node.get_publishers_info_by_topic("/drive")
