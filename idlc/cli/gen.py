@@ -148,7 +148,7 @@ class _Command(click.Command):
     metavar="PREFIX",
     type=click.Path(),
     default="",
-    help="Install the package into this folder for ROS 2 and its C++ tools.",
+    help="Install the package into this folder, where ROS 2 and its C++ tools find it.",
 )
 @click.option(
     "--topic",

@@ -18,11 +18,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    if words in (["--version"], ["-V"]):
-        sys.stdout.write(f"idlc {__version__}\n")
-        return 0
     from idlc.cli.exit_status import status_of
 
+    if words in (["--version"], ["-V"]):
+        return status_of(lambda: print(f"idlc {__version__}"))
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
         # hooks call this for each commit, and importing click takes longer than checking a file
         from idlc.cli.direct import check_paths

@@ -408,7 +408,7 @@ def test_a_closed_pipe_is_no_error():
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
-@pytest.mark.parametrize("words", ["show std_msgs/Header", "check .", "--help"])
+@pytest.mark.parametrize("words", ["show std_msgs/Header", "check .", "--help", "--version"])
 def test_a_full_disk_is_no_internal_error(words):
     write(Path("msg/A.msg"), "int32 a\n")
     with Path("/dev/full").open("w") as full:
