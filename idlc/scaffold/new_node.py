@@ -139,6 +139,7 @@ def node(
         if translated is not None:
             conversion = used.render("node/conversion.py.jinja", conversion=translated.conversion)
             files[f"{own}/{name}_conversion.py"] = conversion
+            files[f"{own}/{translated.home}"] = used.render("node/versions.py.jinja")
             files |= {f"{own}/{path}": text for path, text in translated.files.items()}
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)

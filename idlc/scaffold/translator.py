@@ -58,6 +58,11 @@ class Translated(NamedTuple):
     files: Mapping[str, str]
 
     @property
+    def home(self) -> str:
+        """The module through which both versions are imported."""
+        return f"{FOLDER}/__init__.py"
+
+    @property
     def types(self) -> str:
         """The folder of the files that nobody edits."""
         return f"{FOLDER}/{TYPES}"
@@ -251,8 +256,7 @@ class _Writer:
     @property
     def files(self) -> Iterator[tuple[str, str]]:
         """The files of classes and rules, by their paths in the package's folder."""
-        kept: dict[str, str] = {"__init__.py": '"""Versions of interfaces, and rules."""\n'}
-        kept[f"{TYPES}/__init__.py"] = '"""The classes of each version."""\n'
+        kept: dict[str, str] = {f"{TYPES}/__init__.py": '"""The classes of each version."""\n'}
         files = [RenderedFile(f"{TYPES}/{file.path}", file.text) for file in carried_runtime()]
         for side, (names, models) in self._reached.items():
             packages = sorted({name.package for name in names})
