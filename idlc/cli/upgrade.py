@@ -94,6 +94,13 @@ EPILOG += "\n" + options.example(
     "of a distribution. By default, idlc uses the types of this machine.",
 )
 @click.option(
+    "--from",
+    "old",
+    metavar="PATH|git:REF|distro:NAME",
+    help="The old types, for recordings that do not contain their definitions, such as .db3 files "
+    "of Humble.",
+)
+@click.option(
     "--topic",
     "topics",
     metavar="TOPIC",

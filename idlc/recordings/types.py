@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from types import MappingProxyType
 from typing import NamedTuple
 
 import msgspec
@@ -184,13 +185,13 @@ class DefinedTopic(NamedTuple):
 
 
 class LocalTypes:
-    """The types that are defined locally, without any recording."""
+    """The types that are defined locally, without any recording; `texts` take precedence."""
 
-    def __init__(self, scope: Scope, report: Report) -> None:
+    def __init__(self, scope: Scope, report: Report, texts: Texts = MappingProxyType({})) -> None:
         self.scope = scope
         self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
-            scope.include, scope.root, report, own=self.near, distro=scope.distro
+            scope.include, scope.root, report, own=self.near, distro=scope.distro, texts=texts
         )
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
@@ -262,7 +263,7 @@ class RecordedTypes:
                 path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
                 texts[name] = Source(path, "", topic.recording)
         self.texts = texts
-        scope, own = local.scope, local.near
+        scope, own, texts = local.scope, local.near, {**local.library.texts, **texts}
         self.library = Library(
             scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +13,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from idlc.check.compiler import stage
+from idlc.compare.breaking import GIT
+from idlc.compare.distribution import PREFIX
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
 from idlc.documents.schemas import MCAP_LINE, mcap
@@ -49,6 +52,7 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
     scope: Scope
     out: str | None = None
     to: str | None = None
+    old: str | None = None
     topics: tuple[str, ...] = ()
     rules: tuple[str, ...] = ()
     write_rules: str | None = None
@@ -90,14 +94,15 @@ class Result(NamedTuple):
 def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progress) -> Result:
     """Plan the upgrade of recordings, and write them unless something is in the way of it."""
     result = Result([], [], [])
-    with target_of(options.to, options.scope, report) as target:
+    with ExitStack() as opened:
+        target = opened.enter_context(target_of(options.to, options.scope, report))
+        local = _local(options, opened, report)
         named = _read(rule_files(options.rules, options.scope.root), options.scope.root, report)
         if options.topics:
             topics_of(options.recordings, options.topics, options.scope.root, report)
-        if target is None or report.had_errors:
+        if target is None or local is None or report.had_errors:
             return result
         found = _found(target, named, options.scope.root)
-        local = LocalTypes(options.scope, report)
         for recording in options.recordings:
             result.plans.extend(_plans(recording, options, target, local, Known(named), report))
         if report.errors:
@@ -113,6 +118,21 @@ def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progre
             run = Runner({rules.path: rules.file for rules in named})
             _write(result, options, run, report, progress)
     return result
+
+
+def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalTypes | None:
+    """Return the old types that recordings do not define; `None` after an error."""
+    scope = options.scope
+    if options.old is None:
+        return LocalTypes(scope, report)
+    if options.to is not None and not options.to.startswith((GIT, PREFIX)):
+        # a revision of what `--to` names
+        scope = msgspec.structs.replace(scope, paths=(options.to,))
+    old = opened.enter_context(target_of(options.old, scope, report))
+    if old is None:
+        return None
+    scope = msgspec.structs.replace(scope, distros=(old.distro or scope.distro,))
+    return LocalTypes(scope, report, old.texts)
 
 
 def _read(files: Iterable[Path], root: Root, report: Report) -> list[Rules]:

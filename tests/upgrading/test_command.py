@@ -43,14 +43,13 @@ def write_package(folder, texts, package="drive_msgs"):
     return str(folder / package)
 
 
-def write_recording(path, kind, messages):
+def write_recording(path, kind, messages, *, defined=True):
     version = version_of(kind)
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start("ros2", "test")
-        schema = writer.register_schema(
-            version.key.type, "ros2msg", definition_of(version).encode()
-        )
+        definition = definition_of(version).encode() if defined else b""
+        schema = writer.register_schema(version.key.type, "ros2msg", definition)
         metadata = {"topic_type_hash": type_hash(kind)}
         channel = writer.register_channel("/drive", "cdr", schema, metadata)
         for number, message in enumerate(messages):
@@ -95,6 +94,34 @@ def test_what_needs_no_rule_is_converted(old, tmp_path, capsys):
     assert channel.metadata["topic_type_hash"] == type_hash(new.Drive)
     assert schema.data.decode() == definition_of(version_of(new.Drive))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "new", "old", "out"]
+
+
+@pytest.mark.parametrize("source", ["git:v1", "old/drive_msgs"])
+def test_definitions_that_were_not_recorded_come_from_elsewhere(old, source, tmp_path, capsys):
+    """Humble's .db3 files have none; a recorder also leaves out those that it does not find."""
+    write_package(tmp_path / "src", OLD)
+    for words in (["init", "-q"], ["add", "-A"], ["commit", "-qm", "first"], ["tag", "v1"]):
+        programs.run("git", "-c", "user.name=A", "-c", "user.email=a@b.c", *words, cwd="src")
+    write_package(tmp_path / "src", WIDER)
+    write_recording(tmp_path / "a.mcap", old.Drive, [old.Drive(speed=7)], defined=False)
+    words = ["upgrade", "a.mcap", "--to", "src/drive_msgs", "-o"]
+    assert main([*words, "unchanged"]) == 0
+    assert "the recording does not define `drive_msgs/msg/Drive`" in capsys.readouterr().err
+    assert main([*words, "out", "--from", source]) == 0
+    (made,) = messages_of(tmp_path / "out" / "a.mcap", idlc.load("src/drive_msgs").Drive)
+    assert (made.speed, made.gear) == (7, 3)
+
+
+@pytest.mark.parametrize(
+    ("source", "problem"),
+    [("git:v2", "v2"), ("nowhere", "no such file or folder"), ("distro:foxy", "no such distrib")],
+)
+def test_an_old_version_that_does_not_exist_is_an_error(old, source, problem, tmp_path, capsys):
+    write_package(tmp_path / "new", WIDER)
+    words = ["upgrade", "a.mcap", "--to", "new/drive_msgs", "-o", "out", "--from", source]
+    assert main(words) in (1, 2)
+    assert problem in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_comments_change_the_definition_only(old, tmp_path, capsys):
