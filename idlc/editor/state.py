@@ -23,11 +23,15 @@ from idlc.editor.workspace import (
 from idlc.language.tree import BYTE_ORDER_MARK
 from idlc.model import ir
 from idlc.model.link import Model
-from idlc.project.find import KINDS
+from idlc.project.find import KINDS, RULES
 from idlc.project.root import Root
 
 #: The files to watch on disk: all that a check may read.
-WATCHED = ("**/*.{msg,srv,action}", f"**/{{{','.join(OTHER_INPUTS)}}}")
+WATCHED = (
+    "**/*.{msg,srv,action}",
+    f"**/{{{','.join(OTHER_INPUTS)}}}",
+    f"**/{RULES}/*.py",
+)
 #: A client's name for showing documents which are no files.
 CONTENT = "textDocumentContent"
 

@@ -25,7 +25,7 @@ from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
-from idlc.project.find import DiskSnapshot, InterfaceFile, Listing, list_files, root_of
+from idlc.project.find import RULES, DiskSnapshot, InterfaceFile, Listing, list_files, root_of
 from idlc.project.inputs import Inputs, output_folders
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
@@ -174,6 +174,8 @@ class Workspace:
             homes |= {settings.folder} if settings.folder else set()
             read = [root.absolute(file.path) for file in files.files]
             read += [home / name for home in homes for name in OTHER_INPUTS]
+            rules = [home / RULES for home in homes]
+            read += [*rules, *(file for folder in rules for file in folder.glob("*.py"))]
             on_disk = (path for path in read if not root.is_open(path))
             self._picture = DiskSnapshot(files.folders, on_disk, begun)
         self._places = {

@@ -138,11 +138,15 @@ def test_files_that_change_on_disk_are_noticed(opened):
     tell_of(one, path, lsp.FileChangeType.Deleted)
     assert codes(one.pull(wheel)) == ["IDL201"]
     (folder / "msg/Other.msg").unlink()
-    one.tell(
-        lsp.TEXT_DOCUMENT_DID_SAVE,
-        lsp.DidSaveTextDocumentParams(text_document=lsp.TextDocumentIdentifier(uri=wheel)),
-    )
+    save(one, wheel)
     assert codes(one.pull(wheel)) == ["IDL201"]
+
+
+def save(one, uri):
+    """Tell the server that a document was saved; it looks at the disk then."""
+    document = lsp.TextDocumentIdentifier(uri=uri)
+    params = lsp.DidSaveTextDocumentParams(text_document=document)
+    one.tell(lsp.TEXT_DOCUMENT_DID_SAVE, params)
 
 
 def tell_of(one, path, kind):
@@ -165,6 +169,21 @@ def test_settings_and_package_xml_have_their_problems_in_their_own_files(opened)
     assert found.tags == (lsp.DiagnosticTag.Unnecessary,)
     one.change(manifest, "<package>", 3)
     assert codes(one.pull(manifest)) == ["IDL610"]
+
+
+def test_rules_for_recordings_have_problems_that_follow_the_disk(opened):
+    one, folder, open_ = opened
+    drive = open_("msg/Drive.msg")
+    rules = folder / "upgrade/drive.py"
+    rules.parent.mkdir()
+    pair = 'OLD = ("demo/msg/{}", "RIHS01_{:064}")\nNEW = ("demo/msg/Gone", "RIHS01_{:064}")\n'
+    for text, problems in {pair.format("Drive", 1, 2): ["IDL665"], "def a(:\n": ["IDL664"]}.items():
+        rules.write_text(text)
+        save(one, drive)
+        assert codes(one.pull(rules.as_uri())) == problems
+    rules.unlink()
+    save(one, drive)
+    assert one.pull(rules.as_uri()) == one.pull(drive) == []
 
 
 def test_settings_of_the_editor_count(opened):
