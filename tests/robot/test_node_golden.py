@@ -3,8 +3,12 @@
 import json
 import queue
 
+import pytest
+
+import idlc
 from idlc.robot import (
-    Client,
+    ActionClient,
+    ActionServer,
     DurabilityPolicy,
     HistoryPolicy,
     LivelinessPolicy,
@@ -13,8 +17,7 @@ from idlc.robot import (
     ReliabilityPolicy,
     open_session,
 )
-from idlc.robot.keys import Kind, all_tokens, parse_attachment, parse_token
-from idlc.robot.nodes.interfaces import Interface
+from idlc.robot.keys import Kind, all_tokens, pack_attachment, parse_attachment
 from idlc.robot.qos import (
     qos_profile_best_available,
     qos_profile_parameter_events,
@@ -23,13 +26,17 @@ from idlc.robot.qos import (
     qos_profile_services_default,
     qos_profile_system_default,
 )
-from tests.robot.nodes import LONG, String
+from tests.robot.nodes import LONG, String, node_at, spin_until
 from tests.support.paths import ROOT
 
 CAPTURE = json.loads((ROOT / "golden/robot/rmw_zenoh.json").read_text(encoding="utf-8"))
 TOKENS = [token for token, _ in CAPTURE["tokens"]]
-#: Endpoints of actions follow.
-OWN = 25
+#: The definitions of the captured types.
+DEFINITIONS = {
+    "msg/Drive.msg": "float64 speed\nstring who\nfloat32[] ranges\n",
+    "srv/Add.srv": "int64 a\nint64 b\n---\nint64 sum\n",
+    "action/Countdown.action": "int32 start\n---\nstring done\n---\nint32 left\n",
+}
 SESSION = TOKENS[0].split("/")[2]
 BEST_EFFORT, LATCHED = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL
 PROFILES = {
@@ -57,77 +64,89 @@ PROFILES = {
 }
 
 
-def captured(kind, name):
-    """Return the type of a captured endpoint."""
-    entities = [parse_token(token) for token in TOKENS]
-    entity = next(each for each in entities if (each.kind, each.name) == (kind, name))
-
-    class Bytes:
-        """Messages as bytes: the definition of the captured type is not known."""
-
-        Request = Response = None
-
-        def __init__(self, data):
-            self.data = data
-
-        def serialize(self):
-            return self.data
-
-    Bytes.Request = Bytes
-    return Interface(entity.type, entity.hash, lambda: Bytes)
+@pytest.fixture
+def types(tmp_path):
+    for name, text in DEFINITIONS.items():
+        path = tmp_path / "my_robot" / name
+        path.parent.mkdir(parents=True)
+        path.write_text(text, encoding="utf-8")
+    return idlc.load(str(tmp_path / "my_robot")).my_robot
 
 
-def test_tokens_and_bytes_are_those_of_rclpy(router):
+def test_tokens_and_bytes_are_those_of_rclpy(router, types):
     identity = {"ZENOH_CONFIG_OVERRIDE": f'id="{SESSION}"'}
     tokens, samples, requests = set(), queue.SimpleQueue(), queue.SimpleQueue()
     with (
         open_session(router, environ={}, timeout=LONG) as other,
         open_session(router, environ=identity, timeout=LONG) as session,
     ):
-        drive = CAPTURE["samples"]
-        key, _, attachment, payload = CAPTURE["requests"][0]
-        other.transport.subscriber(drive[0][0], PROFILES["qos_default10"], samples.put)
-        other.transport.service(key, requests.put)
+        (drive_key, drive_attachment, drive, *_), *_ = CAPTURE["samples"]
+        ((add_key, _, add_attachment, add),) = CAPTURE["requests"]
+        other.transport.subscriber(drive_key, PROFILES["qos_default10"], samples.put)
+        other.transport.service(add_key, requests.put)
         node = Node("golden", session=session, namespace="/ns/deep", start_parameter_services=False)
         publishers = [
-            node._publisher(name, captured(Kind.PUBLISHER, f"/ns/deep/{name}"), profile)
+            node.create_publisher(types.msg.Drive, name, profile)
             for name, profile in PROFILES.items()
         ]
         node.create_subscription(String, "/absolute/name", lambda _: None, 10)
         node.create_subscription(String, "~/private", lambda _: None, 10)
-        node._service("add", captured(Kind.SERVICE, "/ns/deep/add"), lambda *_: None)
-        add = captured(Kind.CLIENT, "/pure_add")
-        client = Client(node, "/pure_add", add, qos_profile_services_default)
-        while tokens != {*TOKENS[:OWN]}:
+        node.create_service(types.srv.Add, "add", lambda _, response: response)
+        client = node.create_client(types.srv.Add, "/pure_add")
+        ActionServer(node, types.action.Countdown, "count", lambda _: None)
+        ActionClient(node, types.action.Countdown, "other")
+        while tokens != {*TOKENS}:
             tokens = {*other.transport.tokens(all_tokens(0), LONG)}
-            assert tokens <= {*TOKENS[:OWN]}
-        assert publishers[0].entity.gid.hex() == drive[0][1][-32:]
+            assert tokens <= {*TOKENS}
 
-        sample = None
-        while sample is None:  # the declaration of a subscriber takes a moment to arrive
-            publishers[0].publish(bytes.fromhex(drive[0][2]))
-            publishers[0]._count = 0
-            try:
-                sample = samples.get(timeout=0.1)
-            except queue.Empty:
-                continue
-        assert sample.key == drive[0][0]
-        assert sample.payload.hex() == drive[0][2]
-        assert same_but_time(sample.attachment, drive[0][1])
+        message = types.msg.Drive(speed=1.0, who="golden", ranges=[1.0, 2.0])
+        sample, sent = first(samples, lambda: publishers[0].publish(message))
+        assert (sample.key, sample.payload.hex()) == (drive_key, drive)
+        assert same_but_time(sample.attachment, drive_attachment, sent)
 
-        request = None
-        while request is None:
-            client.call_async(add.kind(bytes.fromhex(payload)))
-            try:
-                request = requests.get(timeout=0.1)
-            except queue.Empty:
-                continue
-        sequence = parse_attachment(request.attachment).sequence
-        assert request.payload.hex() == payload
-        wanted = sequence.to_bytes(8, "little").hex() + attachment[16:]
-        assert same_but_time(request.attachment, wanted)
-        request.drop()
+        request = types.srv.Add.Request(a=1, b=2)
+        asked, sent = first(requests, lambda: client.call_async(request))
+        assert asked.payload.hex() == add
+        assert same_but_time(asked.attachment, add_attachment, sent)
+        asked.drop()
 
 
-def same_but_time(attachment, expected):
-    return attachment[:8].hex() + attachment[16:].hex() == expected[:16] + expected[32:]
+def test_replies_are_those_of_rclpy(router, types):
+    ((key, attachment, payload),) = CAPTURE["replies"]
+    replies = queue.SimpleQueue()
+    with (
+        open_session(router, environ={}, timeout=LONG) as other,
+        node_at(router, "golden", namespace="/ns/deep") as node,
+    ):
+        node.create_service(types.srv.Add, "add", lambda _, response: response)
+        sequence, _, gid = parse_attachment(bytes.fromhex(attachment))
+        request = types.srv.Add.Request(a=1, b=2).serialize()
+        spin_until(lambda: other.graph.count(Kind.SERVICE, "/ns/deep/add"), node)
+        other.transport.call(
+            key, request, pack_attachment(sequence, 0, gid), replies.put, timeout=LONG
+        )
+        spin_until(lambda: not replies.empty(), node)
+        reply = replies.get()
+        assert (reply.key, reply.payload.hex()) == (key, payload)
+        assert same_but_time(reply.attachment, attachment)
+
+
+def first(arrived, send):
+    """Return what arrives first, and how often it was sent: a declaration takes a moment."""
+    sent = 0
+    while True:
+        send()
+        sent += 1
+        try:
+            return arrived.get(timeout=0.1), sent
+        except queue.Empty:
+            continue
+
+
+def same_but_time(attachment, captured, sent=1):
+    """Compare with the attachment of the first message, request or reply in the capture."""
+    captured = bytes.fromhex(captured)
+    sequence = parse_attachment(attachment).sequence
+    assert parse_attachment(captured).sequence == 1
+    assert 1 <= sequence <= sent
+    return attachment[:8] + attachment[16:] == sequence.to_bytes(8, "little") + captured[16:]
