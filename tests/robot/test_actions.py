@@ -7,7 +7,8 @@ import pytest
 
 import idlc
 from idlc.robot import ActionClient, ActionServer, CancelResponse, GoalResponse
-from idlc.robot.actions.goals import CancelCode, GoalState
+from idlc.robot.actions.client import ClientGoalHandle
+from idlc.robot.actions.goals import GoalState
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.nodes.tasks import Future
 from idlc.robot.qos import qos_profile_action_status_default
@@ -15,6 +16,7 @@ from tests.robot.nodes import node_at, spin_until
 
 Fibonacci = idlc.load("example_interfaces/action/Fibonacci").Fibonacci
 CancelGoal = standard("action_msgs/srv/CancelGoal").kind
+CancelCode = CancelGoal.Response
 NEW = Fibonacci.Impl.SendGoalService
 LATCHED = qos_profile_action_status_default
 RESULT = Fibonacci.Impl.GetResultService
@@ -95,21 +97,21 @@ def test_a_goal_can_be_cancelled(pair):
     ends = Ends(pair, cancel_callback=lambda _: CancelResponse.ACCEPT)
     handle = ends.send()
     answer = ends.result(handle.cancel_goal_async())
-    assert answer.return_code == CancelCode.NONE
+    assert answer.return_code == CancelCode.ERROR_NONE
     assert [[*each.goal_id.uuid] for each in answer.goals_canceling] == [[*handle.goal_id.uuid]]
     ends.until(lambda: handle.status == GoalState.CANCELING)
     assert ends.goals[0].is_cancel_requested
     ends.release.set_result(None)
     assert ends.result(handle.get_result_async()).status == GoalState.CANCELED
     # a goal that has ended is not cancelled again
-    assert ends.result(handle.cancel_goal_async()).return_code == CancelCode.GOAL_TERMINATED
+    assert ends.result(handle.cancel_goal_async()).return_code == CancelCode.ERROR_GOAL_TERMINATED
 
 
 def test_a_server_rejects_cancelling_unless_it_is_told_to_accept(pair):
     ends = Ends(pair)
     handle = ends.send()
     answer = ends.result(handle.cancel_goal_async())
-    assert (answer.return_code, answer.goals_canceling) == (CancelCode.REJECTED, [])
+    assert (answer.return_code, answer.goals_canceling) == (CancelCode.ERROR_REJECTED, [])
     assert not ends.goals[0].is_cancel_requested
     ends.release.set_result(None)
     assert ends.result(handle.get_result_async()).status == GoalState.SUCCEEDED
@@ -261,7 +263,7 @@ def test_other_types_are_errors(pair):
     with pytest.raises(TypeError, match=r"not a Fibonacci\.Feedback"):
         ends.goals[0].publish_feedback(Fibonacci.Goal())
     with pytest.raises(TypeError, match="not callable"):
-        ends.server.register_execute_callback(None)
+        ActionServer(pair[0], Fibonacci, "other", None)
 
 
 # hostile
@@ -280,11 +282,13 @@ def test_an_id_can_be_used_once(pair):
 
 def test_unknown_goals_have_no_result_and_cannot_be_cancelled(pair):
     ends = Ends(pair)
-    stranger = SimpleNamespace(goal_id=SimpleNamespace(uuid=[9] * 16))
-    response = ends.result(ends.client.get_result_async(stranger))
+    goal_id = RESULT.Request().goal_id
+    goal_id.uuid = [9] * 16
+    stranger = ClientGoalHandle(ends.client, goal_id, NEW.Response(accepted=True))
+    response = ends.result(stranger.get_result_async())
     assert response.status == GoalState.UNKNOWN
-    answer = ends.result(ends.client.cancel_async(stranger))
-    assert answer.return_code == CancelCode.UNKNOWN_GOAL_ID
+    answer = ends.result(stranger.cancel_goal_async())
+    assert answer.return_code == CancelCode.ERROR_UNKNOWN_GOAL_ID
 
 
 def test_mutated_requests_neither_crash_nor_stop_a_server(pair):

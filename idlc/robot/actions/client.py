@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from threading import Event
+from functools import partial
 from typing import Any
 from uuid import uuid4
 from weakref import WeakValueDictionary
 
-from idlc.robot.actions.goals import GoalState, id_of, result_of
+from idlc.robot.actions.goals import GoalState
 from idlc.robot.names import action_names
 from idlc.robot.nodes.interfaces import standard
+from idlc.robot.nodes.services import Client
 from idlc.robot.nodes.tasks import Future
-from idlc.robot.qos import (
-    QoSProfile,
-    qos_profile_action_status_default,
-    qos_profile_default,
-    qos_profile_services_default,
-)
+from idlc.robot.qos import qos_profile_action_status_default
 
 
 class ClientGoalHandle:
@@ -31,92 +27,62 @@ class ClientGoalHandle:
         #: The last state that the server published, a number of action_msgs/msg/GoalStatus.
         self.status: int = GoalState.UNKNOWN
 
-    def __repr__(self) -> str:
-        key, state = id_of(self.goal_id).hex(), GoalState(self.status).name
-        return f"ClientGoalHandle(id={key}, accepted={self.accepted}, status={state})"
-
     def cancel_goal_async(self) -> Future[Any]:
         """Ask the server to cancel the goal; the future has the action_msgs/srv/CancelGoal."""
-        return self._client.cancel_async(self)
-
-    def cancel_goal(self) -> Any:
-        """Ask the server to cancel the goal, and wait; not in a callback."""
-        return _wait(self.cancel_goal_async())
+        request = self._client.cancel_client.srv_type.Request()
+        request.goal_info.goal_id.uuid = [*self.goal_id.uuid]
+        return self._client.cancel_client.call_async(request)
 
     def get_result_async(self) -> Future[Any]:
         """Ask for the result; the future has a response with `status` and `result`."""
-        return self._client.get_result_async(self)
-
-    def get_result(self) -> Any:
-        """Ask for the result, and wait; not in a callback."""
-        return _wait(self.get_result_async())
+        request = self._client.result_client.srv_type.Request(goal_id=self.goal_id)
+        future = self._client.result_client.call_async(request)
+        callbacks = self._client.feedback_callbacks
+        future.add_done_callback(lambda _: callbacks.pop(bytes(self.goal_id.uuid), None))
+        return future
 
 
 class ActionClient:
     """A client of an action."""
 
     def __init__(
-        self,
-        node: Any,
-        action_type: Any,
-        action_name: str,
-        *,
-        callback_group: Any = None,
-        goal_service_qos_profile: QoSProfile = qos_profile_services_default,
-        result_service_qos_profile: QoSProfile = qos_profile_services_default,
-        cancel_service_qos_profile: QoSProfile = qos_profile_services_default,
-        feedback_sub_qos_profile: QoSProfile = qos_profile_default,
-        status_sub_qos_profile: QoSProfile = qos_profile_action_status_default,
+        self, node: Any, action_type: Any, action_name: str, *, callback_group: Any = None
     ) -> None:
         self._node = node
         self._type = action_type
         self._goals: WeakValueDictionary[bytes, ClientGoalHandle] = WeakValueDictionary()
         #: The states in the last message, which can arrive before the answer of the server.
         self._states: dict[bytes, int] = {}
-        self._callbacks: dict[bytes, Callable[[Any], Any]] = {}
-        self._names = names = action_names(node.resolve_service_name(action_name))
+        self.feedback_callbacks: dict[bytes, Callable[[Any], Any] | None] = {}
+        names = action_names(node.resolve_service_name(action_name))
         impl = action_type.Impl
-        self._cancel_type = standard("action_msgs/srv/CancelGoal").kind
-        self._clients = [
-            node.create_client(kind, name, qos_profile=qos, callback_group=callback_group)
-            for kind, name, qos in (
-                (impl.SendGoalService, names.send_goal, goal_service_qos_profile),
-                (self._cancel_type, names.cancel_goal, cancel_service_qos_profile),
-                (impl.GetResultService, names.get_result, result_service_qos_profile),
-            )
-        ]
-        self._send, self._cancel, self._get_result = self._clients
-        self._subscriptions = [
-            node.create_subscription(kind, name, receive, qos, callback_group=callback_group)
-            for kind, name, receive, qos in (
-                (impl.FeedbackMessage, names.feedback, self._follow, feedback_sub_qos_profile),
-                (
-                    standard("action_msgs/msg/GoalStatusArray").kind,
-                    names.status,
-                    self._update,
-                    status_sub_qos_profile,
-                ),
-            )
-        ]
+        # in the order of rclpy, so that ids are equal
+        client = node.create_client
+        cancel_type = standard("action_msgs/srv/CancelGoal").kind
+        self._send: Client[Any, Any] = client(impl.SendGoalService, names.send_goal)
+        self.cancel_client: Client[Any, Any] = client(cancel_type, names.cancel_goal)
+        self.result_client: Client[Any, Any] = client(impl.GetResultService, names.get_result)
+        self._clients = (self._send, self.cancel_client, self.result_client)
+        subscribe = partial(node.create_subscription, callback_group=callback_group)
+        status_type = standard("action_msgs/msg/GoalStatusArray").kind
+        self._subscriptions = (
+            subscribe(impl.FeedbackMessage, names.feedback, self._follow, 10),
+            subscribe(status_type, names.status, self._update, qos_profile_action_status_default),
+        )
 
     def server_is_ready(self) -> bool:
         """Return whether all services and topics of a server are there."""
         return all(client.service_is_ready() for client in self._clients) and all(
-            self._node.count_publishers(name) for name in (self._names.feedback, self._names.status)
+            subscription.get_publisher_count() for subscription in self._subscriptions
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
         """Wait until a server is there; return whether it is, for at most `timeout_sec` seconds."""
-        return bool(
-            self._node.session.graph.wait_for(lambda _: self.server_is_ready(), timeout_sec)
-        )
+        return bool(self._node.graph.wait_for(lambda _: self.server_is_ready(), timeout_sec))
 
     def send_goal_async(
-        self,
-        goal: Any,
-        feedback_callback: Callable[[Any], Any] | None = None,
-        goal_uuid: Any = None,
-    ) -> Future[Any]:
+        self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None
+    ) -> Future[ClientGoalHandle]:
         """Send a goal; the future has a ClientGoalHandle when the server has answered.
 
         `feedback_callback` gets messages with `feedback`. Raises TypeError if the goal is of
@@ -125,43 +91,27 @@ class ActionClient:
         if not isinstance(goal, self._type.Goal):
             raise TypeError(f"{goal!r} is not a {self._type.__name__}.Goal")
         request = self._type.Impl.SendGoalService.Request(goal=goal)
-        request.goal_id.uuid = [*(uuid4().bytes if goal_uuid is None else goal_uuid.uuid)]
-        key = id_of(request.goal_id)
-        if feedback_callback is not None:
-            self._callbacks[key] = feedback_callback
+        request.goal_id.uuid = [*uuid4().bytes]
+        key = bytes(request.goal_id.uuid)
+        self.feedback_callbacks[key] = feedback_callback
+        sent: Future[ClientGoalHandle] = Future()
 
-        def accepted(response: Any) -> ClientGoalHandle:
-            handle = ClientGoalHandle(self, request.goal_id, response)
-            if handle.accepted:
-                self._goals[key] = handle
-                handle.status = self._states.get(key, GoalState.ACCEPTED)
+        def answer(future: Future[Any]) -> None:
+            if (error := future.exception()) is not None:
+                sent.set_exception(error)
+            elif future.cancelled():
+                sent.cancel()
             else:
-                self._callbacks.pop(key, None)
-            return handle
+                handle = ClientGoalHandle(self, request.goal_id, future.result())
+                if handle.accepted:
+                    self._goals[key] = handle
+                    handle.status = self._states.get(key, GoalState.ACCEPTED)
+                sent.set_result(handle)
+            if key not in self._goals:
+                self.feedback_callbacks.pop(key, None)
 
-        return _then(self._send.call_async(request), accepted)
-
-    def send_goal(self, goal: Any, **options: Any) -> Any:
-        """Send a goal, wait, and return the response with its result; not in a callback."""
-        return _wait(self.send_goal_async(goal, **options)).get_result()
-
-    def cancel_async(self, handle: ClientGoalHandle) -> Future[Any]:
-        """Ask the server to cancel a goal."""
-        request = self._cancel_type.Request()
-        request.goal_info.goal_id.uuid = [*handle.goal_id.uuid]
-        future: Future[Any] = self._cancel.call_async(request)
-        return future
-
-    def get_result_async(self, handle: ClientGoalHandle) -> Future[Any]:
-        """Ask the server for the result of a goal."""
-        request = self._type.Impl.GetResultService.Request()
-        request.goal_id.uuid = [*handle.goal_id.uuid]
-
-        def ended(response: Any) -> Any:
-            self._callbacks.pop(id_of(handle.goal_id), None)
-            return response
-
-        return _then(self._get_result.call_async(request), ended)
+        self._send.call_async(request).add_done_callback(answer)
+        return sent
 
     def destroy(self) -> None:
         """Remove the clients and subscriptions."""
@@ -170,41 +120,12 @@ class ActionClient:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
 
-    async def _follow(self, message: Any) -> None:
-        if callback := self._callbacks.get(id_of(message.goal_id)):
-            await result_of(callback(message))
+    def _follow(self, message: Any) -> Any:
+        callback = self.feedback_callbacks.get(bytes(message.goal_id.uuid))
+        return callback and callback(message)
 
     def _update(self, message: Any) -> None:
-        self._states = {
-            id_of(each.goal_info.goal_id): each.status
-            for each in message.status_list
-            if GoalState.UNKNOWN < each.status <= GoalState.ABORTED
-        }
+        goals = message.status_list
+        self._states = {bytes(goal.goal_info.goal_id.uuid): goal.status for goal in goals}
         for key, handle in [*self._goals.items()]:
             handle.status = self._states.get(key, handle.status)
-
-
-def _then(future: Future[Any], change: Callable[[Any], Any]) -> Future[Any]:
-    """Return a future with the changed result of another one."""
-    changed: Future[Any] = Future()
-
-    def done(future: Future[Any]) -> None:
-        if changed.done():
-            return
-        error = future.exception()
-        if error is not None:
-            changed.set_exception(error)
-        elif future.cancelled():
-            changed.cancel()
-        else:
-            changed.set_result(change(future.result()))
-
-    future.add_done_callback(done)
-    return changed
-
-
-def _wait(future: Future[Any]) -> Any:
-    done = Event()
-    future.add_done_callback(lambda _: done.set())
-    done.wait()
-    return future.result()

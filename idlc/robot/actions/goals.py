@@ -1,10 +1,8 @@
-"""The states of goals, the answers of servers to clients, and the ids of goals."""
+"""The states of goals, and the answers of servers to clients."""
 
 from __future__ import annotations
 
 from enum import Enum, IntEnum
-from inspect import isawaitable
-from typing import Any
 
 
 class GoalState(IntEnum):
@@ -17,20 +15,6 @@ class GoalState(IntEnum):
     SUCCEEDED = 4
     CANCELED = 5
     ABORTED = 6
-
-    @property
-    def is_active(self) -> bool:
-        """True if the goal has not ended."""
-        return GoalState.ACCEPTED <= self <= GoalState.CANCELING
-
-
-class CancelCode(IntEnum):
-    """The outcome of a request to cancel; the numbers are those of action_msgs/srv/CancelGoal."""
-
-    NONE = 0
-    REJECTED = 1
-    UNKNOWN_GOAL_ID = 2
-    GOAL_TERMINATED = 3
 
 
 class GoalResponse(Enum):
@@ -45,23 +29,3 @@ class CancelResponse(Enum):
 
     REJECT = 1
     ACCEPT = 2
-
-
-#: The states from which a goal can enter a state.
-BEFORE: dict[GoalState, tuple[GoalState, ...]] = {
-    GoalState.EXECUTING: (GoalState.ACCEPTED,),
-    GoalState.CANCELING: (GoalState.ACCEPTED, GoalState.EXECUTING),
-    GoalState.SUCCEEDED: (GoalState.EXECUTING, GoalState.CANCELING),
-    GoalState.CANCELED: (GoalState.CANCELING,),
-    GoalState.ABORTED: (GoalState.EXECUTING, GoalState.CANCELING),
-}
-
-
-def id_of(goal_id: Any) -> bytes:
-    """Return the id in a unique_identifier_msgs/msg/UUID."""
-    return bytes(goal_id.uuid)
-
-
-async def result_of(value: Any) -> Any:
-    """Return the result of a callback, which may be a coroutine."""
-    return await value if isawaitable(value) else value

@@ -2,77 +2,68 @@
 
 from __future__ import annotations
 
-import traceback
+import math
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from inspect import isawaitable
 from threading import RLock
 from time import monotonic
-from typing import Any
+from traceback import format_exc
+from typing import Any, TypeAlias
 
-from idlc.robot.actions.goals import (
-    BEFORE,
-    CancelCode,
-    CancelResponse,
-    GoalResponse,
-    GoalState,
-    id_of,
-    result_of,
-)
+from idlc.robot.actions.goals import CancelResponse, GoalResponse, GoalState
 from idlc.robot.names import action_names
 from idlc.robot.nodes.executor import ReentrantCallbackGroup
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.nodes.tasks import Future
-from idlc.robot.qos import (
-    QoSProfile,
-    qos_profile_action_status_default,
-    qos_profile_default,
-    qos_profile_services_default,
-)
+from idlc.robot.qos import qos_profile_action_status_default
+
+#: The states from which a goal can enter a state.
+BEFORE: dict[GoalState, tuple[GoalState, ...]] = {
+    GoalState.EXECUTING: (GoalState.ACCEPTED,),
+    GoalState.CANCELING: (GoalState.ACCEPTED, GoalState.EXECUTING),
+    GoalState.SUCCEEDED: (GoalState.EXECUTING, GoalState.CANCELING),
+    GoalState.CANCELED: (GoalState.CANCELING,),
+    GoalState.ABORTED: (GoalState.EXECUTING, GoalState.CANCELING),
+}
 
 
 class ServerGoalHandle:
-    """A goal that the server accepted."""
+    """A goal that the server accepted; `status` is a number of action_msgs/msg/GoalStatus."""
 
     def __init__(self, server: ActionServer, request: Any, stamp: Any) -> None:
         self._server = server
-        self._lock = RLock()
-        self._state = GoalState.ACCEPTED
-        self.ended_at = 0.0
         self.request = request.goal
         self.goal_id = request.goal_id
-        self.stamp = stamp
+        self.info = _message("GoalInfo")(goal_id=request.goal_id, stamp=stamp)
+        self.status = GoalState.ACCEPTED
+        self.ended_at = math.inf
         #: It ends with the response to clients that ask for the result.
         self.response: Future[Any] = Future()
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ServerGoalHandle) and id_of(self.goal_id) == id_of(other.goal_id)
-
-    def __hash__(self) -> int:
-        return hash(id_of(self.goal_id))
-
-    @property
-    def status(self) -> int:
-        """The state, as a number of action_msgs/msg/GoalStatus."""
-        return self._state
 
     @property
     def is_active(self) -> bool:
         """True until the goal has succeeded or aborted, or is canceled."""
-        return self._state.is_active
+        return self.status <= GoalState.CANCELING
 
     @property
     def is_cancel_requested(self) -> bool:
         """True if the server accepted a client's request to cancel."""
-        return self._state is GoalState.CANCELING
+        return self.status is GoalState.CANCELING
 
-    def execute(self, execute_callback: Callable[[ServerGoalHandle], Any] | None = None) -> None:
+    def execute(self, execute_callback: GoalCallback | None = None) -> None:
         """Execute the goal soon, by the callback of the server or another one."""
         if not self.is_cancel_requested:
             self.enter(GoalState.EXECUTING)
-        self._server.begin(self, execute_callback)
+        self._server.start(self._server.execute, self, execute_callback)
 
     def publish_feedback(self, feedback: Any) -> None:
         """Send feedback to the clients; raise TypeError if it is of another type."""
-        self._server.publish_feedback(self, feedback)
+        publisher, action = self._server.feedback_publisher, self._server.action_type
+        if not isinstance(feedback, action.Feedback):
+            raise TypeError(f"{feedback!r} is not a {action.__name__}.Feedback")
+        publisher.publish(publisher.msg_type(goal_id=self.goal_id, feedback=feedback))
 
     def succeed(self) -> None:
         """End the goal as reached; raise RuntimeError if it is neither executed nor canceled."""
@@ -88,12 +79,16 @@ class ServerGoalHandle:
 
     def enter(self, state: GoalState) -> None:
         """Change the state, and publish it; raise RuntimeError if it cannot follow."""
-        with self._lock:
-            if self._state not in BEFORE[state]:
-                raise RuntimeError(f"a goal that is {self._state.name} cannot become {state.name}")
-            self._state = state
-            self.ended_at = monotonic()
-        self._server.publish_status()
+        with self._server.lock:
+            if self.status not in BEFORE[state]:
+                raise RuntimeError(f"a goal that is {self.status.name} cannot become {state.name}")
+            self.status = state
+            if not self.is_active:
+                self.ended_at = monotonic()
+            self._server.publish_status()
+
+
+GoalCallback: TypeAlias = Callable[[ServerGoalHandle], Any]
 
 
 class ActionServer:
@@ -101,7 +96,9 @@ class ActionServer:
 
     `execute_callback` gets a ServerGoalHandle and returns a result, `goal_callback` gets a goal and
     returns a GoalResponse, `cancel_callback` gets the handle and returns a CancelResponse. They may
-    be coroutines. Results are kept for `result_timeout` seconds, for ever if it is negative.
+    be coroutines. Without them, the server accepts all goals, and rejects requests to cancel.
+    `handle_accepted_callback` gets the handle, and executes the goal at some time. Results are kept
+    for `result_timeout` seconds, for ever if it is negative.
     """
 
     def __init__(
@@ -109,230 +106,133 @@ class ActionServer:
         node: Any,
         action_type: Any,
         action_name: str,
-        execute_callback: Callable[[ServerGoalHandle], Any],
+        execute_callback: GoalCallback,
         *,
         callback_group: Any = None,
         goal_callback: Callable[[Any], Any] | None = None,
-        handle_accepted_callback: Callable[[ServerGoalHandle], Any] | None = None,
-        cancel_callback: Callable[[ServerGoalHandle], Any] | None = None,
-        goal_service_qos_profile: QoSProfile = qos_profile_services_default,
-        result_service_qos_profile: QoSProfile = qos_profile_services_default,
-        cancel_service_qos_profile: QoSProfile = qos_profile_services_default,
-        feedback_pub_qos_profile: QoSProfile = qos_profile_default,
-        status_pub_qos_profile: QoSProfile = qos_profile_action_status_default,
+        handle_accepted_callback: GoalCallback | None = None,
+        cancel_callback: GoalCallback | None = None,
         result_timeout: float = 900,
     ) -> None:
+        if not callable(execute_callback):
+            raise TypeError(f"execute_callback is not callable: {execute_callback!r}")
         self.action_type = action_type
         self._node = node
-        self._timeout = result_timeout
-        self._goals: dict[bytes, ServerGoalHandle] = {}
-        self._lock = RLock()
         self._logger = node.get_logger().get_child("action_server")
-        self.register_execute_callback(execute_callback)
-        self.register_goal_callback(goal_callback)
-        self.register_handle_accepted_callback(handle_accepted_callback)
-        self.register_cancel_callback(cancel_callback)
+        self._execute_callback = execute_callback
+        self._goal_callback = goal_callback or (lambda _: GoalResponse.ACCEPT)
+        self._accepted_callback = handle_accepted_callback or ServerGoalHandle.execute
+        self._cancel_callback = cancel_callback or (lambda _: CancelResponse.REJECT)
+        self._timeout = result_timeout if result_timeout >= 0 else math.inf
+        self._goals: dict[bytes, ServerGoalHandle] = {}
+        #: For the states of goals, which are published in the order in which they change.
+        self.lock = RLock()
         names = action_names(node.resolve_service_name(action_name))
         impl = action_type.Impl
-        cancel = standard("action_msgs/srv/CancelGoal").kind
+        cancel_type = standard("action_msgs/srv/CancelGoal").kind
+        serve = partial(node.create_service, callback_group=callback_group)
+        # requests for results wait until goals end
+        serve_result = partial(node.create_service, callback_group=ReentrantCallbackGroup())
+        publish = node.create_publisher
+        status_type = _message("GoalStatusArray")
         # in the order of rclpy, so that ids are equal; goals that arrive meanwhile wait
-        with self._lock:
-            self._services = [
-                node.create_service(kind, name, answer, qos_profile=qos, callback_group=group)
-                for kind, name, answer, qos, group in (
-                    (
-                        impl.SendGoalService,
-                        names.send_goal,
-                        self._accept,
-                        goal_service_qos_profile,
-                        callback_group,
-                    ),
-                    (
-                        cancel,
-                        names.cancel_goal,
-                        self._cancel,
-                        cancel_service_qos_profile,
-                        callback_group,
-                    ),
-                    (
-                        impl.GetResultService,
-                        names.get_result,
-                        self._answer_result,
-                        result_service_qos_profile,
-                        ReentrantCallbackGroup(),  # requests wait until their goals end
-                    ),
-                )
-            ]
-            self._feedback = node.create_publisher(
-                impl.FeedbackMessage, names.feedback, feedback_pub_qos_profile
+        with self.lock:
+            self._services = (
+                serve(impl.SendGoalService, names.send_goal, self._accept),
+                serve(cancel_type, names.cancel_goal, self._cancel),
+                serve_result(impl.GetResultService, names.get_result, self._answer_result),
             )
-            self._status = node.create_publisher(
-                _message("GoalStatusArray"), names.status, status_pub_qos_profile
-            )
-
-    def register_execute_callback(
-        self, execute_callback: Callable[[ServerGoalHandle], Any]
-    ) -> None:
-        """Execute goals by another callback; raise TypeError if it cannot be called."""
-        if not callable(execute_callback):
-            raise TypeError(
-                f"the callback that executes goals is not callable: {execute_callback!r}"
-            )
-        self._execute_callback = execute_callback
-
-    def register_goal_callback(self, goal_callback: Callable[[Any], Any] | None) -> None:
-        """Decide on new goals by another callback; `None` accepts all."""
-        self._goal_callback = goal_callback or (lambda _: GoalResponse.ACCEPT)
-
-    def register_handle_accepted_callback(
-        self, handle_accepted_callback: Callable[[ServerGoalHandle], Any] | None
-    ) -> None:
-        """Begin accepted goals by another callback; `None` executes them at once."""
-        self._accepted_callback = handle_accepted_callback or ServerGoalHandle.execute
-
-    def register_cancel_callback(
-        self, cancel_callback: Callable[[ServerGoalHandle], Any] | None
-    ) -> None:
-        """Decide on requests to cancel by another callback; `None` rejects all."""
-        self._cancel_callback = cancel_callback or (lambda _: CancelResponse.REJECT)
+            self.feedback_publisher = publish(impl.FeedbackMessage, names.feedback, 10)
+            self._status = publish(status_type, names.status, qos_profile_action_status_default)
 
     def destroy(self) -> None:
         """Remove the services and topics; goals that are executed go on unseen."""
         for service in self._services:
             self._node.destroy_service(service)
-        self._node.destroy_publisher(self._feedback)
+        self._node.destroy_publisher(self.feedback_publisher)
         self._node.destroy_publisher(self._status)
 
     # for handles of goals
 
-    def begin(
-        self, goal: ServerGoalHandle, callback: Callable[[ServerGoalHandle], Any] | None
-    ) -> None:
-        """Execute a goal soon."""
-        self._soon(self._execute, goal, callback or self._execute_callback)
-
-    def publish_feedback(self, goal: ServerGoalHandle, feedback: Any) -> None:
-        """Publish feedback about a goal."""
-        if not isinstance(feedback, self.action_type.Feedback):
-            raise TypeError(f"{feedback!r} is not a {self.action_type.__name__}.Feedback")
-        self._feedback.publish(
-            self.action_type.Impl.FeedbackMessage(goal_id=goal.goal_id, feedback=feedback)
-        )
-
     def publish_status(self) -> None:
         """Publish the states of all goals."""
-        with self._lock:  # so that an older state is not published after a newer one
-            states = [
-                _message("GoalStatus")(goal_info=self._info(goal), status=goal.status)
-                for goal in [*self._goals.values()]
-            ]
-            self._status.publish(_message("GoalStatusArray")(status_list=states))
+        with self.lock:
+            kind, goals = _message("GoalStatus"), [*self._goals.values()]
+            states = [kind(goal_info=goal.info, status=goal.status) for goal in goals]
+            self._status.publish(self._status.msg_type(status_list=states))
+
+    def start(self, callback: Callable[..., Any], *arguments: Any) -> None:
+        """Call a function or coroutine as a task, unless the node was removed in the meantime."""
+        if self._node.executor is not None:
+            self._node.executor.create_task(callback, *arguments)
+
+    async def execute(self, goal: ServerGoalHandle, callback: GoalCallback | None) -> None:
+        """Execute a goal, and respond to the requests for its result."""
+        try:
+            result = await _result_of((callback or self._execute_callback)(goal))
+            if not isinstance(result, self.action_type.Result):
+                raise TypeError(f"{result!r} is not a {self.action_type.__name__}.Result")
+        except Exception:
+            self._logger.error(f"the callback that executes goals failed: {format_exc()}")
+            result = self.action_type.Result()
+        if goal.is_active:
+            self._logger.warning("the goal was neither succeeded nor canceled; aborting it")
+            goal.abort()
+        response = self.action_type.Impl.GetResultService.Response
+        goal.response.set_result(response(status=goal.status, result=result))
 
     # services
 
     async def _accept(self, request: Any, response: Any) -> Any:
         self._expire()
-        key = id_of(request.goal_id)
+        key = bytes(request.goal_id.uuid)
         if key in self._goals:
             self._logger.warning("the server rejects a goal, because another goal has the same id")
             return response
-        answer = await result_of(self._goal_callback(request.goal))
+        answer = await _result_of(self._goal_callback(request.goal))
         if not isinstance(answer, GoalResponse):
             self._logger.warning("the goal is rejected: the callback returned no GoalResponse")
         # another goal may have got the id in the meantime
-        if answer is not GoalResponse.ACCEPT or key in self._goals:
-            return response
-        stamp = self._node.get_clock().now().to_msg()
-        goal = self._goals[key] = ServerGoalHandle(self, request, stamp)
-        self.publish_status()
-        response.accepted = True
-        response.stamp = stamp
-        # as a task, so that the client learns that the goal is accepted before it begins
-        self._soon(self._begin, goal)
+        if answer is GoalResponse.ACCEPT and key not in self._goals:
+            response.accepted = True
+            response.stamp = self._node.get_clock().now().to_msg()
+            goal = self._goals[key] = ServerGoalHandle(self, request, response.stamp)
+            self.publish_status()
+            # as a task, so that the client learns that the goal is accepted before it begins
+            self.start(self._accepted_callback, goal)
         return response
-
-    def _soon(self, *work: Any) -> None:
-        if self._node.executor is not None:  # otherwise the node was removed in the meantime
-            self._node.executor.create_task(*work)
-
-    async def _begin(self, goal: ServerGoalHandle) -> None:
-        await result_of(self._accepted_callback(goal))
-
-    async def _execute(
-        self, goal: ServerGoalHandle, callback: Callable[[ServerGoalHandle], Any]
-    ) -> None:
-        result: Any = None
-        try:
-            result = await result_of(callback(goal))
-        except Exception as error:
-            self._logger.error(f"the callback that executes goals raised {error!r}")
-            traceback.print_exc()
-        else:
-            if not isinstance(result, self.action_type.Result):
-                self._logger.error(
-                    f"the callback that executes goals returned {result!r}, which is no"
-                    f" {self.action_type.__name__}.Result"
-                )
-                result = None
-        if goal.is_active:
-            self._logger.warning("the goal was neither succeeded nor canceled; aborting it")
-            if goal.status == GoalState.ACCEPTED:
-                goal.enter(GoalState.EXECUTING)
-            goal.abort()
-        response = self.action_type.Impl.GetResultService.Response()
-        response.status = int(goal.status)
-        response.result = self.action_type.Result() if result is None else result
-        if not goal.response.done():
-            goal.response.set_result(response)
 
     async def _answer_result(self, request: Any, response: Any) -> Any:
         self._expire()
-        goal = self._goals.get(id_of(request.goal_id))
+        goal = self._goals.get(bytes(request.goal_id.uuid))
         return response if goal is None else await goal.response
 
     async def _cancel(self, request: Any, response: Any) -> Any:
         self._expire()
-        goals, response.return_code = self._to_cancel(request.goal_info)
-        for goal in goals:
-            answer = await result_of(self._cancel_callback(goal))
+        key, until = bytes(request.goal_info.goal_id.uuid), _time(request.goal_info.stamp)
+        # an id means this goal, a time means all goals up to it, and neither means all goals
+        limit = until or (-1 if any(key) else math.inf)
+        known = self._goals.items()
+        goals = [goal for id_, goal in known if id_ == key or _time(goal.info.stamp) <= limit]
+        active = [goal for goal in goals if goal.status in BEFORE[GoalState.CANCELING]]
+        for goal in active:
+            answer = await _result_of(self._cancel_callback(goal))
             if answer is CancelResponse.ACCEPT:
-                try:
+                with suppress(RuntimeError):  # it ended in the meantime
                     goal.enter(GoalState.CANCELING)
-                except RuntimeError:  # it ended in the meantime
-                    continue
-                response.goals_canceling.append(self._info(goal))
-        if goals and not response.goals_canceling:
-            response.return_code = CancelCode.REJECTED
+                    response.goals_canceling.append(goal.info)
+        if active and not response.goals_canceling:
+            response.return_code = response.ERROR_REJECTED
+        elif limit < 0 and not goals:
+            response.return_code = response.ERROR_UNKNOWN_GOAL_ID
+        elif limit < 0 and not active:
+            response.return_code = response.ERROR_GOAL_TERMINATED
         return response
-
-    def _to_cancel(self, info: Any) -> tuple[list[ServerGoalHandle], CancelCode]:
-        """Return the goals that a request means: one, all up to a time, or all."""
-        key, until = id_of(info.goal_id), _time(info.stamp)
-        active = [
-            goal for goal in [*self._goals.values()] if goal.status in BEFORE[GoalState.CANCELING]
-        ]
-        if any(key) and not until:
-            goal = self._goals.get(key)
-            if goal is None:
-                return [], CancelCode.UNKNOWN_GOAL_ID
-            return ([goal], CancelCode.NONE) if goal in active else ([], CancelCode.GOAL_TERMINATED)
-        chosen = [
-            goal
-            for goal in active
-            if not until or _time(goal.stamp) <= until or id_of(goal.goal_id) == key
-        ]
-        return chosen, CancelCode.NONE
-
-    def _info(self, goal: ServerGoalHandle) -> Any:
-        return _message("GoalInfo")(goal_id=goal.goal_id, stamp=goal.stamp)
 
     def _expire(self) -> None:
         """Forget goals whose results were kept long enough."""
-        if self._timeout >= 0:
-            now = monotonic()
-            for key, goal in [*self._goals.items()]:
-                if not goal.is_active and now - goal.ended_at > self._timeout:
-                    del self._goals[key]
+        oldest = monotonic() - self._timeout
+        self._goals = {key: goal for key, goal in self._goals.items() if goal.ended_at >= oldest}
 
 
 def _time(stamp: Any) -> int:
@@ -341,3 +241,7 @@ def _time(stamp: Any) -> int:
 
 def _message(name: str) -> Any:
     return standard(f"action_msgs/msg/{name}").kind
+
+
+async def _result_of(value: Any) -> Any:
+    return await value if isawaitable(value) else value
