@@ -39,9 +39,8 @@ from idlc.robot.nodes.interfaces import (
 from idlc.robot.nodes.logger import Logger, Record
 from idlc.robot.nodes.services import Client, Service
 from idlc.robot.nodes.timer import Timer
-from idlc.robot.parameters.declared import HasParameters
+from idlc.robot.parameters.declared import HasParameters, add_services
 from idlc.robot.parameters.overrides import overrides_of
-from idlc.robot.parameters.services import add_services
 from idlc.robot.parameters.values import Parameter
 from idlc.robot.qos import (
     QoSProfile,

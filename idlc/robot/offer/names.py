@@ -40,8 +40,7 @@ OFFERED: dict[str, dict[str, str]] = {
         _VALUES: (
             "InvalidParameterException InvalidParameterTypeException"
             " InvalidParameterValueException ParameterAlreadyDeclaredException ParameterException"
-            " ParameterImmutableException ParameterNotDeclaredException"
-            " ParameterUninitializedException"
+            " ParameterNotDeclaredException ParameterUninitializedException"
         )
     },
     "rclpy.executors": {f"{_NODES}.executor": _EXECUTORS},

@@ -1,32 +1,23 @@
-"""The methods of nodes that declare, set and describe parameters, in the words of rclpy."""
+"""The methods of nodes for parameters, in the words of rclpy, and the services for parameters."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from copy import copy
+from functools import partial
+from typing import Any
 
 from idlc.robot.nodes.interfaces import standard
-from idlc.robot.parameters.values import (
-    InvalidParameterException,
-    InvalidParameterTypeException,
-    InvalidParameterValueException,
-    Parameter,
-    ParameterAlreadyDeclaredException,
-    ParameterImmutableException,
-    ParameterNotDeclaredException,
-    ParameterType,
-    ParameterUninitializedException,
-    message_of,
-    parameter_value_to_python,
-)
+from idlc.robot.parameters import values
+from idlc.robot.parameters.values import Parameter, ParameterType, message_of
+from idlc.robot.qos import qos_profile_parameters
 
 #: Values that differ by less, relatively, are the same end or step of a range.
 TOLERANCE = 1e-6
-_WRONG_TYPE = "wrong type"
 _SIM_TIME = "use_sim_time"
-
-Callback = Callable[[list[Parameter]], Any]
+_RANGES = {ParameterType.INTEGER: "integer_range", ParameterType.DOUBLE: "floating_point_range"}
 
 
 class HasParameters:
@@ -35,108 +26,69 @@ class HasParameters:
     Methods raise the exceptions that rclpy raises.
     """
 
-    if TYPE_CHECKING:
-        get_clock: Callable[..., Any]
-        get_fully_qualified_name: Callable[..., str]
-        use_sim_time: Callable[[bool], None]
-        _parameter_events: Any
+    get_clock: Callable[..., Any]
+    get_fully_qualified_name: Callable[..., str]
+    use_sim_time: Callable[[bool], None]
+    _parameter_events: Any
 
     def _begin_parameters(
-        self,
-        overrides: Mapping[str, Parameter],
-        *,
-        allow_undeclared: bool,
-        declare_overrides: bool,
+        self, overrides: Mapping[str, Parameter], *, allow_undeclared: bool, declare_overrides: bool
     ) -> None:
         """Prepare a new node; `overrides` replace the values of declarations."""
         self._parameter_overrides = overrides
         self._allow_undeclared_parameters = allow_undeclared
-        self._parameters: dict[str, Parameter] = {}
         self._parameter_descriptors: dict[str, Any] = {}
-        self._pre_set_callbacks: list[Callback] = []
-        self._on_set_callbacks: list[Callback] = []
-        self._post_set_callbacks: list[Callback] = []
-        # declared without an event, and with a descriptor made on demand, so that a node that uses
-        # no parameters starts without the messages about them
-        simulated = overrides.get(_SIM_TIME) or Parameter(_SIM_TIME, value=False)
-        if simulated.type_ is not ParameterType.BOOL:
-            raise InvalidParameterTypeException(_SIM_TIME, simulated.value, "it is a BOOL")
-        self._parameters[_SIM_TIME] = simulated
-        self.use_sim_time(simulated.value)
+        self._on_set_callbacks: list[Callable[[list[Parameter]], Any]] = []
+        # declared without an event or a descriptor, so that a node that uses no parameters starts
+        # without the messages about them
+        simulated = overrides[_SIM_TIME].value if _SIM_TIME in overrides else False
+        self._parameters = {_SIM_TIME: Parameter(_SIM_TIME, ParameterType.BOOL, simulated)}
+        self.use_sim_time(simulated)
         if declare_overrides:
             new = [(name, each.value) for name, each in overrides.items() if name != _SIM_TIME]
             self.declare_parameters("", new)
 
     # declarations
 
-    def declare_parameter(
-        self,
-        name: str,
-        value: Any = None,
-        descriptor: Any = None,
-        ignore_override: bool = False,
-    ) -> Parameter:
+    def declare_parameter(self, name: str, value: Any = None, descriptor: Any = None) -> Parameter:
         """Declare a parameter with a default value, or with a `Parameter.Type` and no value."""
-        return self.declare_parameters("", [(name, value, descriptor)], ignore_override)[0]
+        return self.declare_parameters("", [(name, value, descriptor)])[0]
 
     def declare_parameters(
-        self,
-        namespace: str,
-        parameters: Iterable[Sequence[Any]],
-        ignore_override: bool = False,
+        self, namespace: str, parameters: Iterable[Sequence[Any]]
     ) -> list[Parameter]:
         """Declare parameters, each as (name, value or type, descriptor), and return them."""
         declared: dict[str, tuple[Parameter, Any]] = {}
         for short, *rest in parameters:
-            if not isinstance(short, str):
-                raise TypeError(f"the name of a parameter is a str, not {short!r}")
             name = f"{namespace}.{short}" if namespace else short
             if not short:
-                raise InvalidParameterException(name)
+                raise values.InvalidParameterException(f"invalid name of a parameter: `{name}`")
+            if name in self._parameters:
+                raise values.ParameterAlreadyDeclaredException(f"already declared: `{name}`")
             value, given = [*rest, None, None][:2]
-            descriptor = _descriptor(name, given)
-            type_ = value if isinstance(value, ParameterType) else None
-            if type_ is not None:
-                value = None
-            elif hasattr(value, "string_array_value"):
-                value = parameter_value_to_python(value)
-            if not descriptor.dynamic_typing:
-                type_ = type_ or ParameterType.from_parameter_value(value)
-                if type_ is ParameterType.NOT_SET:
-                    raise ValueError(
-                        f"`{name}` has neither a value nor a type; pass a value, a type, or a"
-                        " descriptor with `dynamic_typing=True`"
-                    )
-                descriptor.type = type_.value
-            if not ignore_override and name in self._parameter_overrides:
-                value = self._parameter_overrides[name].value
-            kind = type_ if type_ and type_.check(value) else None
-            declared[name] = Parameter(name, kind, value), descriptor
-        if known := [name for name in declared if name in self._parameters]:
-            raise ParameterAlreadyDeclaredException(known)
+            descriptor = copy(given) or message_of("ParameterDescriptor")  # one may serve several
+            has_type = isinstance(value, ParameterType)
+            type_ = value if has_type else ParameterType.from_parameter_value(value)
+            if type_ is ParameterType.NOT_SET and not descriptor.dynamic_typing:
+                raise ValueError(f"`{name}` has neither a value nor a type nor `dynamic_typing`")
+            descriptor.name, descriptor.type = name, type_.value
+            override = self._parameter_overrides.get(name)
+            if override or has_type:
+                value = override and override.value
+            # an empty list is of each type of arrays
+            parameter = Parameter(name, type_ if type_.check(value) else None, value)
+            declared[name] = parameter, descriptor
         for name, (parameter, descriptor) in declared.items():
-            result = self._set_parameters([parameter], {name: descriptor})
-            if not result.successful:
-                wrong_type = result.reason.startswith(_WRONG_TYPE)
-                error = (
-                    InvalidParameterTypeException if wrong_type else InvalidParameterValueException
-                )
-                raise error(name, parameter.value, result.reason)
+            self._change([parameter], {name: descriptor})
         return [self._parameters[name] for name in declared]
 
-    def undeclare_parameter(self, name: str) -> None:
-        """Remove a parameter that is not read-only."""
-        if name not in self._parameters:
-            raise ParameterNotDeclaredException(name)
-        if self._known_descriptor(name).read_only:
-            raise ParameterImmutableException(name)
-        self._forget_parameter(name)
-
-    def _forget_parameter(self, name: str) -> None:
-        self._parameters.pop(name, None)
-        self._parameter_descriptors.pop(name, None)
-
     # values
+
+    def _known_parameter(self, name: str) -> Parameter:
+        """Return a parameter, with or without a value."""
+        if name not in self._parameters and not self._allow_undeclared_parameters:
+            raise values.ParameterNotDeclaredException(f"parameter not declared: `{name}`")
+        return self._parameters.get(name) or Parameter(name)
 
     def has_parameter(self, name: str) -> bool:
         """Return whether a parameter is declared."""
@@ -144,15 +96,10 @@ class HasParameters:
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a parameter."""
-        if name in self._parameters:
-            parameter = self._parameters[name]
-            is_set = parameter.type_ is not ParameterType.NOT_SET
-            if is_set or self._known_descriptor(name).dynamic_typing:
-                return parameter
-            raise ParameterUninitializedException(name)
-        if self._allow_undeclared_parameters:
-            return Parameter(name)
-        raise ParameterNotDeclaredException(name)
+        parameter = self._known_parameter(name)
+        if parameter.value is None and not self.describe_parameter(name).dynamic_typing:
+            raise values.ParameterUninitializedException(f"parameter has no value: `{name}`")
+        return parameter
 
     def get_parameters(self, names: Iterable[str]) -> list[Parameter]:
         """Return parameters."""
@@ -160,209 +107,153 @@ class HasParameters:
 
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
         """Return a parameter, or the alternative if it has no value."""
-        parameter = self._parameters.get(name)
-        if parameter is None or parameter.type_ is ParameterType.NOT_SET:
-            return alternative_value or Parameter(name)
-        return parameter
-
-    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Return the parameters whose names begin with a prefix and a dot, without these."""
-        start = f"{prefix}." if prefix else ""
-        return {
-            name.removeprefix(start): parameter
-            for name, parameter in self._parameters.items()
-            if name.startswith(start)
-        }
+        parameter = self._parameters.get(name) or Parameter(name)
+        return parameter if parameter.value is not None else alternative_value or parameter
 
     def get_parameter_type(self, name: str) -> int:
         """Return the type of a parameter, as a number of rcl_interfaces/msg/ParameterType."""
-        if name in self._parameters:
-            return int(self._parameters[name].type_.value)
-        if self._allow_undeclared_parameters:
-            return 0
-        raise ParameterNotDeclaredException(name)
-
-    def get_parameter_types(self, names: Iterable[str]) -> list[int]:
-        """Return the types of parameters."""
-        return [self.get_parameter_type(name) for name in names]
+        return int(self._known_parameter(name).type_.value)
 
     def set_parameters(self, parameter_list: Iterable[Parameter]) -> list[Any]:
         """Set parameters one by one, and return their results."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> Any:
-        """Set all parameters or none, and return the result; NOT_SET undeclares a parameter."""
-        if self._pre_set_callbacks:
-            parameter_list = [
-                each for call in self._pre_set_callbacks for each in call(parameter_list)
-            ]
-            if not parameter_list:
-                return _result("a pre-set callback removed all parameters")
-        if not all(isinstance(parameter, Parameter) for parameter in parameter_list):
-            raise TypeError("parameters must be instances of Parameter")
-        unknown = [each.name for each in parameter_list if each.name not in self._parameters]
-        if unknown and not self._allow_undeclared_parameters:
-            raise ParameterNotDeclaredException(unknown)
-        return self._set_parameters(parameter_list, None)
+        """Set all parameters or none, and return the result."""
+        descriptors = {each.name: self.describe_parameter(each.name) for each in parameter_list}
+        try:
+            self._change(parameter_list, descriptors)
+        except values.InvalidParameterValueException as error:
+            return message_of("SetParametersResult", successful=False, reason=str(error))
+        return message_of("SetParametersResult", successful=True)
 
-    def _set_parameters(self, parameters: list[Parameter], new: dict[str, Any] | None) -> Any:
-        """Check and set parameters; declarations have `new` descriptors."""
+    def _change(self, parameters: list[Parameter], descriptors: dict[str, Any]) -> None:
+        """Check and set parameters, and publish the changes."""
         for parameter in parameters:
-            name = parameter.name
-            descriptor = new[name] if new else self._known_descriptor(name)
-            if descriptor and (reason := self._parameter_problem(parameter, descriptor, new)):
-                return _result(reason)
-        for check in self._on_set_callbacks:
-            result = check(parameters)
-            if not hasattr(result, "successful"):
-                return _result("a callback of the node returned no SetParametersResult")
-            if not result.successful:
-                return result
+            _check(parameter, descriptors[parameter.name], parameter.name not in self._parameters)
+        for callback in self._on_set_callbacks:
+            result = callback(parameters)
+            if not getattr(result, "successful", False):
+                reason = getattr(result, "reason", "a callback returned no SetParametersResult")
+                raise values.InvalidParameterValueException(reason)
         event = message_of("ParameterEvent", node=self.get_fully_qualified_name())
+        event.stamp = self.get_clock().now().to_msg()
         for parameter in parameters:
-            name = parameter.name
-            if new is None and parameter.type_ is ParameterType.NOT_SET:
-                event.deleted_parameters.append(parameter.to_parameter_msg())
-                self._forget_parameter(name)
-                continue
-            if new is not None or name not in self._parameter_descriptors:
-                descriptor = (new or {}).get(name) or _descriptor(name, None, dynamic_typing=True)
-                self._parameter_descriptors[name] = descriptor
-            if self._parameter_descriptors[name].dynamic_typing:
-                self._parameter_descriptors[name].type = parameter.type_.value
-            is_new = self.get_parameter_or(name).type_ is ParameterType.NOT_SET
+            is_new = self.get_parameter_or(parameter.name).value is None
             changes = event.new_parameters if is_new else event.changed_parameters
             changes.append(parameter.to_parameter_msg())
-            self._parameters[name] = parameter
-        event.stamp = self.get_clock().now().to_msg()
+        self._parameters.update({parameter.name: parameter for parameter in parameters})
+        self._parameter_descriptors.update(descriptors)
+        self.use_sim_time(self._parameters[_SIM_TIME].value)
         self._parameter_events.publish(event)
-        if new is None and (simulated := self._parameters.get(_SIM_TIME)) in parameters:
-            self.use_sim_time(simulated.value)
-        for call in self._post_set_callbacks:
-            call(parameters)
-        return _result()
 
-    def _parameter_problem(
-        self, parameter: Parameter, descriptor: Any, new: dict[str, Any] | None
-    ) -> str:
-        """Return the reason why a descriptor forbids a value; empty if it does not."""
-        type_, value = parameter.type_, parameter.value
-        if new is None and descriptor.read_only:
-            return f"`{parameter.name}` is read-only"
-        if not descriptor.dynamic_typing:
-            if type_ is ParameterType.NOT_SET:
-                return "" if new else f"`{parameter.name}` has a fixed type, and stays declared"
-            if type_.value != descriptor.type:
-                wanted = ParameterType(descriptor.type)
-                return f"{_WRONG_TYPE}: `{parameter.name}` is {wanted.name}, not {type_.name}"
-        ranges = {
-            ParameterType.INTEGER: descriptor.integer_range,
-            ParameterType.DOUBLE: descriptor.floating_point_range,
-        }.get(type_, ())
-        for each in ranges:
-            low, high = sorted((each.from_value, each.to_value))
-            if any(_is_close(value, end) for end in (low, high)):
-                continue
-            if not low < value < high:
-                return f"`{parameter.name}` must be from {low} to {high}, not {value}"
-            if each.step and not _is_close(
-                low + round((value - low) / each.step) * each.step, value
-            ):
-                return f"`{parameter.name}` must be from {low} in steps of {each.step}, not {value}"
-        return ""
-
-    # callbacks
-
-    def add_pre_set_parameters_callback(self, callback: Callback) -> None:
-        """Call `callback` with parameters to be set; it returns those that shall be set instead."""
-        self._pre_set_callbacks.insert(0, callback)
-
-    def add_on_set_parameters_callback(self, callback: Callback) -> None:
+    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Call `callback` with parameters to be set; it returns a SetParametersResult."""
         self._on_set_callbacks.insert(0, callback)
-
-    def add_post_set_parameters_callback(self, callback: Callback) -> None:
-        """Call `callback` with the parameters that were set."""
-        self._post_set_callbacks.insert(0, callback)
-
-    def remove_pre_set_parameters_callback(self, callback: Callback) -> None:
-        """Remove a callback; raise ValueError if it was not added."""
-        self._pre_set_callbacks.remove(callback)
-
-    def remove_on_set_parameters_callback(self, callback: Callback) -> None:
-        """Remove a callback; raise ValueError if it was not added."""
-        self._on_set_callbacks.remove(callback)
-
-    def remove_post_set_parameters_callback(self, callback: Callback) -> None:
-        """Remove a callback; raise ValueError if it was not added."""
-        self._post_set_callbacks.remove(callback)
 
     # descriptions
 
     def describe_parameter(self, name: str) -> Any:
         """Return the descriptor of a parameter."""
-        if descriptor := self._known_descriptor(name):
-            return descriptor
-        if self._allow_undeclared_parameters:
-            return message_of("ParameterDescriptor", name=name)
-        raise ParameterNotDeclaredException(name)
-
-    def _known_descriptor(self, name: str) -> Any:
-        """Return the descriptor of a parameter, `None` if it is not declared."""
-        if (
-            name == _SIM_TIME
-            and name in self._parameters
-            and name not in self._parameter_descriptors
-        ):
-            self._parameter_descriptors[name] = _descriptor(
-                name, None, type=ParameterType.BOOL.value
-            )
-        return self._parameter_descriptors.get(name)
-
-    def describe_parameters(self, names: Iterable[str]) -> list[Any]:
-        """Return the descriptors of parameters."""
-        return [self.describe_parameter(name) for name in names]
+        parameter = self._known_parameter(name)
+        descriptor = self._parameter_descriptors.get(name) or message_of(
+            "ParameterDescriptor", name=name, dynamic_typing=name not in self._parameters
+        )
+        if descriptor.dynamic_typing or not descriptor.type:
+            descriptor.type = parameter.type_.value
+        return descriptor
 
     def list_parameters(self, prefixes: Iterable[str], depth: int) -> Any:
         """Return a ListParametersResult of the names with any of the prefixes, or of all.
 
         A name has at most `depth` parts more than its prefix, or any number if `depth` is 0.
         """
-        chosen = {*prefixes}
-        if depth < 0:
-            raise ValueError("the depth must be at least 0")
-        result = message_of("ListParametersResult")
-        above: dict[str, None] = {}
+        chosen = {*prefixes} or {""}
+        names = []
         for name in self._parameters:
             parts = name.split(".")
-            starts = range(1, len(parts)) if chosen else (0,)
-            if name in chosen or any(
-                (depth == 0 or len(parts) - at <= depth)
-                and (not at or ".".join(parts[:at]) in chosen)
-                for at in starts
-            ):
-                result.names.append(name)
-                if len(parts) > 1:
-                    above[".".join(parts[:-1])] = None
-        result.prefixes = [*above]
-        return result
+            starts = (".".join(parts[:length]) for length in range(len(parts) + 1))
+            below = [len(parts) - at for at, start in enumerate(starts) if start in chosen]
+            if below and (not depth or below[-1] <= depth):
+                names.append(name)
+        above = {name.rpartition(".")[0]: None for name in names if "." in name}
+        return message_of("ListParametersResult", names=names, prefixes=[*above])
 
 
-def _is_close(first: float, second: float) -> bool:
-    if isinstance(first, int) and isinstance(second, int):
-        return first == second
-    return math.isclose(first, second, rel_tol=TOLERANCE)
+def _check(parameter: Parameter, descriptor: Any, is_new: bool) -> None:
+    """Raise an InvalidParameterValueException if a descriptor forbids a value."""
+    name, type_, value = parameter.name, parameter.type_, parameter.value
+    if descriptor.read_only and not is_new:
+        raise values.InvalidParameterValueException(f"`{name}` is read-only")
+    is_free = descriptor.dynamic_typing or (is_new and value is None)
+    if not is_free and type_.value != descriptor.type:
+        right = ParameterType(descriptor.type).name
+        raise values.InvalidParameterTypeException(f"`{name}` is {right}, not {type_.name}")
+    for each in getattr(descriptor, _RANGES.get(type_, ""), ()):
+        low, high = sorted((each.from_value, each.to_value))
+        if not _is_inside(value, low, high, each.step):
+            limits = f"from {low} to {high}" + (f" in steps of {each.step}" if each.step else "")
+            raise values.InvalidParameterValueException(f"`{name}` must be {limits}, not {value}")
 
 
-def _descriptor(name: str, given: Any, **values: Any) -> Any:
-    """Return an own descriptor with the values of one that a program may use for several."""
-    kind = standard("rcl_interfaces/msg/ParameterDescriptor").kind
-    if given is not None:
-        if not hasattr(given, "read_only"):
-            raise TypeError(f"`{name}` has a ParameterDescriptor, not {given!r}")
-        values = {each: getattr(given, each) for each in kind.get_fields_and_field_types()}
-    return kind(**{**values, "name": name})
+def _is_inside(value: float, low: float, high: float, step: float) -> bool:
+    if isinstance(value, int):
+        return value == high or value in range(int(low), int(high) + 1, int(step) or 1)
+    is_end = any(math.isclose(value, end, rel_tol=TOLERANCE) for end in (low, high))
+    rest = (value - low) % step if step else 0.0
+    is_step = min(rest, step - rest) <= TOLERANCE * max(abs(value), step)
+    return is_end or (low < value < high and is_step)
 
 
-def _result(reason: str = "") -> Any:
-    return message_of("SetParametersResult", successful=not reason, reason=reason)
+# services
+
+
+def add_services(node: HasParameters, create_service: Callable[..., Any]) -> None:
+    """Create the six services of a node; their messages are compiled for the first request."""
+    for name, answer in _ANSWERS.items():
+        kind = standard(f"rcl_interfaces/srv/{name.title().replace('_', '')}")
+        create_service(f"~/{name}", kind, partial(answer, node), qos_profile_parameters)
+
+
+def _read(get: Callable[..., Any], field: str, node: Any, request: Any, response: Any) -> Any:
+    """Answer with an entry for each name, or with none if one of the parameters has none."""
+    with suppress(values.ParameterException):
+        setattr(response, field, [get(node, name) for name in request.names])
+    return response
+
+
+def _value(node: HasParameters, name: str) -> Any:
+    return node.get_parameter(name).get_parameter_value()
+
+
+def _list(node: HasParameters, request: Any, response: Any) -> Any:
+    response.result = node.list_parameters(request.prefixes, request.depth)
+    return response
+
+
+def _set(node: HasParameters, request: Any, response: Any) -> Any:
+    response.results = [_set_all(node, [message]) for message in request.parameters]
+    return response
+
+
+def _set_atomically(node: HasParameters, request: Any, response: Any) -> Any:
+    response.result = _set_all(node, request.parameters)
+    return response
+
+
+def _set_all(node: HasParameters, messages: list[Any]) -> Any:
+    try:
+        return node.set_parameters_atomically([*map(Parameter.from_parameter_msg, messages)])
+    except (values.ParameterException, ValueError) as error:
+        return message_of("SetParametersResult", successful=False, reason=str(error))
+
+
+#: The services, in the order of rclpy, so that ids are equal.
+_ANSWERS: dict[str, Callable[..., Any]] = {
+    "describe_parameters": partial(_read, HasParameters.describe_parameter, "descriptors"),
+    "get_parameters": partial(_read, _value, "values"),
+    "get_parameter_types": partial(_read, HasParameters.get_parameter_type, "types"),
+    "list_parameters": _list,
+    "set_parameters": _set,
+    "set_parameters_atomically": _set_atomically,
+}
