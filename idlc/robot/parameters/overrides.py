@@ -32,7 +32,7 @@ _DOUBLE = re.compile(r"(?ai)[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|\.?inf(inity)?|\
 class _Loader(yaml.SafeLoader):  # type: ignore[misc] # PyYAML is not typed
     """A loader that does not guess the type of what stands without quotes."""
 
-    yaml_implicit_resolvers = {None: [(_PLAIN, re.compile(""))]}  # noqa: RUF012 - PyYAML's
+    yaml_implicit_resolvers = {"": [("nothing", re.compile(""))], None: [(_PLAIN, re.compile(""))]}  # noqa: RUF012 - PyYAML's
 
 
 def overrides_of(arguments: Arguments, node: str) -> dict[str, Parameter]:
@@ -62,14 +62,14 @@ def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[
             left -= sum(map(len, path)) + len(value.value)
             if left < 0:
                 raise ValueError("it has too many values")
-            if isinstance(value, yaml.MappingNode):
+            if isinstance(value, yaml.MappingNode) and not names:
                 continue
             if _MARK not in path[:-1]:
                 raise ValueError(f"expected `node:`, `{_MARK}:` and `name: value`")
             end = path.index(_MARK)
+            parameter = Parameter(".".join(path[end + 1 :]), value=_value(value))
             if _matches("/".join(path[:end]), node):
-                name = ".".join(path[end + 1 :])
-                parameters[name] = Parameter(name, value=_value(value))
+                parameters[parameter.name] = parameter
     except (OSError, yaml.YAMLError, RecursionError, TypeError, ValueError) as error:
         mark = getattr(error, "problem_mark", None) or mark
         place = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
