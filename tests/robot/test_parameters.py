@@ -321,12 +321,12 @@ BOMB = "a: &a [x,x,x,x,x,x,x,x,x,x]\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("/**: {ros__parameters: {a: [1, 2.0]}}", "p.yaml:1:28: [1, 2.0] is no bool"),
+        ("/**: {ros__parameters: {a: [1, 2.0]}}", "p.yaml:1:28: [1, 2.0] is not a bool"),
         ("/**: {ros__parameters: {a: [1, [2]]}}", "p.yaml:1:28: expected a value or"),
         ("/**: {ros__parameters: {a: !!python/object:os.system x}}", "not tag:yaml.org,2002:py"),
         ("/**: {ros__parameters: 3}", "p.yaml:1:24: expected"),
         ("/**: {ros__parameters: {a: }}", "p.yaml:1:27: expected a value"),
-        ("other: {ros__parameters: {a: [b, 2]}}", "p.yaml:1:30: ['b', 2] is no bool"),
+        ("other: {ros__parameters: {a: [b, 2]}}", "p.yaml:1:30: ['b', 2] is not a bool"),
         ("/**:\n\tx", "p.yaml:2:1: "),
         ("[" * 1500, "p.yaml:"),  # the depth that Python can follow differs
         ("", "p.yaml: expected"),

@@ -33,7 +33,7 @@ class ParameterType(Enum):
         for type_ in cls:
             if type_.check(value):
                 return type_
-        raise TypeError(f"{value!r} is no bool, int, float, str or list of one of these types")
+        raise TypeError(f"{value!r} is not a bool, int, float, str or list of one of these")
 
     def check(self, value: Any) -> bool:
         """Return whether the value is of this type; an empty list is of each array type."""
