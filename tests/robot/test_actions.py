@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 import idlc
-from idlc.robot import ActionClient, ActionServer, CancelResponse, GoalResponse
+from idlc.robot import ActionClient, ActionServer, CancelResponse, GoalResponse, Parameter
 from idlc.robot.actions.client import ClientGoalHandle
 from idlc.robot.actions.goals import GoalState
 from idlc.robot.nodes.interfaces import standard
@@ -130,6 +130,15 @@ def test_all_goals_or_those_before_a_time_can_be_cancelled(pair):
     assert [bytes(each.goal_id.uuid) for each in answer.goals_canceling] == [
         bytes(third.goal_id.uuid)
     ]
+
+
+def test_one_goal_is_cancelled_when_a_simulation_begins(pair):
+    pair[0].set_parameters([Parameter("use_sim_time", value=True)])
+    ends = Ends(pair, cancel_callback=lambda _: CancelResponse.ACCEPT)
+    first, second = ends.send(), ends.send()
+    assert first.stamp == second.stamp == type(first.stamp)()
+    answer = ends.result(second.cancel_goal_async())
+    assert [[*each.goal_id.uuid] for each in answer.goals_canceling] == [[*second.goal_id.uuid]]
 
 
 def test_a_goal_can_be_aborted(pair):
