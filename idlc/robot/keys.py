@@ -31,7 +31,6 @@ from idlc.robot.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
-from idlc.robot.xxh3 import xxh3_128
 
 #: The longest token that idlc reads.
 MOST_TOKEN = 2048
@@ -104,12 +103,9 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def gid(self) -> bytes:
         """The id that the endpoint adds to each message."""
-        return _gid(self.token)
+        from xxhash import xxh3_128_intdigest
 
-
-@lru_cache(4096)
-def _gid(token: str) -> bytes:
-    return xxh3_128(token.encode()).to_bytes(GID_SIZE, "little")
+        return xxh3_128_intdigest(self.token.encode()).to_bytes(GID_SIZE, "little")
 
 
 def data_key(domain: int, name: str, type_: str, hash_: str) -> str:

@@ -202,10 +202,12 @@ def _reason(error: Exception) -> str:
 
 def _import_zenoh() -> Any:
     try:
+        import xxhash  # noqa: F401 - ids of endpoints need it
         import zenoh
     except ImportError as error:
         raise RobotError(
-            f"eclipse-zenoh is required: {error}", 'install it: `pip install "idlc[zenoh]"`'
+            f"eclipse-zenoh and xxhash are required: {error}",
+            'install it: `pip install "idlc[zenoh]"`',
         ) from None
     return zenoh
 

@@ -289,12 +289,14 @@ def test_a_robot_that_does_not_answer_is_one_sentence():
     assert ".rs" not in str(caught.value)
 
 
-def test_a_missing_zenoh_is_one_sentence(monkeypatch):
-    monkeypatch.setitem(sys.modules, "zenoh", None)
-    with pytest.raises(
-        RobotError, match=r"eclipse-zenoh is required: .*pip install \"idlc\[zenoh\]\""
-    ):
+@pytest.mark.parametrize("module", ["zenoh", "xxhash"])
+def test_a_missing_library_is_one_sentence(monkeypatch, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(RobotError) as caught:
         open_session("tcp/127.0.0.1:1")
+    assert caught.value.message.startswith("eclipse-zenoh and xxhash are required: ")
+    assert module in caught.value.message.partition(": ")[2]
+    assert caught.value.hint == 'install it: `pip install "idlc[zenoh]"`'
 
 
 def test_a_path_that_exists_is_no_robot(tmp_path, monkeypatch):
