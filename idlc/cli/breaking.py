@@ -150,7 +150,7 @@ def command(
     from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
     from idlc.project.settings import scope, settings_here
-    from idlc.robot.session import is_address
+    from idlc.project.find import is_address
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)

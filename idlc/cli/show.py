@@ -143,7 +143,7 @@ def command(
     from idlc.cli import output
     from idlc.documents import show
     from idlc.recordings.find import is_recording
-    from idlc.robot.session import is_address
+    from idlc.project.find import is_address
 
     if not is_recording(subject, scope.root):
         if topics:

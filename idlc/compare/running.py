@@ -44,7 +44,7 @@ from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.robot.live.ends import RobotGraph, join_robot
-from idlc.robot.session import is_address
+from idlc.project.find import is_address
 from idlc.wire.layout import oversized
 
 #: A graph that never comes to rest is watched for this many times the patience.

@@ -94,6 +94,8 @@ SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
 #: The name of a type or package, as ROS 2, Python or C++ writes it.
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
+#: A configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
+_ADDRESS = re.compile(r"zenoh:|(?:tcp|tls|quic|udp|ws)/")
 NOTHING = Exclusions()
 
 
@@ -121,6 +123,14 @@ def is_path(text: str, root: Root) -> bool:
     """Return whether a word on the command line means a path rather than a type or package."""
     named = _NAME.fullmatch(text) and Path(text).suffix not in KINDS
     return not named or os.path.lexists(root.path(text))
+
+
+def is_address(word: str) -> bool:
+    """Return whether a word on the command line means a robot; a path that exists does not.
+
+    Malformed addresses count as well, so that connecting reports them.
+    """
+    return _ADDRESS.match(word) is not None and not os.path.lexists(word)
 
 
 class Listing(msgspec.Struct, frozen=True):

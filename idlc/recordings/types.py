@@ -29,7 +29,7 @@ from idlc.recordings.containers.file import UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
-from idlc.robot.session import is_address
+from idlc.project.find import is_address
 from idlc.wire.layout import oversized
 
 #: The number of versions that a topic is compared with.

@@ -6,10 +6,9 @@ import json
 import os
 import re
 from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from itertools import count
 from threading import Lock
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from idlc.diagnostics.text import one_line
@@ -22,45 +21,35 @@ if TYPE_CHECKING:
 #: The port of rmw_zenoh's router.
 ROUTER_PORT = 7447
 MOST_DOMAIN = 999_999
-_LOOPBACK = "tcp/127.0.0.1:0"
+_LOOPBACK = {"router": ["tcp/127.0.0.1:0"], "peer": ["tcp/127.0.0.1:0"]}
 _FILE = "zenoh:"
-_PROTOCOLS = ("tcp", "tls", "quic", "udp", "ws")
-_ENDPOINT = re.compile(
-    rf"(?:{'|'.join(_PROTOCOLS)})/(?:\[[0-9A-Fa-f:.]+\]|[\w.-]+):\d{{1,5}}(?:[?#].*)?"
-)
-_WITHOUT_PORT = re.compile(rf"(?:{'|'.join(_PROTOCOLS)})/[^/:]+")
-
+#: An endpoint: its protocol and host, its port, and options for the protocol.
+_ENDPOINT = re.compile(r"([a-z]+/(?:\[[0-9A-Fa-f:.]+\]|[\w.-]+))(:\d{1,5}(?:[?#].*)?)?")
 #: The settings of every session, as rmw_zenoh has them.
-_COMMON: Mapping[str, Any] = MappingProxyType(
-    {
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": True,
-        "timestamping/enabled": {"router": True, "peer": True, "client": True},
-        "queries_default_timeout": 600_000,
-        "transport/link/tx/lease": 60_000,
-    }
-)
-_ROUTER_ON_LOCALHOST = (f"tcp/localhost:{ROUTER_PORT}",)
+_COMMON: dict[str, Any] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": True,
+    "timestamping/enabled": True,
+    "queries_default_timeout": 600_000,
+    "transport/link/tx/lease": 60_000,
+}
 
 
 class Session(AbstractContextManager["Session"]):
     """A connection to a robot, and what its nodes and endpoints share.
 
-    Closing it twice, or from another thread, is allowed. `domain` is the ROS_DOMAIN_ID.
+    Closing it twice, or from another thread, is allowed. `domain` is the ROS_DOMAIN_ID, `id` the
+    id of the session in tokens.
     """
 
     def __init__(self, transport: Transport, domain: int) -> None:
         self.transport = transport
         self.domain = domain
+        self.id = transport.id
         self._ids = count()
         self._lock = Lock()
         self._graph: Graph | None = None
         self._is_closed = False
-
-    @property
-    def id(self) -> str:
-        """The id of the session in tokens."""
-        return self.transport.id
 
     def next_id(self) -> int:
         """Return an id for a node or an endpoint of this session; the first is 0."""
@@ -88,75 +77,46 @@ class Session(AbstractContextManager["Session"]):
         self.close()
 
 
-def is_address(word: str) -> bool:
-    """Return whether a word of a command line means a robot; a path that exists does not.
-
-    Malformed addresses count as well, so that `open_session` reports them.
-    """
-    first, slash, _ = word.partition("/")
-    return (
-        word.startswith(_FILE) or (slash != "" and first in _PROTOCOLS)
-    ) and not os.path.lexists(word)
-
-
 def open_session(
-    *addresses: str,
+    address: str = "",
+    *,
     domain: int | None = None,
-    listen: Iterable[str] = (),
     timeout: float = 5.0,
     environ: Mapping[str, str] = os.environ,
 ) -> Session:
     """Return a session with a robot.
 
-    An address is an endpoint such as `tcp/robot:7447`, several of them with commas, or
-    `zenoh:FILE`, a configuration file of Zenoh. The session is a client of the first endpoint that
-    answers within `timeout` seconds each. Without an address, it is a peer as in rmw_zenoh: of
-    ZENOH_SESSION_CONFIG_URI, or of the router on localhost, which may start later. ROS_DOMAIN_ID
-    is the default of `domain`, and ZENOH_CONFIG_OVERRIDE applies always. Only what `listen` or a
-    configuration file names can be reached from other machines. Raises RobotError.
+    An address is an endpoint such as `tcp/robot:7447`, or `zenoh:FILE`, a configuration file of
+    Zenoh. The session is a client of the endpoint, which answers within `timeout` seconds. Without
+    an address, it is a peer as in rmw_zenoh: of ZENOH_SESSION_CONFIG_URI, or of the router on
+    localhost, which may start later. ROS_DOMAIN_ID is the default of `domain`, and
+    ZENOH_CONFIG_OVERRIDE applies always. Only a configuration can admit other machines. Raises
+    RobotError.
     """
     zenoh = _import_zenoh()
-    domain = _domain(environ) if domain is None else domain
-    words = [part for address in addresses for part in _split(address)]
-    files = [word for word in words if word.startswith(_FILE)]
-    if files and len(words) > 1:
-        raise RobotError(
-            f"`{one_line(files[0])}` cannot be combined with other addresses",
-            "name the endpoints in the configuration file",
-        )
-    path = files[0].removeprefix(_FILE) if files else ""
-    if not words:
-        path = environ.get("ZENOH_SESSION_CONFIG_URI", "")
-    settings: dict[str, Any] = {}
-    listens = [_checked(word) for word in listen]
+    path = environ.get("ZENOH_SESSION_CONFIG_URI", "")
+    if address:
+        path = address.removeprefix(_FILE) if address.startswith(_FILE) else ""
     if path:
         config = _read(zenoh, path)
-        settings = {"timestamping/enabled": True, **_closed(zenoh, config)}
     else:
-        config = zenoh.Config()
-        mode = "client" if words and not listens else "peer"
+        endpoint = _checked(address) if address else f"tcp/localhost:{ROUTER_PORT}"
         settings = {
-            **_COMMON,
-            "mode": mode,
-            "connect/endpoints": [_checked(word) for word in words] or _ROUTER_ON_LOCALHOST,
-            "connect/timeout_ms": int(timeout * 1000) if words else -1,
-            "connect/exit_on_failure": bool(words),
+            "mode": "client" if address else "peer",
+            "connect/endpoints": [endpoint],
+            "connect/timeout_ms": int(timeout * 1000) if address else -1,
+            "connect/exit_on_failure": bool(address),
+            "listen/endpoints": _LOOPBACK,
         }
-        if mode == "peer":
-            settings["listen/endpoints"] = [_LOOPBACK]
-    if listens:
-        settings["listen/endpoints"] = listens
-    _insert(config, settings)
-    _override(config, environ)
-    from idlc.robot.zenoh_transport import ZenohTransport
-
-    if len(words) > 1 and not listens:  # Zenoh itself would wait for the first one alone
-        for word in words[:-1]:
-            with suppress(RobotError):
-                return open_session(word, domain=domain, timeout=timeout, environ=environ)
-        return open_session(words[-1], domain=domain, timeout=timeout, environ=environ)
-    target = ", ".join(words) or path
-    return Session(ZenohTransport(_open(zenoh, config, target, timeout)), domain)
+        config = _configured(zenoh.Config(), _COMMON | settings)
+    try:
+        return _open(zenoh, config, domain, environ)
+    except zenoh.ZError as error:
+        where = f"`{one_line(address or path)}`" if address or path else "the router"
+        raise RobotError(
+            f"{where} does not answer: {_reason(error)}",
+            f"is rmw_zenohd or `idlc robot router` running there? idlc waited {timeout:g} s",
+        ) from None
 
 
 def open_router(
@@ -171,21 +131,16 @@ def open_router(
     """
     zenoh = _import_zenoh()
     endpoints = [_checked(word) for word in listen]
-    config = zenoh.Config()
     settings = {
-        **_COMMON,
         "mode": "router",
         "listen/endpoints": endpoints,
         "connect/endpoints": [_checked(word) for word in connect],
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
     }
-    _insert(config, settings)
-    _override(config, environ)
-    from idlc.robot.zenoh_transport import ZenohTransport
-
     try:
-        return Session(ZenohTransport(zenoh.open(config)), _domain(environ))
+        config = _configured(zenoh.Config(), _COMMON | settings)
+        return _open(zenoh, config, None, environ)
     except zenoh.ZError as error:
         raise RobotError(
             f"no router can listen on {', '.join(endpoints)}: {_reason(error)}",
@@ -193,16 +148,9 @@ def open_router(
         ) from None
 
 
-def _reason(error: Exception) -> str:
-    """Return an error of Zenoh without the position in its source."""
-    text = re.split(r" at /| at [A-Za-z]:", str(error))[0]
-    match = re.search(r'(?:Str\(|msg: )"(.*)"', text, re.DOTALL)
-    return one_line((match[1] if match else text).split("\\n")[-1].strip(" ="))
-
-
 def _import_zenoh() -> Any:
     try:
-        import xxhash  # noqa: F401 - ids of endpoints need it
+        import xxhash  # noqa: F401 - the ids of endpoints need it
         import zenoh
     except ImportError as error:
         raise RobotError(
@@ -212,58 +160,43 @@ def _import_zenoh() -> Any:
     return zenoh
 
 
-def _domain(environ: Mapping[str, str]) -> int:
-    text = environ.get("ROS_DOMAIN_ID", "").strip() or "0"
-    if not (re.fullmatch("[0-9]{1,9}", text) and int(text) <= MOST_DOMAIN):
-        raise RobotError(f"ROS_DOMAIN_ID is `{one_line(text)}`", "set it to a number such as 0")
-    return int(text)
-
-
-def _split(address: str) -> list[str]:
-    if address.startswith(_FILE):
-        return [address]
-    return [word.strip() for word in address.split(",")]
-
-
 def _checked(endpoint: str) -> str:
     """Return an endpoint; raise RobotError if it is malformed."""
-    if _ENDPOINT.fullmatch(endpoint):
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match and match[2]:
         return endpoint
-    good = f"{endpoint}:{ROUTER_PORT}" if _WITHOUT_PORT.fullmatch(endpoint) else ""
-    raise RobotError(
-        f"`{one_line(endpoint)}` is not an endpoint",
-        f"write `{one_line(good) or f'tcp/localhost:{ROUTER_PORT}'}`",
-    )
+    good = f"{match[1] if match else 'tcp/localhost'}:{ROUTER_PORT}"
+    raise RobotError(f"`{one_line(endpoint)}` is not an endpoint", f"write `{good}`")
 
 
 def _read(zenoh: Any, path: str) -> Any:
-    """Return the configuration in a file."""
+    """Return the configuration in a file, restricted to loopback where it leaves that open."""
     try:
-        return zenoh.Config.from_file(path)
+        config = zenoh.Config.from_file(path)
     except zenoh.ZError as error:
         raise RobotError(
             f"`{one_line(path)}` is not a configuration of Zenoh: {_reason(error)}",
             "write the name of a .json5 file, such as the files of rmw_zenoh_cpp",
         ) from None
-
-
-def _closed(zenoh: Any, config: Any) -> dict[str, Any]:
-    """Return settings that restrict a configuration to loopback where it leaves that open."""
-    settings: dict[str, Any] = {}
+    settings: dict[str, Any] = {"timestamping/enabled": True}
     if config.get_json("listen/endpoints") == zenoh.Config().get_json("listen/endpoints"):
-        settings["listen/endpoints"] = {"router": [_LOOPBACK], "peer": [_LOOPBACK]}
+        settings["listen/endpoints"] = _LOOPBACK
     if config.get_json("scouting/multicast/enabled") == "null":
         settings["scouting/multicast/enabled"] = False
-    return settings
+    return _configured(config, settings)
 
 
-def _insert(config: Any, settings: Mapping[str, Any]) -> None:
+def _configured(config: Any, settings: Mapping[str, Any]) -> Any:
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
+    return config
 
 
-def _override(config: Any, environ: Mapping[str, str]) -> None:
-    """Apply `path=json5;path=json5`, as rmw_zenoh does."""
+def _open(zenoh: Any, config: Any, domain: int | None, environ: Mapping[str, str]) -> Session:
+    """Return a session with this configuration and those of rmw_zenoh's environment variables."""
+    text = environ.get("ROS_DOMAIN_ID", "").strip() or "0" if domain is None else str(domain)
+    if not (re.fullmatch("[0-9]{1,9}", text) and int(text) <= MOST_DOMAIN):
+        raise RobotError(f"ROS_DOMAIN_ID is `{one_line(text)}`", "set it to a number such as 0")
     for item in environ.get("ZENOH_CONFIG_OVERRIDE", "").split(";"):
         key, separator, value = item.partition("=")
         try:
@@ -274,14 +207,13 @@ def _override(config: Any, environ: Mapping[str, str]) -> None:
                 f"ZENOH_CONFIG_OVERRIDE has `{one_line(item)}`: {_reason(error)}",
                 'write `mode="client";connect/endpoints=["tcp/robot:7447"]`',
             ) from None
+    from idlc.robot.zenoh_transport import ZenohTransport
+
+    return Session(ZenohTransport(zenoh.open(config)), int(text))
 
 
-def _open(zenoh: Any, config: Any, target: str, timeout: float) -> Any:
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        where = f"`{one_line(target)}`" if target else "the router"
-        raise RobotError(
-            f"{where} does not answer: {_reason(error)}",
-            f"is rmw_zenohd or `idlc robot router` running there? idlc waited {timeout:g} s",
-        ) from None
+def _reason(error: Exception) -> str:
+    """Return an error of Zenoh without the position in its source."""
+    text = re.split(r" at /| at [A-Za-z]:", str(error))[0]
+    match = re.search(r'(?:Str\(|msg: )"(.*)"', text, re.DOTALL)
+    return one_line((match[1] if match else text).split("\\n")[-1].strip(" ="))

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.main import main
+from idlc.project.find import is_address
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from idlc.robot.session import is_address, open_router, open_session
+from idlc.robot.session import open_router, open_session
 from tests.robot.conftest import free_endpoint, start_router
 from tests.robot.nodes import pass_on
 
@@ -181,8 +182,9 @@ def test_a_call_ends_after_its_timeout(sessions):
 
 def test_peers_need_no_router():
     endpoint = free_endpoint()
-    nobody = {"ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{free_endpoint()}"]'}
-    with opened(listen=[endpoint], environ=nobody) as left, opened(endpoint) as right:
+    override = f'connect/endpoints=["{free_endpoint()}"];listen/endpoints=["{endpoint}"]'
+    alone = {"ZENOH_CONFIG_OVERRIDE": override}
+    with opened(environ=alone) as left, opened(endpoint) as right:
         node = entity(left, Kind.NODE)
         left.transport.announce(node.token)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
@@ -209,19 +211,6 @@ def test_a_lost_connection_comes_back():
         assert right.graph.wait_for(lambda graph: not graph.entities(), LONG)
         with open_router([endpoint], environ={}):
             assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
-
-
-def test_the_first_endpoint_that_answers_is_taken(router):
-    def opened_second():
-        for timeout in (1, 10):  # both endpoints get this time
-            with suppress(RobotError):
-                return opened(f"{free_endpoint()},{router}", timeout=timeout)
-        return opened(f"{free_endpoint()},{router}", timeout=LONG)
-
-    with opened_second() as one, opened(router, free_endpoint()) as two:
-        node = entity(one, Kind.NODE)
-        one.transport.announce(node.token)
-        assert two.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
 
 
 def test_a_configuration_file_is_used_and_opens_nothing_more(router, tmp_path):
@@ -256,10 +245,13 @@ def listening():
         (["tcp/robot"], {}, "`tcp/robot` is not an endpoint (write `tcp/robot:7447`)"),
         (["tcp/"], {}, "`tcp/` is not an endpoint (write `tcp/localhost:7447`)"),
         (["robot:7447"], {}, "`robot:7447` is not an endpoint (write `tcp/localhost:7447`)"),
-        (["tcp/a:1,"], {}, "`` is not an endpoint (write `tcp/localhost:7447`)"),
+        (["tcp/a:1,tcp/b:1"], {}, "`tcp/a:1,tcp/b:1` is not an endpoint"),
+        (["tcp/127.0.0.1:99999"], {}, "`tcp/127.0.0.1:99999` does not answer: "),
+        (["abc/127.0.0.1:1"], {}, "`abc/127.0.0.1:1` does not answer: "),
+        (["tcp/127.0.0.1:1?x"], {}, "`tcp/127.0.0.1:1?x` does not answer: "),
         (["tcp/a\nb:1"], {}, "`tcp/a␊b:1` is not an endpoint"),
         (["zenoh:no.json5"], {}, "`no.json5` is not a configuration of Zenoh: No such file"),
-        (["zenoh:a", "tcp/a:1"], {}, "`zenoh:a` cannot be combined with other addresses"),
+        (["zenoh:"], {}, "`zenoh:` is not an endpoint"),
         ([], {"ZENOH_SESSION_CONFIG_URI": "x"}, "`x` is not a configuration of Zenoh"),
         ([], {"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is `x` (set it to a number such as 0)"),
         ([], {"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is `-1`"),

@@ -22,7 +22,7 @@ from idlc.recordings.containers.file import (
 )
 from idlc.recordings.containers.mcap import McapFile
 from idlc.recordings.containers.source import RecordingError, first_bytes, is_local, of_file
-from idlc.robot.session import is_address
+from idlc.project.find import is_address
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
