@@ -1,167 +1,54 @@
 """A live robot: its graph and types, and nodes without ROS, over the protocol of rmw_zenoh."""
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from idlc.robot.actions.client import ActionClient, ClientGoalHandle
-    from idlc.robot.actions.goals import CancelResponse, GoalResponse
-    from idlc.robot.actions.server import ActionServer, ServerGoalHandle
-    from idlc.robot.errors import RobotError
-    from idlc.robot.graph import Graph
-    from idlc.robot.nodes.arguments import remove_ros_args
-    from idlc.robot.nodes.clock import Clock, ClockType, Duration, Time
-    from idlc.robot.nodes.context import (
-        Context,
-        SignalHandlerOptions,
-        get_default_context,
-        init,
-        ok,
-        shutdown,
-        try_shutdown,
-    )
-    from idlc.robot.nodes.endpoints import (
-        Publisher,
-        PublisherEventCallbacks,
-        Subscription,
-        SubscriptionEventCallbacks,
-    )
-    from idlc.robot.nodes.executor import (
-        Executor,
-        ExternalShutdownException,
-        MutuallyExclusiveCallbackGroup,
-        ReentrantCallbackGroup,
-        SingleThreadedExecutor,
-    )
-    from idlc.robot.nodes.logger import Logger, LoggingSeverity, get_logger
-    from idlc.robot.nodes.node import Node
-    from idlc.robot.nodes.services import Client, Service
-    from idlc.robot.nodes.spinning import spin, spin_once, spin_until_future_complete
-    from idlc.robot.nodes.tasks import Future
-    from idlc.robot.nodes.timer import Timer
-    from idlc.robot.parameters.values import Parameter, parameter_value_to_python
-    from idlc.robot.qos import (
-        DurabilityPolicy,
-        HistoryPolicy,
-        LivelinessPolicy,
-        QoSProfile,
-        ReliabilityPolicy,
-    )
-    from idlc.robot.session import Session, open_router, open_session
-
-__all__ = [
-    "ActionClient",
-    "ActionServer",
-    "CancelResponse",
-    "Client",
-    "ClientGoalHandle",
-    "Clock",
-    "ClockType",
-    "Context",
-    "DurabilityPolicy",
-    "Duration",
-    "Executor",
-    "ExternalShutdownException",
-    "Future",
-    "GoalResponse",
-    "Graph",
-    "HistoryPolicy",
-    "LivelinessPolicy",
-    "Logger",
-    "LoggingSeverity",
-    "MutuallyExclusiveCallbackGroup",
-    "Node",
-    "Parameter",
-    "Publisher",
-    "PublisherEventCallbacks",
-    "QoSProfile",
-    "ReentrantCallbackGroup",
-    "ReliabilityPolicy",
-    "RobotError",
-    "ServerGoalHandle",
-    "Service",
-    "Session",
-    "SignalHandlerOptions",
-    "SingleThreadedExecutor",
-    "Subscription",
-    "SubscriptionEventCallbacks",
-    "Time",
-    "Timer",
-    "get_default_context",
-    "get_logger",
-    "init",
-    "ok",
-    "open_router",
-    "open_session",
-    "parameter_value_to_python",
-    "remove_ros_args",
-    "shutdown",
-    "spin",
-    "spin_once",
-    "spin_until_future_complete",
-    "try_shutdown",
-]
-
-#: The names that programs use, and the modules that are imported when they ask for one.
-_MODULES = {
-    "ActionClient": "actions.client",
-    "ActionServer": "actions.server",
-    "CancelResponse": "actions.goals",
-    "Client": "nodes.services",
-    "ClientGoalHandle": "actions.client",
-    "Clock": "nodes.clock",
-    "ClockType": "nodes.clock",
-    "Context": "nodes.context",
-    "DurabilityPolicy": "qos",
-    "Duration": "nodes.clock",
-    "Executor": "nodes.executor",
-    "ExternalShutdownException": "nodes.executor",
-    "Future": "nodes.tasks",
-    "GoalResponse": "actions.goals",
-    "Graph": "graph",
-    "HistoryPolicy": "qos",
-    "LivelinessPolicy": "qos",
-    "Logger": "nodes.logger",
-    "LoggingSeverity": "nodes.logger",
-    "MutuallyExclusiveCallbackGroup": "nodes.executor",
-    "Node": "nodes.node",
-    "Parameter": "parameters.values",
-    "Publisher": "nodes.endpoints",
-    "PublisherEventCallbacks": "nodes.endpoints",
-    "QoSProfile": "qos",
-    "ReentrantCallbackGroup": "nodes.executor",
-    "ReliabilityPolicy": "qos",
-    "RobotError": "errors",
-    "ServerGoalHandle": "actions.server",
-    "Service": "nodes.services",
-    "Session": "session",
-    "SignalHandlerOptions": "nodes.context",
-    "SingleThreadedExecutor": "nodes.executor",
-    "Subscription": "nodes.endpoints",
-    "SubscriptionEventCallbacks": "nodes.endpoints",
-    "Time": "nodes.clock",
-    "Timer": "nodes.timer",
-    "get_default_context": "nodes.context",
-    "get_logger": "nodes.logger",
-    "init": "nodes.context",
-    "ok": "nodes.context",
-    "open_router": "session",
-    "open_session": "session",
-    "parameter_value_to_python": "parameters.values",
-    "remove_ros_args": "nodes.arguments",
-    "shutdown": "nodes.context",
-    "spin": "nodes.spinning",
-    "spin_once": "nodes.spinning",
-    "spin_until_future_complete": "nodes.spinning",
-    "try_shutdown": "nodes.context",
-}
-
-
-def __getattr__(name: str) -> object:
-    """Import a name when a program asks for it."""
-    if name in _MODULES:
-        return getattr(__import__(f"idlc.robot.{_MODULES[name]}", fromlist=[name]), name)
-    raise AttributeError(f"module 'idlc.robot' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    """Return the public names, for help() and completion."""
-    return sorted({*globals(), *__all__})
+from idlc.robot.actions.client import ActionClient as ActionClient
+from idlc.robot.actions.client import ClientGoalHandle as ClientGoalHandle
+from idlc.robot.actions.goals import CancelResponse as CancelResponse
+from idlc.robot.actions.goals import GoalResponse as GoalResponse
+from idlc.robot.actions.server import ActionServer as ActionServer
+from idlc.robot.actions.server import ServerGoalHandle as ServerGoalHandle
+from idlc.robot.errors import RobotError as RobotError
+from idlc.robot.graph import Graph as Graph
+from idlc.robot.nodes.arguments import remove_ros_args as remove_ros_args
+from idlc.robot.nodes.clock import Clock as Clock
+from idlc.robot.nodes.clock import ClockType as ClockType
+from idlc.robot.nodes.clock import Duration as Duration
+from idlc.robot.nodes.clock import Time as Time
+from idlc.robot.nodes.context import Context as Context
+from idlc.robot.nodes.context import SignalHandlerOptions as SignalHandlerOptions
+from idlc.robot.nodes.context import get_default_context as get_default_context
+from idlc.robot.nodes.context import init as init
+from idlc.robot.nodes.context import ok as ok
+from idlc.robot.nodes.context import shutdown as shutdown
+from idlc.robot.nodes.context import try_shutdown as try_shutdown
+from idlc.robot.nodes.endpoints import Publisher as Publisher
+from idlc.robot.nodes.endpoints import PublisherEventCallbacks as PublisherEventCallbacks
+from idlc.robot.nodes.endpoints import Subscription as Subscription
+from idlc.robot.nodes.endpoints import SubscriptionEventCallbacks as SubscriptionEventCallbacks
+from idlc.robot.nodes.executor import Executor as Executor
+from idlc.robot.nodes.executor import ExternalShutdownException as ExternalShutdownException
+from idlc.robot.nodes.executor import (
+    MutuallyExclusiveCallbackGroup as MutuallyExclusiveCallbackGroup,
+)
+from idlc.robot.nodes.executor import ReentrantCallbackGroup as ReentrantCallbackGroup
+from idlc.robot.nodes.executor import SingleThreadedExecutor as SingleThreadedExecutor
+from idlc.robot.nodes.logger import Logger as Logger
+from idlc.robot.nodes.logger import LoggingSeverity as LoggingSeverity
+from idlc.robot.nodes.logger import get_logger as get_logger
+from idlc.robot.nodes.node import Node as Node
+from idlc.robot.nodes.services import Client as Client
+from idlc.robot.nodes.services import Service as Service
+from idlc.robot.nodes.spinning import spin as spin
+from idlc.robot.nodes.spinning import spin_once as spin_once
+from idlc.robot.nodes.spinning import spin_until_future_complete as spin_until_future_complete
+from idlc.robot.nodes.tasks import Future as Future
+from idlc.robot.nodes.timer import Timer as Timer
+from idlc.robot.parameters.values import Parameter as Parameter
+from idlc.robot.parameters.values import parameter_value_to_python as parameter_value_to_python
+from idlc.robot.qos import DurabilityPolicy as DurabilityPolicy
+from idlc.robot.qos import HistoryPolicy as HistoryPolicy
+from idlc.robot.qos import LivelinessPolicy as LivelinessPolicy
+from idlc.robot.qos import QoSProfile as QoSProfile
+from idlc.robot.qos import ReliabilityPolicy as ReliabilityPolicy
+from idlc.robot.session import Session as Session
+from idlc.robot.session import open_router as open_router
+from idlc.robot.session import open_session as open_session

@@ -23,8 +23,6 @@ from idlc.robot.names import (
     ros_type,
 )
 from idlc.robot.qos import (
-    DEFAULT_DEPTH,
-    INFINITE,
     DurabilityPolicy,
     HistoryPolicy,
     LivelinessPolicy,
@@ -39,17 +37,14 @@ NO_HASH = "TypeHashNotSupported"
 GID_SIZE = 16
 _SECOND = 10**9
 _PREFIX = "@ros2_lv"
-_HEAD_PARTS = 6
-_NODE_PARTS = 9
-_ENDPOINT_PARTS = 13
-_HEAD = re.compile(r"(\d{1,6})/([0-9a-f]{1,32})/(\d{1,10})/(\d{1,10})/(NN|M[PS]|S[SC])/", re.ASCII)
-_HASH = re.compile(r"[A-Za-z0-9_]{1,128}", re.ASCII)
-_NUMBER = r"(\d{0,10})"
-_QOS = re.compile(
-    rf"{_NUMBER}:{_NUMBER}:{_NUMBER},{_NUMBER}"
-    rf":{_NUMBER},{_NUMBER}:{_NUMBER},{_NUMBER}:{_NUMBER},{_NUMBER},{_NUMBER}",
+#: A node, or a node and an endpoint: names, a type of DDS, a hash and QoS. `/` in names is `%`.
+_TOKEN = re.compile(
+    rf"{_PREFIX}/(\d{{1,6}})/([0-9a-f]{{1,32}})/(\d{{1,10}})/(\d{{1,10}})/(NN|M[PS]|S[SC])"
+    r"/([^/]+)/([^/]+)/([^/]+)(?:/([^/]+)/([^/]+)/(\w{1,128})/([^/]+))?(?:/|\Z)",
     re.ASCII,
 )
+_QOS = "{}:{}:{},{}:{},{}:{},{}:{},{},{}"
+_QOS_PATTERN = re.compile(_QOS.replace("{}", r"(\d{0,10})"), re.ASCII)
 
 
 class Kind(str, Enum):
@@ -122,12 +117,13 @@ def all_tokens(domain: int) -> str:
 
 
 def _make_token(entity: Entity) -> str:
-    head = (_PREFIX, entity.domain, entity.session, entity.node_id, entity.id, entity.kind.value)
     names = [entity.enclave, entity.namespace, entity.node]
+    end = []
     if entity.kind is not Kind.NODE:
         names += (entity.name, dds_type(entity.type), entity.hash or NO_HASH)
-    parts = [*map(str, head), *(name.replace("/", "%") for name in names)]
-    return "/".join(parts if entity.kind is Kind.NODE else [*parts, format_qos(entity.qos)])
+        end = [format_qos(entity.qos)]
+    head = (_PREFIX, entity.domain, entity.session, entity.node_id, entity.id, entity.kind.value)
+    return "/".join([*map(str, head), *(name.replace("/", "%") for name in names), *end])
 
 
 def parse_token(token: str) -> Entity | None:
@@ -135,24 +131,18 @@ def parse_token(token: str) -> Entity | None:
 
     Further parts, which later versions of rmw_zenoh add, are ignored.
     """
-    match = _HEAD.match(token, len(_PREFIX) + 1) if token.startswith(f"{_PREFIX}/") else None
-    if match is None or len(token) > MOST_TOKEN:
+    match = _TOKEN.match(token) if len(token) <= MOST_TOKEN else None
+    if match is None:
         return None
-    domain, session, node_id, id_, mark = match.groups()
-    kind = Kind(mark)
-    parts = [part.replace("%", "/") for part in token[match.end() :].split("/")]
-    if len(parts) < (_NODE_PARTS if kind is Kind.NODE else _ENDPOINT_PARTS) - _HEAD_PARTS:
-        return None
-    enclave, namespace, node, *rest = parts
+    domain, session, node_id, id_, mark, *parts, hash_, qos_part = match.groups("")
+    enclave, namespace, node, name, dds = (part.replace("%", "/") for part in parts)
+    kind, type_, qos = Kind(mark), ros_type(dds), parse_qos(qos_part)
     if not (is_namespace(enclave) and is_namespace(namespace) and is_node_name(node)):
         return None
-    name = type_ = hash_ = ""
-    qos: QoSProfile | None = None
-    if kind is not Kind.NODE:
-        name, dds, hash_, qos_part, *_ = rest
-        type_, qos = ros_type(dds) or "", parse_qos(qos_part)
-        if not (is_absolute(name) and type_ and _HASH.fullmatch(hash_) and qos):
-            return None
+    if kind is Kind.NODE:
+        name, type_, hash_, qos = "", "", "", QoSProfile()
+    elif not (is_absolute(name) and type_ and qos):
+        return None
     return Entity(
         domain=int(domain),
         session=session,
@@ -163,57 +153,51 @@ def parse_token(token: str) -> Entity | None:
         namespace=namespace,
         node=node,
         name=name,
-        type=type_,
+        type=type_ or "",
         hash="" if hash_ == NO_HASH else hash_,
         qos=qos or QoSProfile(),
         token=token,
     )
 
 
-def format_qos(qos: QoSProfile) -> str:
-    """Return the QoS part of a token, in which defaults are empty."""
-    depth = "" if qos.depth == DEFAULT_DEPTH else qos.depth
+def _numbers(qos: QoSProfile) -> tuple[int, ...]:
+    """Return the numbers of a profile in the order of a token."""
     return (
-        f"{_other(qos.reliability, ReliabilityPolicy.RELIABLE)}"
-        f":{_other(qos.durability, DurabilityPolicy.VOLATILE)}"
-        f":{_other(qos.history, HistoryPolicy.KEEP_LAST)},{depth}"
-        f":{_duration(qos.deadline)}:{_duration(qos.lifespan)}"
-        f":{_other(qos.liveliness, LivelinessPolicy.AUTOMATIC)}"
-        f",{_duration(qos.liveliness_lease_duration)}"
+        *(qos.reliability, qos.durability, qos.history, qos.depth),
+        *divmod(qos.deadline, _SECOND),
+        *divmod(qos.lifespan, _SECOND),
+        qos.liveliness,
+        *divmod(qos.liveliness_lease_duration, _SECOND),
     )
 
 
-def _other(value: int, default: int) -> str:
-    return "" if value == default else str(int(value))
+_DEFAULTS = _numbers(QoSProfile())
 
 
-def _duration(nanoseconds: int) -> str:
-    pairs = zip(divmod(nanoseconds, _SECOND), divmod(INFINITE, _SECOND), strict=True)
-    return ",".join(_other(value, default) for value, default in pairs)
+def format_qos(qos: QoSProfile) -> str:
+    """Return the QoS part of a token, in which defaults are empty."""
+    pairs = zip(_numbers(qos), _DEFAULTS, strict=True)
+    return _QOS.format(*("" if value == default else int(value) for value, default in pairs))
 
 
 @lru_cache(1024)
 def parse_qos(text: str) -> QoSProfile | None:
     """Return the profile of a token's QoS part; `None` if it is malformed."""
-    match = _QOS.fullmatch(text)
+    match = _QOS_PATTERN.fullmatch(text)
     if match is None:
         return None
-    values = [int(value) if value else None for value in match.groups()]
-    durations = []
-    for at in (4, 6, 9):
-        pairs = zip(values[at : at + 2], divmod(INFINITE, _SECOND), strict=True)
-        seconds, rest = (default if value is None else value for value, default in pairs)
-        durations.append(seconds * _SECOND + rest)
+    pairs = zip(match.groups(), _DEFAULTS, strict=True)
+    values = [int(number) if number else default for number, default in pairs]
     try:
         return QoSProfile(
-            reliability=ReliabilityPolicy(values[0] or 0),
-            durability=DurabilityPolicy(values[1] or 0),
-            history=HistoryPolicy(values[2] or 0),
-            depth=values[3] or 0,
-            deadline=durations[0],
-            lifespan=durations[1],
-            liveliness=LivelinessPolicy(values[8] or 0),
-            liveliness_lease_duration=durations[2],
+            reliability=ReliabilityPolicy(values[0]),
+            durability=DurabilityPolicy(values[1]),
+            history=HistoryPolicy(values[2]),
+            depth=values[3],
+            deadline=values[4] * _SECOND + values[5],
+            lifespan=values[6] * _SECOND + values[7],
+            liveliness=LivelinessPolicy(values[8]),
+            liveliness_lease_duration=values[9] * _SECOND + values[10],
         )
     except ValueError:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from operator import index
 from typing import Any
 
 import msgspec
@@ -59,11 +60,11 @@ class QoSProfile(msgspec.Struct, frozen=True, kw_only=True):
     Durations are nanoseconds, or objects that have `nanoseconds`, such as rclpy's; a profile
     contains integers. Values that leave the choice to the middleware become its choice:
     SYSTEM_DEFAULT the default of the policy, depth 0 a depth of 42, a duration of 0 infinite.
-    Raises ValueError if a value is out of range.
+    Raises ValueError if a value is out of range, and TypeError if it is no integer.
     """
 
     history: HistoryPolicy = HistoryPolicy.KEEP_LAST
-    depth: int = 0
+    depth: int = DEFAULT_DEPTH
     reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
     durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
     lifespan: Any = INFINITE
@@ -73,33 +74,21 @@ class QoSProfile(msgspec.Struct, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         """Check the values and fill in the choices of the middleware."""
-        chosen: dict[str, Any] = {"depth": self.depth or DEFAULT_DEPTH}
-        if not 0 <= self.depth <= MOST_DEPTH:
-            raise ValueError(f"a depth must be between 0 and {MOST_DEPTH}, not {self.depth}")
-        for name in _DURATIONS:
+        for name, default in zip(self.__struct_fields__, self.__struct_defaults__, strict=True):
             value = getattr(self, name)
-            nanoseconds = int(getattr(value, "nanoseconds", value)) or INFINITE
-            if not 0 < nanoseconds <= INFINITE:
-                raise ValueError(f"{name} must be between 0 and {INFINITE} ns, not {nanoseconds}")
-            chosen[name] = nanoseconds
-        for name, default in _POLICIES.items():
-            chosen[name] = type(default)(getattr(self, name)) or default
-        for name, value in chosen.items():
-            msgspec.structs.force_setattr(self, name, value)
+            number = index(getattr(value, "nanoseconds", value)) or default
+            most = MOST_DEPTH if name == "depth" else INFINITE
+            if isinstance(default, IntEnum):
+                number = type(default)(number)
+            elif not 0 < number <= most:
+                raise ValueError(f"{name} must be between 0 and {most}, not {number}")
+            msgspec.structs.force_setattr(self, name, number)
 
     @property
     def is_latched(self) -> bool:
         """True if late subscriptions get earlier messages."""
         return self.durability is DurabilityPolicy.TRANSIENT_LOCAL
 
-
-_DURATIONS = ("lifespan", "deadline", "liveliness_lease_duration")
-_POLICIES: dict[str, IntEnum] = {
-    "history": HistoryPolicy.KEEP_LAST,
-    "reliability": ReliabilityPolicy.RELIABLE,
-    "durability": DurabilityPolicy.VOLATILE,
-    "liveliness": LivelinessPolicy.AUTOMATIC,
-}
 
 qos_profile_default = QoSProfile(depth=10)
 qos_profile_system_default = QoSProfile()
@@ -126,29 +115,24 @@ def qos_profile(value: QoSProfile | int) -> QoSProfile:
     return value if isinstance(value, QoSProfile) else QoSProfile(depth=value)
 
 
+#: The offered and the requested value that do not fit; durations fit if they are not longer.
+_UNFIT = {
+    "reliability": (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE),
+    "durability": (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL),
+    "deadline": None,
+    "liveliness": (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC),
+    "liveliness_lease_duration": None,
+}
+
+
 def incompatible_policies(offered: QoSProfile, requested: QoSProfile) -> tuple[str, ...]:
     """Return the policies for which a publisher offers less than a subscription requests.
 
     ROS 2 on DDS does not connect such ends; rmw_zenoh connects them all the same.
     """
-    reliability, durability = ReliabilityPolicy, DurabilityPolicy
-    return tuple(
-        name
-        for name, unfit in {
-            "reliability": (offered.reliability, requested.reliability)
-            == (reliability.BEST_EFFORT, reliability.RELIABLE),
-            "durability": (offered.durability, requested.durability)
-            == (durability.VOLATILE, durability.TRANSIENT_LOCAL),
-            "deadline": _longer(offered.deadline, requested.deadline),
-            "liveliness": (offered.liveliness, requested.liveliness)
-            == (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC),
-            "liveliness_lease_duration": _longer(
-                offered.liveliness_lease_duration, requested.liveliness_lease_duration
-            ),
-        }.items()
-        if unfit
-    )
-
-
-def _longer(offered: int, requested: int) -> bool:
-    return offered > requested and requested != FOLLOWS
+    names = []
+    for name, unfit in _UNFIT.items():
+        pair = (getattr(offered, name), getattr(requested, name))
+        if pair == unfit or (unfit is None and pair[0] > pair[1] != FOLLOWS):
+            names.append(name)
+    return tuple(names)

@@ -39,7 +39,7 @@ MOST_IN_A_FOLDER = 15
 CROWDED = {"idlc/cli", "idlc/runtime"}
 
 #: Rooms that a program imports by their name: what is in them is what they offer.
-OFFERED_AT_ONCE = {"runtime", "build"}
+OFFERED_AT_ONCE = {"runtime", "build", "robot"}
 
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
