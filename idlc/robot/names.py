@@ -103,7 +103,7 @@ def _reason(name: str) -> str:
 
 
 class ActionParts(NamedTuple):
-    """The three services and two topics of an action: their names, or their types."""
+    """The names of the three services and two topics of an action."""
 
     send_goal: str
     cancel_goal: str
@@ -115,17 +115,6 @@ class ActionParts(NamedTuple):
 def action_names(action: str) -> ActionParts:
     """Return the names of the services and topics of an action with this absolute name."""
     return ActionParts(*(f"{action}{_ACTION}{part}" for part in ActionParts._fields))
-
-
-def action_types(action: str) -> ActionParts:
-    """Return the types of the services and topics of an action type."""
-    return ActionParts(
-        f"{action}_SendGoal",
-        "action_msgs/srv/CancelGoal",
-        f"{action}_GetResult",
-        f"{action}_FeedbackMessage",
-        "action_msgs/msg/GoalStatusArray",
-    )
 
 
 def action_part(name: str) -> tuple[str, str] | None:

@@ -25,7 +25,6 @@ class Closeable(Protocol):
 
     def close(self) -> None:
         """Withdraw the declaration; afterwards, no new callback starts."""
-        ...
 
 
 class Sender(Closeable, Protocol):
@@ -33,7 +32,6 @@ class Sender(Closeable, Protocol):
 
     def put(self, payload: bytes, attachment: bytes) -> None:
         """Send a message."""
-        ...
 
 
 class Request(Protocol):
@@ -42,20 +40,16 @@ class Request(Protocol):
     @property
     def payload(self) -> bytes:
         """The encoded request."""
-        ...
 
     @property
     def attachment(self) -> bytes:
         """The attachment; empty if the client sent none."""
-        ...
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
         """Send the reply and finish; it may run later, on any thread."""
-        ...
 
     def drop(self) -> None:
         """Finish without a reply, so that the client does not wait for one."""
-        ...
 
 
 class Transport(Protocol):
@@ -64,29 +58,17 @@ class Transport(Protocol):
     @property
     def id(self) -> str:
         """The id of this session in tokens."""
-        ...
 
     def publisher(self, key: str, qos: QoSProfile) -> Sender:
         """Declare a publisher; one that is latched keeps its last messages."""
-        ...
 
     def subscriber(
-        self,
-        key: str,
-        qos: QoSProfile,
-        callback: Callable[[Sample], None],
-        *,
-        ignore_local: bool = False,
+        self, key: str, qos: QoSProfile, callback: Callable[[Sample], None]
     ) -> Closeable:
-        """Call `callback` with each message; a latched profile also gets earlier ones.
-
-        `ignore_local` leaves out the messages of this session.
-        """
-        ...
+        """Call `callback` with each message; a latched profile also gets earlier ones."""
 
     def service(self, key: str, callback: Callable[[Request], None]) -> Closeable:
         """Call `callback` with each request."""
-        ...
 
     def call(
         self,
@@ -101,20 +83,15 @@ class Transport(Protocol):
 
         The end comes when all services have answered, or after `timeout` seconds.
         """
-        ...
 
     def announce(self, token: str) -> Closeable:
         """Show a token to all sessions while the declaration lasts."""
-        ...
 
     def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
         """Call `callback` with each token that matches, now and later: True appears, False goes."""
-        ...
 
     def tokens(self, pattern: str, timeout: float) -> list[str]:
         """Return the tokens that match now; waits for answers for at most `timeout` seconds."""
-        ...
 
     def close(self) -> None:
         """Close the connection; all declarations end with it."""
-        ...

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import zenoh
-import zenoh.ext
+from zenoh import CongestionControl, Reliability, ext
 
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from idlc.robot.transport import Closeable, Request, Sample, Sender
@@ -28,34 +28,25 @@ class ZenohTransport:
     def publisher(self, key: str, qos: QoSProfile) -> Sender:
         """Declare a publisher."""
         reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
-        control, reliability = zenoh.CongestionControl, zenoh.Reliability
         blocks = reliable and qos.history is HistoryPolicy.KEEP_ALL
         options: dict[str, Any] = {
-            "congestion_control": control.BLOCK if blocks else control.DROP,
-            "reliability": reliability.RELIABLE if reliable else reliability.BEST_EFFORT,
+            "congestion_control": CongestionControl.BLOCK if blocks else CongestionControl.DROP,
+            "reliability": Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
         }
         if not qos.is_latched:
-            return _Sender(self._declared, self._session.declare_publisher(key, **options))
+            return _Declared(self._declared, self._session.declare_publisher(key, **options))
         if reliable:
-            options["sample_miss_detection"] = zenoh.ext.MissDetectionConfig(
+            options["sample_miss_detection"] = ext.MissDetectionConfig(
                 heartbeat=None, sporadic_heartbeat=_HEARTBEAT
             )
-        publisher = zenoh.ext.declare_advanced_publisher(
-            self._session,
-            key,
-            publisher_detection=True,
-            cache=zenoh.ext.CacheConfig(max_samples=qos.depth),
-            **options,
+        cache = ext.CacheConfig(max_samples=qos.depth)
+        publisher = ext.declare_advanced_publisher(
+            self._session, key, publisher_detection=True, cache=cache, **options
         )
-        return _LatchedSender(self._declared, publisher)
+        return _Declared(self._declared, publisher)
 
     def subscriber(
-        self,
-        key: str,
-        qos: QoSProfile,
-        callback: Callable[[Sample], None],
-        *,
-        ignore_local: bool = False,
+        self, key: str, qos: QoSProfile, callback: Callable[[Sample], None]
     ) -> Closeable:
         """Declare a subscriber."""
 
@@ -63,23 +54,15 @@ class ZenohTransport:
             if sample.kind == zenoh.SampleKind.PUT:
                 callback(_sample(sample))
 
-        receive = _direct(put)
-        options: dict[str, Any] = {}
-        if ignore_local:
-            options["allowed_origin"] = zenoh.Locality.REMOTE
         if not qos.is_latched:
-            return _Declared(
-                self._declared, self._session.declare_subscriber(key, receive, **options)
-            )
+            subscriber = self._session.declare_subscriber(key, _direct(put))
+            return _Declared(self._declared, subscriber)
+        options: dict[str, Any] = {}
         if qos.reliability is not ReliabilityPolicy.BEST_EFFORT:
-            options["recovery"] = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
-        subscriber = zenoh.ext.declare_advanced_subscriber(
-            self._session,
-            key,
-            receive,
-            subscriber_detection=True,
-            history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
-            **options,
+            options["recovery"] = ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+        history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth)
+        subscriber = ext.declare_advanced_subscriber(
+            self._session, key, _direct(put), subscriber_detection=True, history=history, **options
         )
         return _Declared(self._declared, subscriber)
 
@@ -106,7 +89,7 @@ class ZenohTransport:
 
         self._session.get(
             key,
-            zenoh.handlers.Callback(answer, lambda: callback(None), indirect=False),
+            _direct(answer, lambda: callback(None)),
             payload=payload,
             attachment=attachment,
             target=zenoh.QueryTarget.ALL_COMPLETE,
@@ -124,9 +107,8 @@ class ZenohTransport:
         def receive(sample: zenoh.Sample) -> None:
             callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        return _Declared(
-            self._declared, self._liveliness.declare_subscriber(pattern, receive, history=True)
-        )
+        subscriber = self._liveliness.declare_subscriber(pattern, receive, history=True)
+        return _Declared(self._declared, subscriber)
 
     def tokens(self, pattern: str, timeout: float) -> list[str]:
         """Query the liveliness tokens that exist."""
@@ -139,9 +121,9 @@ class ZenohTransport:
             self._session.close()
 
 
-def _direct(callback: Callable[[Any], None]) -> Any:
+def _direct(callback: Callable[[Any], None], end: Callable[[], None] = lambda: None) -> Any:
     """Return a callback for Zenoh's own threads, as Zenoh never forgets one for another thread."""
-    return zenoh.handlers.Callback(callback, lambda: None, indirect=False)
+    return zenoh.handlers.Callback(callback, end, indirect=False)
 
 
 class _Declared:
@@ -152,42 +134,30 @@ class _Declared:
         self._declaration = declaration
         declared.add(self)
 
-    def close(self) -> None:
-        """Withdraw it."""
-        if self in self._declared:
-            self._declared.discard(self)
-            self._declaration.undeclare()
-
-
-class _Sender(_Declared):
-    def put(self, payload: bytes, attachment: bytes) -> None:
-        """Send a message."""
-        self._declaration.put(payload, attachment=attachment)
-
-
-class _LatchedSender(_Sender):
     def put(self, payload: bytes, attachment: bytes) -> None:
         """Send a message."""
         if self not in self._declared:
             raise RuntimeError("the publisher is closed")
-        super().put(payload, attachment)
+        self._declaration.put(payload, attachment=attachment)
 
     def close(self) -> None:
-        """Withdraw it by forgetting it.
-
-        Its `undeclare` keeps the GIL while it waits for a task, for ten seconds if a callback on
-        the thread of that task waits for the GIL.
-        """
+        """Withdraw it."""
+        if self not in self._declared:
+            return
         self._declared.discard(self)
-        self._declaration = None
+        declaration, self._declaration = self._declaration, None
+        # Zenoh withdraws a forgotten one. `undeclare` of this class keeps the GIL while it waits
+        # for a task, for ten seconds if a callback on the thread of that task waits for the GIL.
+        if not isinstance(declaration, ext.AdvancedPublisher):
+            declaration.undeclare()
 
 
 class _Request:
     def __init__(self, query: zenoh.Query, key: str) -> None:
         self._query: Any = query
         self._key = key
-        self.payload = query.payload.to_bytes() if query.payload is not None else b""
-        self.attachment = query.attachment.to_bytes() if query.attachment is not None else b""
+        self.payload = _bytes(query.payload)
+        self.attachment = _bytes(query.attachment)
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
         """Send the reply, and finish the query."""
@@ -200,9 +170,8 @@ class _Request:
 
 
 def _sample(sample: zenoh.Sample) -> Sample:
-    attachment = sample.attachment
-    return Sample(
-        str(sample.key_expr),
-        sample.payload.to_bytes(),
-        b"" if attachment is None else attachment.to_bytes(),
-    )
+    return Sample(str(sample.key_expr), sample.payload.to_bytes(), _bytes(sample.attachment))
+
+
+def _bytes(data: zenoh.ZBytes | None) -> bytes:
+    return b"" if data is None else data.to_bytes()

@@ -11,7 +11,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.load import load
 from idlc.robot.keys import Entity, Kind, pack_attachment
-from idlc.robot.names import action_names, action_types
+from idlc.robot.names import action_names
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import open_session
 
@@ -172,7 +172,14 @@ class Robot:
 
     def action(self, name, type_):
         """Announce the five parts of an action server."""
-        for place, part in zip(action_names(name), action_types(type_), strict=True):
+        types = (
+            f"{type_}_SendGoal",
+            "action_msgs/srv/CancelGoal",
+            f"{type_}_GetResult",
+            f"{type_}_FeedbackMessage",
+            "action_msgs/msg/GoalStatusArray",
+        )
+        for place, part in zip(action_names(name), types, strict=True):
             is_topic = place.endswith(("feedback", "status"))
             self.announce(Kind.PUBLISHER if is_topic else Kind.SERVICE, place, part)
 

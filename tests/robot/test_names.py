@@ -93,13 +93,6 @@ def test_an_action_consists_of_services_and_topics():
     assert parts.status == "/ns/move/_action/status"
     for field, name in parts._asdict().items():
         assert names.action_part(name) == ("/ns/move", field)
-    assert names.action_types("a/action/Move") == (
-        "a/action/Move_SendGoal",
-        "action_msgs/srv/CancelGoal",
-        "a/action/Move_GetResult",
-        "a/action/Move_FeedbackMessage",
-        "action_msgs/msg/GoalStatusArray",
-    )
     assert names.action_part("/_action/status") is None
     assert names.action_part("/a/_action/other") is None
     assert names.action_part("/a/status") is None
