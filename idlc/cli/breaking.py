@@ -149,8 +149,8 @@ def command(
     from idlc.compare.breaking import GIT, BreakingOptions, breaking
     from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
-    from idlc.project.settings import scope, settings_here
     from idlc.project.find import is_address
+    from idlc.project.settings import scope, settings_here
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)

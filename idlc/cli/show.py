@@ -142,8 +142,8 @@ def command(
     """
     from idlc.cli import output
     from idlc.documents import show
-    from idlc.recordings.find import is_recording
     from idlc.project.find import is_address
+    from idlc.recordings.find import is_recording
 
     if not is_recording(subject, scope.root):
         if topics:

@@ -40,11 +40,10 @@ from idlc.model import ir
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import list_files, no_interfaces
+from idlc.project.find import is_address, list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.robot.live.ends import RobotGraph, join_robot
-from idlc.project.find import is_address
 from idlc.wire.layout import oversized
 
 #: A graph that never comes to rest is watched for this many times the patience.

@@ -7,10 +7,9 @@ from glob import glob, has_magic
 from pathlib import Path
 
 from idlc.project.files import entries, is_file, is_folder
-from idlc.project.find import KIND_FOLDERS, KINDS
+from idlc.project.find import KIND_FOLDERS, KINDS, is_address
 from idlc.project.root import MANIFEST, Root
 from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
-from idlc.project.find import is_address
 
 #: Cannot be read, which opening it reports.
 ROS_1 = ".bag"

@@ -21,6 +21,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lower import lower
 from idlc.project import inputs
+from idlc.project.find import is_address
 from idlc.project.library import Library, Texts
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -29,7 +30,6 @@ from idlc.recordings.containers.file import UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
-from idlc.project.find import is_address
 from idlc.wire.layout import oversized
 
 #: The number of versions that a topic is compared with.

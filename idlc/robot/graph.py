@@ -15,6 +15,7 @@ from idlc.robot.transport import Transport
 #: The total length of the tokens that a graph keeps: enough for 100,000 endpoints.
 MOST_CHARACTERS = 32 * 2**20
 #: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
+_TIMEOUT = 5.0
 _SETTLED = 1.0
 _TIMES = 10
 T = TypeVar("T")
@@ -29,30 +30,23 @@ class Graph:
     were too many, so that entities are missing.
     """
 
-    def __init__(
-        self,
-        transport: Transport,
-        domain: int,
-        *,
-        timeout: float = 5.0,
-        limit: int = MOST_CHARACTERS,
-    ) -> None:
+    def __init__(self, transport: Transport, domain: int, limit: int = MOST_CHARACTERS) -> None:
         self.ignored = 0
         self.is_full = False
         self._limit = limit
         self._characters = 0
         self._entities: dict[str, Entity] = {}
-        self._named: dict[tuple[Kind, str], dict[str, Entity]] = {}
+        self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
         self._listeners: dict[object, Listener] = {}
         self._changed = Condition()
         pattern = all_tokens(domain)
         # Zenoh answers the question only before the watch; what goes in between never arrives
-        expected = {token for token in transport.tokens(pattern, timeout) if parse_token(token)}
+        expected = {token for token in transport.tokens(pattern, _TIMEOUT) if parse_token(token)}
         self._watch = transport.watch(pattern, self._update)
         for _ in range(_TIMES):
             if self.wait_for(lambda _: self.is_full or expected <= self._entities.keys(), _SETTLED):
                 break
-            expected.intersection_update(transport.tokens(pattern, timeout))
+            expected.intersection_update(transport.tokens(pattern, _TIMEOUT))
 
     def close(self) -> None:
         """Stop watching; the entities stay as they are."""
@@ -64,21 +58,18 @@ class Graph:
         *,
         name: str | None = None,
         type: str | None = None,  # noqa: A002 - the word for it
-        node: str | None = None,
     ) -> tuple[Entity, ...]:
-        """Return the entities of this kind, with this absolute name, type and node."""
+        """Return the entities of this kind, with this absolute name and type."""
         with self._changed:
-            if kind is not None and name is not None:
-                chosen = [*self._named.get((kind, name), {}).values()]
-            else:
-                chosen = [*self._entities.values()]
+            is_indexed = kind is not None and name is not None
+            known = self._named.get((kind, name), {}) if is_indexed else self._entities
+            entities = [*known.values()]
         return tuple(
             entity
-            for entity in chosen
-            if (kind is None or entity.kind is kind)
-            and (name is None or entity.name == name)
-            and (type is None or entity.type == type)
-            and (node is None or entity.node_name == node)
+            for entity in entities
+            if kind in (None, entity.kind)
+            and name in (None, entity.name)
+            and type in (None, entity.type)
         )
 
     def count(self, kind: Kind, name: str) -> int:

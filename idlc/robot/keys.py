@@ -14,14 +14,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.robot.names import (
-    dds_type,
-    full_name,
-    is_absolute,
-    is_namespace,
-    is_node_name,
-    ros_type,
-)
+from idlc.robot.names import dds_type, full_name, is_absolute, is_namespace, is_node_name, ros_type
 from idlc.robot.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -93,7 +86,8 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def key(self) -> str:
         """The key of the endpoint's messages, or of its requests."""
-        return data_key(self.domain, self.name, self.type, self.hash)
+        name = self.name.strip("/")
+        return f"{self.domain}/{name}/{dds_type(self.type)}/{self.hash or NO_HASH}"
 
     @property
     def gid(self) -> bytes:
@@ -101,14 +95,6 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
         from xxhash import xxh3_128_intdigest
 
         return xxh3_128_intdigest(self.token.encode()).to_bytes(GID_SIZE, "little")
-
-
-def data_key(domain: int, name: str, type_: str, hash_: str) -> str:
-    """Return the key of a topic's messages or a service's requests.
-
-    The type of a service is `package/srv/Name`. The hash `*` is that of every version.
-    """
-    return f"{domain}/{name.strip('/')}/{dds_type(type_)}/{hash_ or NO_HASH}"
 
 
 def all_tokens(domain: int) -> str:

@@ -9,14 +9,12 @@ from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from itertools import count
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
-
-if TYPE_CHECKING:
-    from idlc.robot.graph import Graph
-    from idlc.robot.transport import Transport
+from idlc.robot.graph import Graph
+from idlc.robot.transport import Transport
 
 #: The port of rmw_zenoh's router.
 ROUTER_PORT = 7447
@@ -58,8 +56,6 @@ class Session(AbstractContextManager["Session"]):
     @property
     def graph(self) -> Graph:
         """The graph of the domain, which is watched from the first use on."""
-        from idlc.robot.graph import Graph
-
         with self._lock:
             self._graph = self._graph or Graph(self.transport, self.domain)
             return self._graph

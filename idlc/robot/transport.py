@@ -35,15 +35,10 @@ class Sender(Closeable, Protocol):
 
 
 class Request(Protocol):
-    """A request that a service received."""
+    """A request that a service received; the attachment is empty if the client sent none."""
 
-    @property
-    def payload(self) -> bytes:
-        """The encoded request."""
-
-    @property
-    def attachment(self) -> bytes:
-        """The attachment; empty if the client sent none."""
+    payload: bytes
+    attachment: bytes
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
         """Send the reply and finish; it may run later, on any thread."""
@@ -53,11 +48,9 @@ class Request(Protocol):
 
 
 class Transport(Protocol):
-    """A connection to other programs."""
+    """A connection to other programs; `id` is that of the session in tokens."""
 
-    @property
-    def id(self) -> str:
-        """The id of this session in tokens."""
+    id: str
 
     def publisher(self, key: str, qos: QoSProfile) -> Sender:
         """Declare a publisher; one that is latched keeps its last messages."""

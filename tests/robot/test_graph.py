@@ -63,7 +63,7 @@ def test_an_endpoint_can_come_before_its_node_and_stay_after_it():
     tokens.update(node.token, True)
     tokens.update(node.token, True)
     assert graph.entities(Kind.NODE) == (node,)
-    assert graph.entities(node="/talker") == (endpoint, node)
+    assert graph.entities() == (endpoint, node)
     tokens.update(node.token, False)
     tokens.update(node.token, False)
     assert graph.entities() == (endpoint,)
@@ -81,7 +81,6 @@ def test_entities_are_selected_by_all_that_is_known():
     ]
     graph = Graph(Tokens(*(end.token for end in ends)), 0)
     assert graph.entities(Kind.PUBLISHER, name="/chatter") == tuple(ends[:2])
-    assert graph.entities(node="/other") == (ends[1],)
     assert graph.entities(type="std_msgs/msg/Int8") == (ends[2],)
     assert graph.entities(Kind.CLIENT, name="/add") == ()
     assert graph.count(Kind.PUBLISHER, "/chatter") == 2

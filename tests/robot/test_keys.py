@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from idlc.robot import keys
 from idlc.robot.keys import (
     Entity,
     Kind,
@@ -108,7 +107,7 @@ def test_messages_are_sent_on_the_key_of_their_publisher():
 def test_requests_and_replies_are_read():
     ((key, _, attachment, _),) = CAPTURE["requests"]
     assert parse_attachment(bytes.fromhex(attachment)).sequence == 1
-    assert key.startswith(keys.data_key(0, "/pure_add", "my_robot/srv/Add", "RIHS01_07ca"))
+    assert key.startswith("0/pure_add/my_robot::srv::dds_::Add_/RIHS01_07ca")
     ((key, attachment, _),) = CAPTURE["replies"]
     assert parse_attachment(bytes.fromhex(attachment)).gid == bytes(range(16))
     assert key in {parse_token(token).key for token in TOKENS if "/SS/" in token}

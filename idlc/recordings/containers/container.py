@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
 
 from msgspec.structs import replace
 
+from idlc.project.find import is_address
 from idlc.recordings.containers import bag, db3, records
 from idlc.recordings.containers.compression import ZSTD_MAGIC
 from idlc.recordings.containers.db3 import Db3File
@@ -22,7 +23,6 @@ from idlc.recordings.containers.file import (
 )
 from idlc.recordings.containers.mcap import McapFile
 from idlc.recordings.containers.source import RecordingError, first_bytes, is_local, of_file
-from idlc.project.find import is_address
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window

@@ -10,17 +10,11 @@ from os import fstat, path, stat_result
 from pathlib import Path
 from typing import Any
 
+from idlc.diagnostics.errors import HintedError
 
-class RecordingError(Exception):
-    """A recording, or a part of it, cannot be read; `hint` says what can be done about it."""
 
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message, hint)
-        self.message = message
-        self.hint = hint
-
-    def __str__(self) -> str:
-        return f"{self.message} ({self.hint})" if self.hint else self.message
+class RecordingError(HintedError):
+    """A recording, or a part of it, cannot be read."""
 
 
 @contextmanager
