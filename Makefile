@@ -116,7 +116,8 @@ fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
 	    $(TEST_ENV)/bin/python -m pytest --timeout 0 -n 2 $(SELECTION) tests/hardening/test_fuzz.py \
 	    tests/hardening/test_fuzz_recordings.py tests/recordings/test_hostile_containers.py \
-	    tests/hardening/test_limits.py tests/runtime/test_hostile.py \
+	    tests/hardening/test_limits.py tests/runtime/test_hostile.py tests/robot/test_hostile.py \
+	    tests/robot/test_node_hostile.py \
 	    $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
 	@if $(TEST_ENV)/bin/python $(PIP_INSTALL) atheris; then \
 	    for target in $$($(TEST_ENV)/bin/python -c \

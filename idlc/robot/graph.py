@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice, product
+from sys import getsizeof
 from threading import Condition
 from typing import NamedTuple, TypeVar
 
@@ -12,8 +13,12 @@ from idlc.robot.keys import Entity, Kind, all_tokens, parse_token
 from idlc.robot.qos import incompatible_policies
 from idlc.robot.transport import Transport
 
-#: The total length of the tokens that a graph keeps: enough for 100,000 endpoints.
-MOST_CHARACTERS = 32 * 2**20
+#: The bytes of the tokens that a graph keeps, each with so much more for its entity: enough for
+#: 100,000 endpoints.
+MOST_BYTES = 80 * 2**20
+ENTITY_BYTES = 500
+#: The most tokens that a graph waits for.
+_MOST_EXPECTED = 100_000
 #: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
 _TIMEOUT = 5.0
 _SETTLED = 1.0
@@ -30,18 +35,19 @@ class Graph:
     were too many, so that entities are missing.
     """
 
-    def __init__(self, transport: Transport, domain: int, limit: int = MOST_CHARACTERS) -> None:
+    def __init__(self, transport: Transport, domain: int, limit: int = MOST_BYTES) -> None:
         self.ignored = 0
         self.is_full = False
         self._limit = limit
-        self._characters = 0
+        self._bytes = 0
         self._entities: dict[str, Entity] = {}
         self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
         self._listeners: dict[object, Listener] = {}
         self._changed = Condition()
         pattern = all_tokens(domain)
         # Zenoh answers the question only before the watch; what goes in between never arrives
-        expected = {token for token in transport.tokens(pattern, _TIMEOUT) if parse_token(token)}
+        valid = filter(parse_token, transport.tokens(pattern, _TIMEOUT))
+        expected = {*islice(valid, _MOST_EXPECTED)}
         self._watch = transport.watch(pattern, self._update)
         for _ in range(_TIMES):
             if self.wait_for(lambda _: self.is_full or expected <= self._entities.keys(), _SETTLED):
@@ -127,12 +133,12 @@ class Graph:
         if token in self._entities:
             return None
         entity = parse_token(token)
-        full = self._characters + len(token) > self._limit
-        self.is_full |= full
-        if entity is None or full:
+        size = getsizeof(token) + ENTITY_BYTES
+        if entity is None or self._bytes + size > self._limit:
+            self.is_full |= entity is not None
             self.ignored += 1
             return None
-        self._characters += len(token)
+        self._bytes += size
         self._entities[token] = entity
         self._named.setdefault((entity.kind, entity.name), {})[token] = entity
         return entity
@@ -140,7 +146,7 @@ class Graph:
     def _remove(self, token: str) -> Entity | None:
         entity = self._entities.pop(token, None)
         if entity is not None:
-            self._characters -= len(token)
+            self._bytes -= getsizeof(token) + ENTITY_BYTES
             same = self._named[entity.kind, entity.name]
             del same[token]
             if not same:

@@ -6,7 +6,7 @@ a queue, return at once, and never close anything. All `close` methods may be ca
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple, Protocol
 
 from idlc.robot.qos import QoSProfile
@@ -83,8 +83,8 @@ class Transport(Protocol):
     def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
         """Call `callback` with each token that matches, now and later: True appears, False goes."""
 
-    def tokens(self, pattern: str, timeout: float) -> list[str]:
-        """Return the tokens that match now; waits for answers for at most `timeout` seconds."""
+    def tokens(self, pattern: str, timeout: float) -> Iterable[str]:
+        """Yield the tokens that match now; waits for answers for at most `timeout` seconds."""
 
     def close(self) -> None:
         """Close the connection; all declarations end with it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import zenoh
@@ -110,10 +110,11 @@ class ZenohTransport:
         subscriber = self._liveliness.declare_subscriber(pattern, receive, history=True)
         return _Declared(self._declared, subscriber)
 
-    def tokens(self, pattern: str, timeout: float) -> list[str]:
+    def tokens(self, pattern: str, timeout: float) -> Iterator[str]:
         """Query the liveliness tokens that exist."""
-        replies = self._liveliness.get(pattern, timeout=timeout)
-        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+        for reply in self._liveliness.get(pattern, timeout=timeout):
+            if reply.ok is not None:
+                yield str(reply.ok.key_expr)
 
     def close(self) -> None:
         """Close the Zenoh session."""

@@ -1,6 +1,5 @@
 """The graph from tokens, in any order and in any number, and mismatches in it."""
 
-import random
 import threading
 
 import pytest
@@ -100,28 +99,11 @@ def test_a_token_that_went_while_the_others_were_fetched_stays_away():
 def test_garbage_is_counted_and_nothing_else():
     tokens = Tokens("@ros2_lv/0/x", "", entity(Kind.NODE).token)
     graph = Graph(tokens, 0)
-    random_ = random.Random(29)
-    for _ in range(1000):
-        tokens.update("@ros2_lv/0/" + "".join(map(chr, random_.sample(range(1, 5000), 30))), True)
-        tokens.update("never/seen", False)
-    assert graph.ignored == 1002
+    tokens.update("never/seen", False)
+    tokens.update("@ros2_lv/0/" + "x" * 100_000, True)
+    assert graph.ignored == 3
     assert not graph.is_full
     assert len(graph.entities()) == 1
-
-
-def test_a_robot_with_ten_thousand_endpoints_is_fine_and_a_flood_is_cut():
-    ends = [entity(Kind.PUBLISHER, n, name=f"/topic_{n}").token for n in range(10_000)]
-    graph = Graph(Tokens(*ends), 0)
-    assert len(graph.entities()) == 10_000
-    assert (graph.ignored, graph.is_full) == (0, False)
-    tokens = Tokens(*ends)
-    graph = Graph(tokens, 0, limit=sum(map(len, ends[:500])))
-    assert len(graph.entities()) == 500
-    assert (graph.ignored, graph.is_full) == (9_500, True)
-    for token in ends[:500]:
-        tokens.update(token, False)
-    tokens.update(ends[9_999], True)
-    assert [end.id for end in graph.entities()] == [9_999]
 
 
 def test_listeners_hear_each_change_until_they_end():
