@@ -15,7 +15,6 @@ from idlc.robot.qos import QoSProfile
 class Sample(NamedTuple):
     """A message or a reply; the attachment is empty if the sender sent none."""
 
-    key: str
     payload: bytes
     attachment: bytes
 

@@ -171,7 +171,7 @@ class _Request:
 
 
 def _sample(sample: zenoh.Sample) -> Sample:
-    return Sample(str(sample.key_expr), sample.payload.to_bytes(), _bytes(sample.attachment))
+    return Sample(sample.payload.to_bytes(), _bytes(sample.attachment))
 
 
 def _bytes(data: zenoh.ZBytes | None) -> bytes:

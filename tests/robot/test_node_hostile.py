@@ -68,13 +68,13 @@ def test_mutated_messages_requests_and_responses_are_ignored(node, capsys):
         match number % 3:
             case 0:
                 payload, attached = mutated(rng, message), mutated(rng, attachment)
-                subscription._receive(Sample("0/x", rng.choice([message, payload]), attached))
+                subscription._receive(Sample(rng.choice([message, payload]), attached))
             case 1:
                 payload, attached = mutated(rng, request), mutated(rng, attachment)
                 requests.append(Request(payload, rng.choice([attachment, attached])))
                 service._receive(requests[-1])
             case _:
-                client._response(number, Sample("0/x", mutated(rng, response), attachment))
+                client._response(number, Sample(mutated(rng, response), attachment))
         if number % 10 == 0:
             while node.executor._queue.qsize():
                 node.executor.spin_once(timeout_sec=0)
@@ -96,7 +96,7 @@ def test_a_flood_is_bounded(node):
     payload = SetBool.Request().serialize()
     requests = [Request(payload, pack_attachment(number % 40, 2, GID)) for number in range(100)]
     for number, request in enumerate(requests):
-        subscription._receive(Sample("0/x", b"", pack_attachment(number, 2, GID)))
+        subscription._receive(Sample(b"", pack_attachment(number, 2, GID)))
         service._receive(request)
     assert len(subscription._queue) == 5
     assert len(service._queue) == len(service._open) == 10
