@@ -7,7 +7,7 @@ a queue, return at once, and never close anything. All `close` methods may be ca
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 from idlc.robot.qos import QoSProfile
 
@@ -17,6 +17,10 @@ class Sample(NamedTuple):
 
     payload: bytes
     attachment: bytes
+
+
+#: Receives each reply, and at the end once `None`.
+OnReply: TypeAlias = Callable[[Sample | None], None]
 
 
 class Closeable(Protocol):
@@ -63,18 +67,9 @@ class Transport(Protocol):
         """Call `callback` with each request."""
 
     def call(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        callback: Callable[[Sample | None], None],
-        *,
-        timeout: float,
+        self, key: str, payload: bytes, attachment: bytes, callback: OnReply, *, timeout: float
     ) -> None:
-        """Send a request; call `callback` with each reply, and at the end once with `None`.
-
-        The end comes when all services have answered, or after `timeout` seconds.
-        """
+        """Send a request; the end comes when all have replied, or after `timeout` seconds."""
 
     def announce(self, token: str) -> Closeable:
         """Show a token to all sessions while the declaration lasts."""

@@ -9,7 +9,7 @@ import zenoh
 from zenoh import CongestionControl, Reliability, ext
 
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from idlc.robot.transport import Closeable, Request, Sample, Sender
+from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
 #: Seconds between the heartbeats by which subscriptions notice that they missed a message.
 _HEARTBEAT = 0.5
@@ -73,13 +73,7 @@ class ZenohTransport:
         return _Declared(self._declared, queryable)
 
     def call(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        callback: Callable[[Sample | None], None],
-        *,
-        timeout: float,
+        self, key: str, payload: bytes, attachment: bytes, callback: OnReply, *, timeout: float
     ) -> None:
         """Send a query to all services."""
 
