@@ -17,8 +17,6 @@ from idlc.robot.transport import Transport
 #: 100,000 endpoints.
 MOST_BYTES = 80 * 2**20
 ENTITY_BYTES = 500
-#: The most tokens that a graph waits for.
-_MOST_EXPECTED = 100_000
 #: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
 _TIMEOUT = 5.0
 _SETTLED = 1.0
@@ -47,7 +45,7 @@ class Graph:
         pattern = all_tokens(domain)
         # Zenoh answers the question only before the watch; what goes in between never arrives
         valid = filter(parse_token, transport.tokens(pattern, _TIMEOUT))
-        expected = {*islice(valid, _MOST_EXPECTED)}
+        expected = {*islice(valid, limit // ENTITY_BYTES)}
         self._watch = transport.watch(pattern, self._update)
         for _ in range(_TIMES):
             if self.wait_for(lambda _: self.is_full or expected <= self._entities.keys(), _SETTLED):

@@ -35,13 +35,12 @@ class ZenohTransport:
         }
         if not qos.is_latched:
             return _Declared(self._declared, self._session.declare_publisher(key, **options))
+        options["cache"] = ext.CacheConfig(max_samples=qos.depth)
         if reliable:
-            options["sample_miss_detection"] = ext.MissDetectionConfig(
-                heartbeat=None, sporadic_heartbeat=_HEARTBEAT
-            )
-        cache = ext.CacheConfig(max_samples=qos.depth)
+            heartbeats = ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT)
+            options["sample_miss_detection"] = heartbeats
         publisher = ext.declare_advanced_publisher(
-            self._session, key, publisher_detection=True, cache=cache, **options
+            self._session, key, publisher_detection=True, **options
         )
         return _Declared(self._declared, publisher)
 
