@@ -68,6 +68,10 @@ def test_two_programs_meet_at_a_router(router, program):
         assert client.call(SetBool.Request(data=True), LONG).message == "on"
 
 
+def talkers(graph):
+    return [entity for entity in graph.entities() if entity.node == "talker"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_end_a_program_without_a_trace(router, program, number):
     with node_at(router, "listener") as node:
@@ -77,7 +81,7 @@ def test_signals_end_a_program_without_a_trace(router, program, number):
         program.send_signal(number)
         _, errors = program.communicate(timeout=LONG)
         assert (program.returncode, errors) == (0, "")
-        assert graph.wait_for(lambda _: not graph.entities(node="/robot/talker"), LONG)
+        assert graph.wait_for(lambda _: not talkers(graph), LONG)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,10 +30,19 @@ def site(tmp_path_factory):
             continue
         origin = Path(spec.origin)
         source = origin.parent if origin.name == "__init__.py" else origin
-        (folder / source.name).symlink_to(source)
+        provide(source, folder)
         if (libraries := source.parent / f"{name}.libs").is_dir():
-            (folder / libraries.name).symlink_to(libraries)
+            provide(libraries, folder)
     return folder
+
+
+def provide(source, folder):
+    """Link to a file or folder, or copy it where links need a right of their own."""
+    try:
+        (folder / source.name).symlink_to(source)
+    except OSError:
+        copy = shutil.copytree if source.is_dir() else shutil.copy
+        copy(source, folder / source.name)
 
 
 class Program:

@@ -242,7 +242,7 @@ def listening():
         (["abc/127.0.0.1:1"], {}, "`abc/127.0.0.1:1` does not answer: "),
         (["tcp/127.0.0.1:1?x"], {}, "`tcp/127.0.0.1:1?x` does not answer: "),
         (["tcp/a\nb:1"], {}, "`tcp/a␊b:1` is not an endpoint"),
-        (["zenoh:no.json5"], {}, "`no.json5` is not a configuration of Zenoh: No such file"),
+        (["zenoh:no.json5"], {}, "`no.json5` is not a configuration of Zenoh: "),
         (["zenoh:"], {}, "`zenoh:` is not an endpoint"),
         ([], {"ZENOH_SESSION_CONFIG_URI": "x"}, "`x` is not a configuration of Zenoh"),
         ([], {"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is `x` (set it to a number such as 0)"),
@@ -291,8 +291,8 @@ def test_a_path_that_exists_is_no_robot(tmp_path, monkeypatch):
         False
     ] * 2
     (tmp_path / "tcp").mkdir()
-    (tmp_path / "tcp/robot:7447").touch()
-    assert not is_address("tcp/robot:7447")
+    (tmp_path / "tcp/robot").touch()
+    assert not is_address("tcp/robot")
 
 
 def test_two_routers_cannot_have_one_port(router):
