@@ -13,7 +13,7 @@ import pytest
 from jinja2 import Environment, nodes
 
 from tests.support.imports import MODULES, graph, imports, room, tree
-from tests.support.paths import DOCS, ROOT
+from tests.support.paths import DOCS, EXAMPLE, ROOT
 
 TEMPLATES = sorted((ROOT / "templates").rglob("*.jinja"))
 RUNTIME = [module for module in MODULES if room(module) == "runtime"]
@@ -317,3 +317,8 @@ def test_checking_a_file_imports_little(tmp_path):
     assert "idlc.check.package.manifest" in own
     assert "idlc.scaffold" not in own
     assert len(own) <= 82, "what a run without problems does not need can wait"
+
+
+def test_commands_without_a_robot_import_nothing_of_robots(tmp_path):
+    for words in (("gen", str(EXAMPLE), "-o", "out"), ("show", "std_msgs/msg/String")):
+        assert [name for name in imported_by(*words, cwd=tmp_path) if ".robot" in name] == []
