@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice, product
-from sys import getsizeof
 from threading import Condition
 from typing import NamedTuple, TypeVar
 
@@ -13,10 +12,11 @@ from idlc.robot.keys import Entity, Kind, all_tokens, parse_token
 from idlc.robot.qos import incompatible_policies
 from idlc.robot.transport import Transport
 
-#: The bytes of the tokens that a graph keeps, each with so much more for its entity: enough for
-#: 100,000 endpoints.
-MOST_BYTES = 80 * 2**20
+#: The memory of a graph's entities, about so much for each and for each character of its token.
+#: It is enough for 100,000 endpoints.
+MOST_BYTES = 128 * 2**20
 ENTITY_BYTES = 500
+CHARACTER_BYTES = 4
 #: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
 _TIMEOUT = 5.0
 _SETTLED = 1.0
@@ -131,7 +131,7 @@ class Graph:
         if token in self._entities:
             return None
         entity = parse_token(token)
-        size = getsizeof(token) + ENTITY_BYTES
+        size = ENTITY_BYTES + CHARACTER_BYTES * len(token)
         if entity is None or self._bytes + size > self._limit:
             self.is_full |= entity is not None
             self.ignored += 1
@@ -144,7 +144,7 @@ class Graph:
     def _remove(self, token: str) -> Entity | None:
         entity = self._entities.pop(token, None)
         if entity is not None:
-            self._bytes -= getsizeof(token) + ENTITY_BYTES
+            self._bytes -= ENTITY_BYTES + CHARACTER_BYTES * len(token)
             same = self._named[entity.kind, entity.name]
             del same[token]
             if not same:

@@ -10,7 +10,6 @@ MOST_NAME = 247
 MOST_NODE_NAME = 255
 
 _PART = r"[A-Za-z_][A-Za-z0-9_]*"
-_NODE = re.compile(_PART, re.ASCII)
 _ABSOLUTE = re.compile(rf"(?:/{_PART})+", re.ASCII)
 _RELATIVE = re.compile(rf"(?:~|(?:~/|/)?{_PART}(?:/{_PART})*)", re.ASCII)
 _TYPE = re.compile(r"([a-z]\w*)/(msg|srv|action)/([A-Za-z]\w*)", re.ASCII)
@@ -53,7 +52,7 @@ def is_namespace(name: str) -> bool:
 
 def is_node_name(name: str) -> bool:
     """Return whether this is a valid name of a node, without its namespace."""
-    return len(name) <= MOST_NODE_NAME and _NODE.fullmatch(name) is not None
+    return len(name) <= MOST_NODE_NAME and name.isascii() and name.isidentifier()
 
 
 def full_name(namespace: str, name: str) -> str:

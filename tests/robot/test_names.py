@@ -70,6 +70,18 @@ def test_any_name_is_refused_or_becomes_absolute(name):
         assert names.is_absolute(expand_name(name, "/ns", "node"))
 
 
+@pytest.mark.parametrize("number", range(256))
+def test_only_letters_digits_and_underscores_are_in_names(number):
+    character = chr(number)
+    is_word = character == "_" or (character.isascii() and character.isalnum())
+    for name in (f"a{character}b", f"a/b{character}"):
+        with suppress(InvalidNameError):
+            assert expand_name(name, "/ns", "node") == f"/ns/{name}"
+            assert is_word or (character == "/" and name == "a/b")
+    assert names.is_node_name(f"a{character}") == is_word
+    assert names.is_namespace(f"/a{character}") == is_word
+
+
 def test_namespaces_may_lack_their_slash():
     assert [*map(expand_namespace, ("", "/", "ns", "/a/b"))] == ["/", "/", "/ns", "/a/b"]
     for name in ("/a/", "//", "a b", "~", "/1"):
