@@ -28,6 +28,7 @@ TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 KIND := $(TAG)$(if $(filter yes,$(LOCKED)),-locked)
 TEST_ENV := .venv/test-$(KIND)$(if $(filter no,$(ROS)),-without-ros)
 KILTED_ENV := .venv/kilted-$(KIND)
+ROBOT_ENV := .venv/robot-$(KIND)
 LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 # no lock is for the demonstration alone
@@ -48,7 +49,7 @@ NOT_ROS := $(if $(filter no,$(ROS)), and not ros)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
-LOCKS := build release test-ros test-kilted test-lowest
+LOCKS := build release test-ros test-kilted test-robot test-lowest
 UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
     --generate-hashes --no-annotate --custom-compile-command 'make lock'
 # Nothing that we run leaves this machine, or this folder: rclpy stops where it cannot write its logs.
@@ -57,7 +58,7 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test test-long test-bare test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
+.PHONY: help install demo test test-long test-bare test-kilted test-robot test-all test-lowest vscode test-vscode fuzz soak lint example bench \
     lock site playground release-check runtime-wheel clean
 
 help: ## show this list
@@ -92,6 +93,9 @@ test-bare: ## run the commands of the README on a bare Debian: as root and a use
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
 	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
+
+test-robot: $(ROBOT_ENV)/installed ## run idlc.robot with pyzeros and zenoh-ros2-sdk (needs a C compiler)
+	IDLC_PEERS=1 CYDR_CACHE_DIR=$(CURDIR)/build/cydr $(ROBOT_ENV)/bin/python -m pytest tests/robot/test_peers.py $(ARGS)
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/repository/every_python.sh $(INTERPRETERS)
@@ -157,6 +161,7 @@ lock: ## choose the versions for CI again, and write down their hashes
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
 	$(UV_COMPILE) pyproject.toml --extra test-ros --output-file maintenance/requirements/test-ros.txt
 	$(UV_COMPILE) pyproject.toml --extra test-kilted --output-file maintenance/requirements/test-kilted.txt
+	$(UV_COMPILE) pyproject.toml --extra test-robot --output-file maintenance/requirements/test-robot.txt
 	$(UV_COMPILE) pyproject.toml --extra test --resolution lowest-direct \
 	    --output-file maintenance/requirements/test-lowest.txt
 	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints maintenance/requirements/test-ros.txt \
@@ -170,6 +175,7 @@ clean: ## remove environments and everything that was built
 
 $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(KILTED_ENV)/installed: EXTRA := test-kilted
+$(ROBOT_ENV)/installed: EXTRA := test-robot
 $(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
 $(if $(filter-out yes,$(LOCKED)),$(DEMO_ENV)/installed: EXTRA := ros)
 $(SITE_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),docs,test-ros)

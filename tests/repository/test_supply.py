@@ -21,6 +21,7 @@ LOCKED = {
     "release": "release",
     "test-ros": "test-ros",
     "test-kilted": "test-kilted",
+    "test-robot": "test-robot",
     "test-lowest": "test",
 }
 #: Where CI runs, on each interpreter.
