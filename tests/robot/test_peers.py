@@ -6,11 +6,12 @@ A router, two programs of idlc.robot and one of each library run at once. Each p
 * subscribes late to the topic that /NAME/join names;
 * publishes on /NAME/heard what it is answered, and what it receives late.
 
-The versions are those of maintenance/requirements/test-robot.txt. What they do otherwise than
-rmw_zenoh does: pyzeros has no transient local QoS, and raises NotImplementedError. The publishers of
-zenoh-ros2-sdk announce it and keep nothing, and its late subscriptions ask for the newest message
-alone. Its GIDs are random, and each of its endpoints is in a node of its own. Both libraries count
-messages from 0, and offer no descriptions of types.
+The versions are those of maintenance/requirements/test-robot.txt. Other than rmw_zenoh does,
+* pyzeros has no transient local QoS: it raises NotImplementedError;
+* publishers of zenoh-ros2-sdk announce transient local QoS and keep nothing, and its late
+  subscriptions ask for the newest message alone. Its GIDs are random, so that a message does not
+  tell its publisher, and each of its endpoints is in a node of its own;
+* both count messages from 0, and offer no descriptions of types.
 """
 
 import json
@@ -94,7 +95,7 @@ def environment(folder):
 
 @pytest.fixture(scope="module")
 def network(tmp_path_factory):
-    """The endpoint of the router, at which all programs are, and a node `/tester` in this process."""
+    """The endpoint of the router, at which all programs are, and the node `/tester`, which is here."""
     folder = tmp_path_factory.mktemp("network")
     for package, files in catalog_files().items():
         for name, text in files.items():
@@ -133,7 +134,8 @@ def network(tmp_path_factory):
         for name, process in processes.items():
             place = f"/{name}/set"
             while not node.graph.wait_for(lambda graph, p=place: graph.count(Kind.SERVICE, p), 1):
-                assert process.poll() is None and time.monotonic() < end, logs[name].read_text()
+                assert process.poll() is None, logs[name].read_text()
+                assert time.monotonic() < end, logs[name].read_text()
         yield endpoint, node
         for name, process in processes.items():
             assert process.poll() is None, logs[name].read_text()

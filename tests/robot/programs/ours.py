@@ -1,4 +1,4 @@
-"""A node of idlc.robot: ours.py ENDPOINT NAME FOLDER. tests/robot/test_peers.py tells of its names."""
+"""A node of idlc.robot: ours.py ENDPOINT NAME FOLDER. test_peers.py tells of its names."""
 
 import sys
 
