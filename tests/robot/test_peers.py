@@ -45,7 +45,7 @@ PROGRAMS = {
     "zenoh_ros2_sdk": "of_zenoh_ros2_sdk.py",
 }
 #: Seconds in which the programs start; pyzeros compiles.
-LONGEST = 600
+LONGEST = 300
 JointState = idlc.load("sensor_msgs/msg/JointState").JointState
 STATE = {
     "header": {"stamp": {"sec": 3, "nanosec": 5}, "frame_id": "Gehäuse"},
@@ -95,7 +95,7 @@ def environment(folder):
 
 @pytest.fixture(scope="module")
 def network(tmp_path_factory):
-    """The endpoint of the router, at which all programs are, and the node `/tester`, which is here."""
+    """The endpoint of the router, at which all programs are, and a node of this process."""
     folder = tmp_path_factory.mktemp("network")
     for package, files in catalog_files().items():
         for name, text in files.items():
