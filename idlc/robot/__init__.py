@@ -13,6 +13,7 @@ from idlc.robot.nodes.clock import Clock as Clock
 from idlc.robot.nodes.clock import ClockType as ClockType
 from idlc.robot.nodes.clock import Duration as Duration
 from idlc.robot.nodes.clock import Time as Time
+from idlc.robot.nodes.clock import Timer as Timer
 from idlc.robot.nodes.context import Context as Context
 from idlc.robot.nodes.context import SignalHandlerOptions as SignalHandlerOptions
 from idlc.robot.nodes.context import get_default_context as get_default_context
@@ -26,22 +27,21 @@ from idlc.robot.nodes.endpoints import Subscription as Subscription
 from idlc.robot.nodes.endpoints import SubscriptionEventCallbacks as SubscriptionEventCallbacks
 from idlc.robot.nodes.executor import Executor as Executor
 from idlc.robot.nodes.executor import ExternalShutdownException as ExternalShutdownException
+from idlc.robot.nodes.executor import Future as Future
 from idlc.robot.nodes.executor import (
     MutuallyExclusiveCallbackGroup as MutuallyExclusiveCallbackGroup,
 )
 from idlc.robot.nodes.executor import ReentrantCallbackGroup as ReentrantCallbackGroup
 from idlc.robot.nodes.executor import SingleThreadedExecutor as SingleThreadedExecutor
+from idlc.robot.nodes.executor import spin as spin
+from idlc.robot.nodes.executor import spin_once as spin_once
+from idlc.robot.nodes.executor import spin_until_future_complete as spin_until_future_complete
 from idlc.robot.nodes.logger import Logger as Logger
 from idlc.robot.nodes.logger import LoggingSeverity as LoggingSeverity
 from idlc.robot.nodes.logger import get_logger as get_logger
 from idlc.robot.nodes.node import Node as Node
 from idlc.robot.nodes.services import Client as Client
 from idlc.robot.nodes.services import Service as Service
-from idlc.robot.nodes.spinning import spin as spin
-from idlc.robot.nodes.spinning import spin_once as spin_once
-from idlc.robot.nodes.spinning import spin_until_future_complete as spin_until_future_complete
-from idlc.robot.nodes.tasks import Future as Future
-from idlc.robot.nodes.timer import Timer as Timer
 from idlc.robot.parameters.values import Parameter as Parameter
 from idlc.robot.parameters.values import parameter_value_to_python as parameter_value_to_python
 from idlc.robot.qos import DurabilityPolicy as DurabilityPolicy

@@ -1,41 +1,77 @@
-"""`python -m idlc.robot my_node.py`: run a node of rclpy where there is no rclpy."""
+"""Run a node that was written for rclpy, on a machine without rclpy.
+
+  Usage: python -m idlc.robot [FILE | -m MODULE] [ARGUMENTS]...
+
+The node speaks the protocol of rmw_zenoh. ARGUMENTS are arguments for the node, such as
+`--ros-args -r a:=b`. docs/robot-nodes.md lists the names of rclpy that idlc offers.
+"""
 
 from __future__ import annotations
 
+import re
+import runpy
+import shlex
 import sys
+from importlib.util import find_spec
+from pathlib import Path
 
-_USAGE = """\
-Usage: python -m idlc.robot [FILE | -m MODULE] [ARGUMENTS]...
-
-  Run a node that was written for rclpy, on a machine without rclpy. The
-  node speaks the protocol of rmw_zenoh. ARGUMENTS are arguments for the
-  node, such as `--ros-args -r a:=b`.
-  docs/robot-nodes.md lists the names of rclpy that idlc offers.
-"""
+from idlc.diagnostics.text import one_line
+from idlc.robot.errors import RobotError
+from idlc.robot.offer import Importer, not_offered
 
 
 def main(words: list[str]) -> int:
     """Run the node that the command line names; return the exit status."""
-    is_module = words[:1] == ["-m"]
-    words = words[is_module:]
-    if words[:1] in (["-h"], ["--help"]):
-        sys.stdout.write(_USAGE)
-        return 0
-    if not words or words[0].startswith("-"):
-        return _refuse("FILE or MODULE is missing", "write `python -m idlc.robot my_node.py`")
-    from idlc.robot.errors import RobotError
-    from idlc.robot.offer.program import run
-
     try:
-        run(words[0], words[1:], is_module=is_module)
+        if words[:1] in (["-h"], ["--help"]):
+            sys.stdout.write(__doc__)
+        else:
+            run(words)
     except RobotError as error:
-        return _refuse(error.message, error.hint or "see docs/robot-nodes.md")
+        hint = error.hint or "see docs/robot-nodes.md"
+        sys.stderr.write(f"error: {error.message}\n  = hint: {hint}\n")
+        return 2
     return 0
 
 
-def _refuse(message: str, hint: str) -> int:
-    sys.stderr.write(f"error: {message}\n  = hint: {hint}\n")
-    return 2
+def run(words: list[str]) -> None:
+    """Run a node of rclpy to its end, without rclpy; raise RobotError if that is impossible.
+
+    A file that belongs to a package runs as a module of it, so that it can import its neighbours.
+    Exceptions of the program are its own, SystemExit included.
+    """
+    is_module = words[:1] == ["-m"]
+    words = words[is_module:]
+    if not words or words[0].startswith("-"):
+        raise RobotError("FILE or MODULE is missing", "write `python -m idlc.robot my_node.py`")
+    target = words[0]
+    folder, module = Path.cwd(), target
+    if not is_module:
+        path = Path(target).resolve()
+        if not path.is_file():
+            raise RobotError(f"`{one_line(target)}` is not a file", "name a node's .py file")
+        folder, module = path.parent, path.stem
+        while (folder / "__init__.py").is_file() and folder.parent != folder:
+            folder, module = folder.parent, f"{folder.name}.{module}"
+            is_module = True
+    sys.path.insert(0, str(folder))
+    if (spec := find_spec("rclpy")) is not None:
+        problem = f"rclpy is installed ({one_line(spec.origin or 'as a folder')})"
+        command = shlex.join(["python", *sys.argv[1:]])
+        raise RobotError(problem, f"run the node with it: `{one_line(command)}`")
+    sys.meta_path.append(Importer())
+    sys.argv = words
+    try:
+        if is_module:
+            runpy.run_module(module, run_name="__main__", alter_sys=True)
+        else:
+            runpy.run_path(target, run_name="__main__")
+    except ImportError as error:
+        # `from rclpy.node import X` loses the message of the module
+        match = re.match(r"cannot import name '(\w+)'", str(error))
+        if match is None or not f"{error.name}.".startswith("rclpy."):
+            raise
+        raise ImportError(not_offered(f"{error.name}.{match[1]}"), name=error.name) from error
 
 
 if __name__ == "__main__":

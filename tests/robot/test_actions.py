@@ -9,8 +9,8 @@ import idlc
 from idlc.robot import ActionClient, ActionServer, CancelResponse, GoalResponse, Parameter
 from idlc.robot.actions.client import ClientGoalHandle
 from idlc.robot.actions.goals import GoalState
+from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import standard
-from idlc.robot.nodes.tasks import Future
 from idlc.robot.qos import qos_profile_action_status_default
 from tests.robot.nodes import node_at, spin_until
 

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -12,9 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from idlc.robot.offer.names import OFFERED
-from tests.robot.nodes import LONG
-from tests.support.paths import EXAMPLE, ROOT
+import idlc
+from idlc.cli.main import main
+from idlc.robot.offer import OFFERED
+from tests.robot.nodes import LONG, node_at, spin_until
+from tests.support.files import write
+from tests.support.paths import EXAMPLE, GOLDEN, ROOT
 
 #: The installed packages that idlc uses here; the environment may have ROS 2's as well.
 USED = "_yaml click jinja2 lark markupsafe msgspec numpy typing_extensions xxhash yaml zenoh"
@@ -80,7 +84,6 @@ def start(site, router, tmp_path):
         **os.environ,
         "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)]),
         "ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{router}"]',
-        "RCUTILS_COLORIZED_OUTPUT": "0",
     }
 
     def started(*words, cwd=EXAMPLE):
@@ -192,18 +195,42 @@ def test_mistakes_on_the_command_line_are_errors(start, words):
     assert "Traceback" not in program.output
 
 
-@pytest.mark.parametrize("module", OFFERED)
-def test_each_offered_name_exists(module):
-    for home, words in OFFERED[module].items():
-        for word in words.split():
-            assert hasattr(__import__(home, fromlist=[word]), word), (home, word)
+NAMES = """\
+import sys
+from importlib import import_module
+
+from idlc.robot.offer import OFFERED
+
+for module, names in OFFERED.items():
+    for name in names.split():
+        value = getattr(import_module(module), name)
+        home = import_module(getattr(value, "__module__", "idlc.robot.qos"))
+        assert home.__name__.startswith("idlc.robot."), (module, name)
+        assert value in vars(home).values(), (module, name)
+    print(module)
+"""
+
+
+def test_each_offered_name_is_one_of_idlc(start, tmp_path):
+    (tmp_path / "node.py").write_text(NAMES, encoding="utf-8")
+    program = start("node.py", cwd=tmp_path)
+    assert program.ends() == 0, program.output
+    assert program.output.split() == [*OFFERED]
+
+
+def test_modules_are_attributes_of_their_packages(start, tmp_path):
+    text = "import rclpy\nprint(rclpy.qos.QoSProfile.__name__, rclpy.action.client.__name__)"
+    (tmp_path / "node.py").write_text(text, encoding="utf-8")
+    program = start("node.py", cwd=tmp_path)
+    assert program.ends() == 0, program.output
+    assert program.output == "QoSProfile rclpy.action.client\n"
 
 
 def test_the_page_lists_the_names():
     page = (ROOT / "docs/robot-nodes.md").read_text(encoding="utf-8")
-    for module, homes in OFFERED.items():
-        names = sorted({word for words in homes.values() for word in words.split()})
-        assert f"| `{module}` | {', '.join(f'`{name}`' for name in names)} |" in page
+    for module, names in OFFERED.items():
+        words = ", ".join(f"`{name}`" for name in sorted(names.split()))
+        assert f"| `{module}` | {words} |" in page
 
 
 def test_scaffolded_nodes_use_only_offered_names():
@@ -214,11 +241,95 @@ def test_scaffolded_nodes_use_only_offered_names():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("rclpy."):
                 used |= {(node.module, alias.name) for alias in node.names}
-    offered = {
-        (module, word)
-        for module, homes in OFFERED.items()
-        for words in homes.values()
-        for word in words.split()
-    }
+    offered = {(module, name) for module, names in OFFERED.items() for name in names.split()}
     assert ("rclpy.node", "Node") in used
     assert {module for module, _ in used - offered} <= {"rclpy.lifecycle"}
+
+
+# what `idlc scaffold` writes
+
+SCAFFOLDED = """
+idlc scaffold node listener --subscriber Command:command --qos latched
+idlc scaffold node writer --publisher std_msgs/String:words@20
+idlc scaffold node translator --translate ../old/my_msgs ../new/my_msgs --topic my_msgs/Drive:a:b
+idlc gen
+"""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    """A package with a node of each kind, except lifecycle nodes."""
+    folder = tmp_path_factory.mktemp("scaffolded")
+    write(folder / "old/my_msgs/msg/Drive.msg", "float64 speed\n")
+    write(folder / "new/my_msgs/msg/Drive.msg", "float64 speed\nstring note 'new'\n")
+    commands = (GOLDEN / "scaffold/nodes/commands").read_text(encoding="utf-8") + SCAFFOLDED
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for line in commands.split("\n"):
+            program, *words = shlex.split(line) or ["cd", "."]
+            if program == "cd":
+                patch.chdir(words[0])
+            else:
+                assert main(words) == 0, line
+    return folder / "demo"
+
+
+@pytest.mark.long
+def test_scaffolded_publishers_subscribers_timers_and_parameters(start, package):
+    talker = start("demo/talker.py", cwd=package)
+    talker.until("[talker]: tick", 2)
+    listener = start("demo/listener.py", cwd=package)
+    listener.until("command: message.command='stop'")
+    ros = ["--ros-args", "-r", "words:=/talker/words", "-r", "__node:=poet"]
+    start("-m", "demo.writer", *ros, cwd=package)
+    talker.until("~/words: message.data='hello'")
+    for program in (talker, listener):
+        program.process.send_signal(signal.SIGINT)
+        assert program.ends() == 0, program.output
+        assert "Traceback" not in program.output
+
+
+@pytest.mark.long
+def test_scaffolded_parameters_are_set_from_outside(start, package, router):
+    talker = start("demo/talker.py", "--ros-args", "-p", "speed:=2.5", cwd=package)
+    kind = idlc.load("rcl_interfaces/srv/GetParameters").GetParameters
+    with node_at(router, "observer") as node:
+        client = node.create_client(kind, "/talker/get_parameters")
+        assert client.wait_for_service(timeout_sec=LONG), talker.output
+        response = client.call(kind.Request(names=["speed", "names"]), LONG)
+        assert [each.double_value for each in response.values] == [2.5, 0.0]
+        assert [*response.values[1].string_array_value] == ["a", "b"]
+
+
+@pytest.mark.long
+def test_scaffolded_services_and_actions(start, package):
+    oracle, station = (start(f"demo/{name}.py", cwd=package) for name in ("oracle", "station"))
+    timeout = ("--server-timeout", LONG)
+    asker = start("demo/asker.py", "why", "--loud", *timeout, cwd=package)
+    assert asker.ends() == 0, asker.output
+    assert "ask: response.answer=" in asker.output
+    oracle.until("ask: request.question='why'")
+    both = start("demo/both.py", "--dock-station", "3", *timeout, cwd=package)
+    assert both.ends() == 0, both.output
+    assert both.output.count("dock: feedback.distance=") == 5
+    assert "dock: result.docked=False" in both.output
+    station.until("dock: done")
+    ship = start("demo/ship.py", *timeout, cwd=package)
+    ship.until("dock: feedback.distance=")
+    ship.process.send_signal(signal.SIGTERM)
+    assert ship.ends() == 130, ship.output
+    station.until("dock: cancelled")
+
+
+@pytest.mark.long
+def test_scaffolded_translators(start, package, router):
+    translator = start("demo/translator.py", cwd=package)
+    folders = (package.parent / version / "my_msgs" for version in ("old", "new"))
+    old, new = (idlc.load(folder)["my_msgs/msg/Drive"] for folder in folders)
+    with node_at(router, "observer") as node:
+        received = []
+        node.create_subscription(new, "b", received.append, 10)
+        publisher = node.create_publisher(old, "a", 10)
+        spin_until(publisher.get_subscription_count, node)
+        spin_until(lambda: publisher.publish(old(speed=1.5)) or received, node)
+        assert received[0] == new(speed=1.5, note="new"), translator.output

@@ -10,9 +10,9 @@ from weakref import WeakValueDictionary
 
 from idlc.robot.actions.goals import GoalState
 from idlc.robot.names import action_names
+from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.nodes.services import Client
-from idlc.robot.nodes.tasks import Future
 from idlc.robot.qos import qos_profile_action_status_default
 
 

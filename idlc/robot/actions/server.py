@@ -14,9 +14,8 @@ from typing import Any, TypeAlias
 
 from idlc.robot.actions.goals import CancelResponse, GoalResponse, GoalState
 from idlc.robot.names import action_names
-from idlc.robot.nodes.executor import ReentrantCallbackGroup
+from idlc.robot.nodes.executor import Future, ReentrantCallbackGroup
 from idlc.robot.nodes.interfaces import standard
-from idlc.robot.nodes.tasks import Future
 from idlc.robot.qos import qos_profile_action_status_default
 
 #: The states from which a goal can enter a state.

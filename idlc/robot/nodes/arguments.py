@@ -3,77 +3,43 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from argparse import ArgumentError, ArgumentParser
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.names import InvalidNameError, expand_name, expand_namespace
+from idlc.robot.names import expand_name, expand_namespace
+from idlc.robot.nodes.logger import LoggingSeverity, get_logger
 
-_START, _END = "--ros-args", "--"
-_RULE = re.compile(
-    r"(?:([A-Za-z_]\w*):(?!//))?(?:(rostopic|rosservice)://)?([^:=]+):=(.+)", re.ASCII
-)
+_SCHEME = r"(?:rostopic|rosservice)://"
+_RULE = re.compile(rf"(?:(\w+):(?!//))?({_SCHEME})?([^:=]+):=(?:{_SCHEME})?(.+)", re.ASCII)
 _PARAMETER = re.compile(r"(?:([\w/*]+):)?([^:=]+):=(.*)", re.ASCII | re.DOTALL)
-#: Flags that idlc reads and that have no effect here, and the number of their values.
-_WITHOUT_EFFECT = {
-    "--enclave": 1,
-    "-e": 1,
-    "--log-config-file": 1,
-    "--log-file-name": 1,
-    **{
-        f"--{word}-{what}": 0
-        for word in ("enable", "disable")
-        for what in ("stdout-logs", "external-lib-logs")
-    },
-}
-
-
-class Remap(NamedTuple):
-    """A rule: the name `source`, of the node called `node` or of all, is `target` instead.
-
-    `scheme` restricts it to topics or services. `__node` and `__ns` stand for the node itself.
-    """
-
-    node: str
-    scheme: str
-    source: str
-    target: str
-
-
-class Override(NamedTuple):
-    """A value for a parameter, as YAML text; of the node called `node`, or of all if empty."""
-
-    node: str
-    name: str
-    value: str
+_HINT = "write `-r old:=new` or `-p parameter:=value`; `--` ends the arguments of ROS"
 
 
 class Arguments(NamedTuple):
     """The arguments after `--ros-args`."""
 
-    remaps: tuple[Remap, ...] = ()
-    overrides: tuple[Override, ...] = ()
+    #: A node or nothing for all of them, `rostopic://`, `rosservice://` or nothing for both, a name
+    #: or `__node` or `__ns` for the node itself, and the name that replaces it.
+    remaps: tuple[tuple[str, str, str, str], ...] = ()
+    #: A node or nothing for all of them, a parameter, and its value as YAML text.
+    overrides: tuple[tuple[str, str, str], ...] = ()
     parameter_files: tuple[str, ...] = ()
-    #: Levels by the name of a logger; the empty name is the default.
-    log_levels: tuple[tuple[str, str], ...] = ()
-    enable_rosout: bool = True
 
-    def __add__(self, other: object) -> Arguments:
-        """Return both; where they differ, the first of them counts for names."""
-        assert isinstance(other, Arguments)
+    def __add__(self, other: Arguments) -> Arguments:  # type: ignore[override]
+        """Return both; where they differ, the first of them counts."""
         return Arguments(
             self.remaps + other.remaps,
             other.overrides + self.overrides,
             other.parameter_files + self.parameter_files,
-            other.log_levels + self.log_levels,
-            self.enable_rosout and other.enable_rosout,
         )
 
-    def special(self, node: str, *sources: str) -> str | None:
+    def special(self, node: str, source: str) -> str | None:
         """Return the replacement of `__node` or `__ns` for a node that the program calls `node`."""
-        rules = (rule for rule in self.remaps if rule.source in sources)
-        return next((rule.target for rule in rules if rule.node in ("", node)), None)
+        rules = (rule for rule in self.remaps if rule[0] in ("", node) and rule[2] == source)
+        return next((target for *_, target in rules), None)
 
     def rename(self, name: str, namespace: str, node: str, scheme: str) -> str:
         """Return the absolute name of a topic or service that a node calls `name`.
@@ -81,29 +47,11 @@ class Arguments(NamedTuple):
         Raises InvalidNameError.
         """
         absolute = expand_name(name, namespace, node)
-        for rule in self.remaps:
-            if rule.source.startswith("__") or rule.node not in ("", node):
-                continue
-            if rule.scheme in ("", scheme) and absolute == expand_name(
-                rule.source, namespace, node
-            ):
-                return expand_name(rule.target, namespace, node)
+        for only, kind, source, target in self.remaps:
+            applies = only in ("", node) and kind in ("", f"{scheme}://")
+            if applies and absolute == expand_name(source, namespace, node):
+                return expand_name(target, namespace, node)
         return absolute
-
-
-def _split(args: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the other arguments, and those of ROS."""
-    others: list[str] = []
-    ros: list[str] = []
-    is_ros = False
-    for word in args:
-        if word == _START:
-            is_ros = True
-        elif is_ros and word == _END:
-            is_ros = False
-        else:
-            (ros if is_ros else others).append(word)
-    return others, ros
 
 
 def remove_ros_args(args: Sequence[str]) -> list[str]:
@@ -112,70 +60,60 @@ def remove_ros_args(args: Sequence[str]) -> list[str]:
 
 
 def parse_arguments(args: Sequence[str]) -> Arguments:
-    """Return the arguments after `--ros-args`; raise RobotError for one that is not valid."""
-    return _parse(iter(_split(args)[1]))
+    """Return the arguments after `--ros-args`, and set the levels of loggers that they name.
 
-
-def _parse(words: Iterator[str]) -> Arguments:
-    remaps: list[Remap] = []
-    overrides: list[Override] = []
-    files: list[str] = []
-    levels: list[tuple[str, str]] = []
-    rosout = True
-    for flag in words:
-        if flag in ("-r", "--remap"):
-            remaps.append(_remap(_value(flag, words)))
-        elif flag in ("-p", "--param"):
-            overrides.append(_override(_value(flag, words)))
-        elif flag == "--params-file":
-            files.append(_value(flag, words))
-        elif flag == "--log-level":
-            name, separator, level = _value(flag, words).rpartition(":=")
-            levels.append((name if separator else "", level))
-        elif flag in ("--enable-rosout-logs", "--disable-rosout-logs"):
-            rosout = flag.startswith("--enable")
-        elif flag in _WITHOUT_EFFECT:
-            for _ in range(_WITHOUT_EFFECT[flag]):
-                _value(flag, words)
-        else:
-            raise RobotError(
-                f"`{one_line(flag)}` is not an argument of ROS",
-                f"write `{_END}` before arguments of the program that follow `{_START}`",
-            )
-    return Arguments(tuple(remaps), tuple(overrides), tuple(files), tuple(levels), rosout)
-
-
-def _value(flag: str, words: Iterator[str]) -> str:
-    for word in words:
-        return word
-    raise RobotError(f"`{flag}` has no value", f"write it after `{flag}`")
-
-
-def _remap(text: str) -> Remap:
-    match = _RULE.fullmatch(text)
+    Raises RobotError if an argument is not valid.
+    """
+    parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for flags in (("-r", "--remap"), ("-p", "--param"), ("--params-file",), ("--log-level",)):
+        parser.add_argument(*flags, action="append", default=[])
     try:
-        if match is None:
-            raise InvalidNameError("it is not of the form `old:=new`")
-        node, scheme, source, target = match.groups(default="")
-        target = target.removeprefix(f"{scheme}://") if scheme else target
-        if source in ("__name", "__node"):
-            expand_name(target, "/", "node")
-            source = "__node"
-        elif source == "__ns":
-            expand_namespace(target)
+        known, others = parser.parse_known_args(_split(args)[1])
+        if others:
+            raise ValueError(f"`{others[0]}` is not an argument of ROS that idlc knows")
+        for text in known.log_level:
+            _set_level(text)
+        remaps, overrides = map(_remap, known.remap), map(_override, known.param)
+        return Arguments(tuple(remaps), tuple(overrides), tuple(known.params_file))
+    except (ArgumentError, ValueError) as error:
+        raise RobotError(one_line(str(error)), _HINT) from None
+
+
+def _split(args: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the other arguments, and those of ROS."""
+    parts: tuple[list[str], list[str]] = [], []
+    is_ros = False
+    for word in args:
+        if word == "--ros-args" or (is_ros and word == "--"):
+            is_ros = word == "--ros-args"
         else:
-            expand_name(source, "/", "node")
-            expand_name(target, "/", "node")
-    except InvalidNameError as error:
-        raise RobotError(
-            f"`{one_line(text)}` does not replace a name: {one_line(str(error))}",
-            "write `-r old:=new`, `-r __node:=name` or `-r __ns:=/name`",
-        ) from None
-    return Remap(node, scheme, source, target)
+            parts[is_ros].append(word)
+    return parts
 
 
-def _override(text: str) -> Override:
+def _remap(text: str) -> tuple[str, str, str, str]:
+    match = _RULE.fullmatch(text)
+    if match is None:
+        raise ValueError(f"`{text}` is not of the form `old:=new`")
+    node, scheme, source, target = match.groups(default="")
+    source = "__node" if source == "__name" else source
+    expand_name(source, "/", "node")
+    if source == "__ns":
+        expand_namespace(target)
+    else:
+        expand_name(target, "/", "node")
+    return node, scheme, source, target
+
+
+def _override(text: str) -> tuple[str, str, str]:
     match = _PARAMETER.fullmatch(text)
     if match is None:
-        raise RobotError(f"`{one_line(text)}` does not set a parameter", "write `-p name:=value`")
-    return Override(*match.groups(default=""))
+        raise ValueError(f"`{text}` is not of the form `parameter:=value`")
+    return match[1] or "", match[2], match[3]
+
+
+def _set_level(text: str) -> None:
+    name, _, level = text.rpartition(":=")
+    if level.upper() not in LoggingSeverity.__members__:
+        raise ValueError(f"`{level}` is not a level of loggers, such as `debug` or `warn`")
+    get_logger(name).set_level(LoggingSeverity[level.upper()])

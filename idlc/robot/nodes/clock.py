@@ -1,21 +1,18 @@
-"""Time, durations and clocks, as those of rclpy; `/clock` sets the clock of a simulated node."""
+"""Times, clocks and timers, as those of rclpy; `/clock` sets the clock of a simulated node."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from enum import IntEnum
 from functools import total_ordering
 from typing import Any
 
+from idlc.robot.nodes.executor import CallbackGroup, Ready
 from idlc.robot.nodes.interfaces import standard
 
 _SECOND = 10**9
-
-
-def _message(name: str, nanoseconds: int) -> Any:
-    seconds, rest = divmod(nanoseconds, _SECOND)
-    return standard(f"builtin_interfaces/msg/{name}").kind(sec=seconds, nanosec=rest)
 
 
 class ClockType(IntEnum):
@@ -26,28 +23,45 @@ class ClockType(IntEnum):
     STEADY_TIME = 3
 
 
+_SYSTEM = ClockType.SYSTEM_TIME
+
+
 @total_ordering
-class Duration:
-    """A number of nanoseconds, which can be negative."""
+class _Nanoseconds:
+    """The base class of times and durations."""
+
+    clock_type: Any = None
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self.nanoseconds = int(seconds * _SECOND) + int(nanoseconds)
 
-    def __repr__(self) -> str:
-        return f"Duration(nanoseconds={self.nanoseconds})"
-
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Duration) and self.nanoseconds == other.nanoseconds
+        return isinstance(other, type(self)) and self.nanoseconds == self._number(other)
 
-    def __lt__(self, other: Duration) -> bool:
-        return self.nanoseconds < other.nanoseconds
+    def __lt__(self, other: _Nanoseconds) -> bool:
+        return self.nanoseconds < self._number(other)
 
     def __hash__(self) -> int:
         return hash(self.nanoseconds)
 
+    def _number(self, other: _Nanoseconds) -> int:
+        """Return the nanoseconds of the other; raise TypeError if it cannot be compared."""
+        if self.clock_type is not other.clock_type:
+            raise TypeError(f"{self!r} and {other!r} are of different clocks")
+        return other.nanoseconds
+
     def to_msg(self) -> Any:
-        """Return it as builtin_interfaces/msg/Duration."""
-        return _message("Duration", self.nanoseconds)
+        """Return it as a message of builtin_interfaces."""
+        seconds, rest = divmod(self.nanoseconds, _SECOND)
+        name = "Duration" if isinstance(self, Duration) else "Time"
+        return standard(f"builtin_interfaces/msg/{name}").kind(sec=seconds, nanosec=rest)
+
+
+class Duration(_Nanoseconds):
+    """A number of nanoseconds, which can be negative."""
+
+    def __repr__(self) -> str:
+        return f"Duration(nanoseconds={self.nanoseconds})"
 
     @classmethod
     def from_msg(cls, msg: Any) -> Duration:
@@ -55,18 +69,13 @@ class Duration:
         return cls(nanoseconds=msg.sec * _SECOND + msg.nanosec)
 
 
-@total_ordering
-class Time:
+class Time(_Nanoseconds):
     """A time of a clock, in nanoseconds."""
 
     def __init__(
-        self,
-        *,
-        seconds: float = 0,
-        nanoseconds: int = 0,
-        clock_type: ClockType = ClockType.SYSTEM_TIME,
+        self, *, seconds: float = 0, nanoseconds: int = 0, clock_type: ClockType = _SYSTEM
     ) -> None:
-        self.nanoseconds = int(seconds * _SECOND) + int(nanoseconds)
+        super().__init__(seconds=seconds, nanoseconds=nanoseconds)
         self.clock_type = clock_type
         if not 0 <= self.nanoseconds < 2**63:
             raise ValueError(f"a time must be between 0 and 2**63 ns, not {self.nanoseconds}")
@@ -79,37 +88,13 @@ class Time:
         return divmod(self.nanoseconds, _SECOND)
 
     def __add__(self, other: Duration) -> Time:
-        total = self.nanoseconds + other.nanoseconds
-        return Time(nanoseconds=total, clock_type=self.clock_type)
-
-    __radd__ = __add__
+        return Time(nanoseconds=self.nanoseconds + other.nanoseconds, clock_type=self.clock_type)
 
     def __sub__(self, other: Any) -> Any:
         """Return the duration since another time, or the time before a duration."""
-        rest = self.nanoseconds - other.nanoseconds
         if isinstance(other, Time):
-            self._same_clock(other)
-            return Duration(nanoseconds=rest)
-        return Time(nanoseconds=rest, clock_type=self.clock_type)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Time) and self.nanoseconds == self._same_clock(other).nanoseconds
-
-    def __lt__(self, other: Time) -> bool:
-        return self.nanoseconds < self._same_clock(other).nanoseconds
-
-    def __hash__(self) -> int:
-        return hash(self.nanoseconds)
-
-    def _same_clock(self, other: Time) -> Time:
-        if self.clock_type is not other.clock_type:
-            names = f"{self.clock_type.name} and {other.clock_type.name}"
-            raise TypeError(f"times of different clocks, {names}, cannot be compared")
-        return other
-
-    def to_msg(self) -> Any:
-        """Return it as builtin_interfaces/msg/Time."""
-        return _message("Time", self.nanoseconds)
+            return Duration(nanoseconds=self.nanoseconds - self._number(other))
+        return Time(nanoseconds=self.nanoseconds - other.nanoseconds, clock_type=self.clock_type)
 
     @classmethod
     def from_msg(cls, msg: Any, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
@@ -118,13 +103,11 @@ class Time:
 
 
 class Clock:
-    """A clock; one of ROS_TIME is the system's, or simulated while `simulated` is not `None`."""
+    """A clock; one of ROS_TIME is the system's, or simulated after `simulate`."""
 
-    def __init__(self, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> None:
+    def __init__(self, *, clock_type: ClockType = _SYSTEM) -> None:
         self.clock_type = clock_type
         self._simulated: int | None = None
-        #: Called with no arguments when simulated time begins, moves back, or ends.
-        self.at_jump: list[Callable[[], None]] = []
 
     @property
     def ros_time_is_active(self) -> bool:
@@ -133,12 +116,8 @@ class Clock:
 
     def now(self) -> Time:
         """Return the time now."""
-        if self._simulated is not None:
-            nanoseconds = self._simulated
-        elif self.clock_type is ClockType.STEADY_TIME:
-            nanoseconds = time.monotonic_ns()
-        else:
-            nanoseconds = time.time_ns()
+        is_system = not self.ros_time_is_active and self.clock_type is not ClockType.STEADY_TIME
+        nanoseconds = time.time_ns() if is_system else self.elapsed()
         return Time(nanoseconds=nanoseconds, clock_type=self.clock_type)
 
     def elapsed(self) -> int:
@@ -147,7 +126,78 @@ class Clock:
 
     def simulate(self, nanoseconds: int | None) -> None:
         """Set the simulated time, `None` for the real one."""
-        before, self._simulated = self._simulated, nanoseconds
-        if before is None or nanoseconds is None or nanoseconds < before:
-            for jump in self.at_jump if before != nanoseconds else ():
-                jump()
+        self._simulated = nanoseconds
+
+
+class Timer(Ready):
+    """Calls back once in each period; calls that come too late are left out, not made up for."""
+
+    def __init__(
+        self,
+        callback: Callable[[], Any] | None,
+        group: CallbackGroup | None,
+        period: int,
+        clock: Clock,
+        *,
+        autostart: bool = True,
+    ) -> None:
+        super().__init__(group)
+        if period < 0:
+            raise ValueError("the period of a timer must not be negative")
+        self.callback = callback
+        self.clock = clock
+        #: The period in nanoseconds; a new one counts from the next call on.
+        self.timer_period_ns = period
+        #: The time of the next call; infinite if the timer is cancelled.
+        self._next = math.inf
+        if autostart:
+            self.begin_period()
+
+    def begin_period(self) -> None:
+        """Begin a period now; the executor notices when the last period would have ended."""
+        self._next = self.clock.elapsed() + self.timer_period_ns
+
+    def cancel(self) -> None:
+        """Stop calling, until `reset`."""
+        self._next = math.inf
+
+    destroy = cancel
+
+    def reset(self) -> None:
+        """Begin a period now, also after `cancel`."""
+        self.begin_period()
+        if self._executor is not None:
+            self._executor.wake()
+
+    def is_canceled(self) -> bool:
+        """Return whether the timer is cancelled."""
+        return self._next == math.inf
+
+    def nanoseconds_left(self) -> float:
+        """Return nanoseconds until the next call, infinite if cancelled, negative if it is late."""
+        left = self._next - self.clock.elapsed()
+        if self.timer_period_ns < left < math.inf:  # the simulated time moved back
+            self.begin_period()
+            return self.timer_period_ns
+        return left
+
+    def is_ready(self) -> bool:
+        """Return whether a call is due."""
+        return self.nanoseconds_left() <= 0
+
+    def wake_if_ready(self) -> float:
+        """Queue a call that is due; return seconds for which an executor can wait."""
+        left = self.nanoseconds_left()
+        if left <= 0:
+            self.wake()
+        # /clock ends the wait for simulated time
+        return math.inf if left <= 0 or self.clock.ros_time_is_active else left / 1e9
+
+    def take(self) -> Callable[[], Any] | None:
+        """Return the callback if it is due."""
+        left = self.nanoseconds_left()
+        if left > 0:
+            return None
+        if period := self.timer_period_ns:
+            self._next += period * (-left // period + 1)
+        return self.callback

@@ -8,23 +8,20 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from enum import IntFlag
-from types import FrameType
+from enum import Enum
+from functools import partial
 from typing import Any
 from weakref import WeakSet
 
 from idlc.robot.errors import RobotError
 from idlc.robot.nodes.arguments import Arguments, parse_arguments
-from idlc.robot.nodes.logger import set_levels
 from idlc.robot.session import Session, open_session
 
 
-class SignalHandlerOptions(IntFlag):
-    """The signals that shut contexts down."""
+class SignalHandlerOptions(Enum):
+    """The signals that shut the default context down."""
 
     NO = 0
-    SIGINT = 1
-    SIGTERM = 2
     ALL = 3
 
 
@@ -33,29 +30,19 @@ class Context(AbstractContextManager["Context"]):
 
     def __init__(self, session: Session | None = None) -> None:
         self.arguments = Arguments()
-        self._is_valid = session is not None
+        #: Opens the session.
+        self.connect: Callable[[], Session] = open_session
         self._session = session
         self._is_own = session is None
-        self._address: tuple[str, ...] = ()
-        self._domain: int | None = None
+        self._is_valid = session is not None
         self._lock = threading.Lock()
         self._sleepers: WeakSet[Any] = WeakSet()
-        self._callbacks: list[Callable[[], Any]] = []
 
-    def init(
-        self,
-        args: Sequence[str] | None = None,
-        *,
-        domain_id: int | None = None,
-        address: str | None = None,
-    ) -> None:
+    def init(self, args: Sequence[str] | None = None) -> None:
         """Begin; see the function `init`."""
         if self._is_valid:
             raise RobotError("the context is initialized already", "call `shutdown()` first")
         self.arguments = parse_arguments(sys.argv if args is None else args)
-        set_levels(self.arguments.log_levels)
-        self._address = () if address is None else (address,)
-        self._domain = domain_id
         self._is_valid = True
 
     @property
@@ -65,7 +52,7 @@ class Context(AbstractContextManager["Context"]):
             if not self._is_valid:
                 raise RobotError("the context is not initialized", "call `idlc.robot.init()` first")
             if self._session is None:
-                self._session = open_session(*self._address, domain=self._domain)
+                self._session = self.connect()
                 # tokens go at once, and no thread of the transport calls a program that ends
                 atexit.register(self.shutdown)
             return self._session
@@ -73,10 +60,6 @@ class Context(AbstractContextManager["Context"]):
     def ok(self) -> bool:
         """Return whether the context is initialized and not shut down."""
         return self._is_valid
-
-    def on_shutdown(self, callback: Callable[[], Any]) -> None:
-        """Call `callback` when `shutdown` is called, or at the end of the program."""
-        self._callbacks.append(callback)
 
     def wake_at_shutdown(self, sleeper: Any) -> None:
         """Call the method `wake` of an object at shutdown, also in a signal handler."""
@@ -91,16 +74,15 @@ class Context(AbstractContextManager["Context"]):
     def shutdown(self) -> None:
         """End all waits, and close the session if the context opened it. May be called again."""
         self.invalidate()
-        callbacks, self._callbacks = self._callbacks, []
-        for callback in callbacks:
-            callback()
         with self._lock:
             session, self._session = self._session, None
         if session is not None and self._is_own:
             atexit.unregister(self.shutdown)
             session.close()
-
-    try_shutdown = shutdown
+        if self is _default and threading.current_thread() is threading.main_thread():
+            for number in [*_previous]:
+                if signal.getsignal(number) is _handle:
+                    signal.signal(number, _previous.pop(number))
 
     def __exit__(self, *_: object) -> None:
         self.shutdown()
@@ -119,7 +101,6 @@ def init(
     *,
     args: Sequence[str] | None = None,
     context: Context | None = None,
-    domain_id: int | None = None,
     signal_handler_options: SignalHandlerOptions | None = None,
     address: str | None = None,
 ) -> Context:
@@ -130,44 +111,30 @@ def init(
     and SIGTERM shut the default context down. Raises RobotError.
     """
     chosen = context or _default
-    chosen.init(args, domain_id=domain_id, address=address)
-    if signal_handler_options is None:
-        signal_handler_options = (
-            SignalHandlerOptions.ALL if chosen is _default else SignalHandlerOptions.NO
-        )
-    if threading.current_thread() is threading.main_thread():
-        for option in (SignalHandlerOptions.SIGINT, SignalHandlerOptions.SIGTERM):
-            if option in signal_handler_options:
-                _install(getattr(signal, str(option.name)))
+    addresses = () if address is None else (address,)
+    chosen.init(args)
+    chosen.connect = partial(open_session, *addresses)
+    is_wanted = chosen is _default and signal_handler_options is not SignalHandlerOptions.NO
+    if is_wanted and threading.current_thread() is threading.main_thread():
+        for number in {signal.SIGINT, signal.SIGTERM} - _previous.keys():
+            _previous[number] = signal.signal(number, _handle)
     return chosen
 
 
-def _install(number: int) -> None:
-    if number not in _previous:
-        _previous[number] = signal.signal(number, _handle)
-
-
-def _handle(number: int, frame: FrameType | None) -> None:
+def _handle(number: int, frame: Any) -> None:
     _default.invalidate()
-    previous = _previous.get(number)
-    if callable(previous):  # of Ctrl-C, the one that raises KeyboardInterrupt
+    # of Ctrl-C, the one that raises KeyboardInterrupt
+    if callable(previous := _previous.get(number)):
         previous(number, frame)
 
 
-def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
+def shutdown(*, context: Context | None = None) -> None:
     """Shut a context down: nodes leave the graph, and executors stop. May be called again."""
-    chosen = context or _default
-    chosen.shutdown()
-    uninstall = chosen is _default if uninstall_handlers is None else uninstall_handlers
-    if uninstall and threading.current_thread() is threading.main_thread():
-        for number in [*_previous]:
-            if signal.getsignal(number) is _handle:
-                signal.signal(number, _previous.pop(number))
+    (context or _default).shutdown()
 
 
-def try_shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
-    """Do the same as `shutdown`, which fails in rclpy if it is called twice."""
-    shutdown(context=context, uninstall_handlers=uninstall_handlers)
+#: In rclpy, `shutdown` fails if it is called twice.
+try_shutdown = shutdown
 
 
 def ok(*, context: Context | None = None) -> bool:

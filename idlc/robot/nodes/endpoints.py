@@ -13,10 +13,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, Entity, Kind, pack_attachment, parse_attachment
-from idlc.robot.nodes.clock import Clock, ClockType
+from idlc.robot.nodes.clock import Clock, ClockType, Timer
 from idlc.robot.nodes.executor import CallbackGroup, Ready
 from idlc.robot.nodes.interfaces import Interface, MessageLike
-from idlc.robot.nodes.timer import Timer
 from idlc.robot.qos import INFINITE, HistoryPolicy, QoSProfile
 from idlc.robot.transport import Sample
 from idlc.runtime.names import DecodeError

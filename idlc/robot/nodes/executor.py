@@ -1,47 +1,90 @@
-"""The executor: one thread that runs all callbacks of its nodes, one at a time.
+"""Futures, and the executor: one thread that runs all callbacks of its nodes, one at a time.
 
 Threads of the transport only append to bounded queues and wake it.
 """
 
 from __future__ import annotations
 
+import inspect
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Generator
+from concurrent import futures
+from contextlib import AbstractContextManager, suppress
+from functools import partial
 from queue import Empty, SimpleQueue
 from threading import RLock
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
-from idlc.robot.nodes.tasks import Future, Task
 
+T = TypeVar("T")
 #: On Windows, a signal does not interrupt a wait, so that no wait is longer than these seconds.
 _TICK = 0.5
+#: Seconds; `None` and negative numbers are no limit.
+Limit: TypeAlias = float | None
 
 
 class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
     """The context was shut down, for example by SIGTERM, while an executor waited."""
 
 
+class Future(futures.Future[T]):
+    """A result that comes later; `await` it in a coroutine that an executor runs.
+
+    Callbacks run in the executor, or at once on the thread that sets the result if there is none.
+    """
+
+    def __init__(self, *, executor: Executor | None = None) -> None:
+        super().__init__()
+        self.executor = executor
+
+    def __await__(self) -> Generator[Any, None, T]:
+        while not self.done():
+            yield self
+        return self.result()  # type: ignore[return-value] # as in rclpy, `None` if cancelled
+
+    def result(self, timeout: float | None = None) -> T | None:  # type: ignore[override]
+        """Return the result, `None` before there is one; raise the exception if one was set."""
+        return super().result(timeout) if self.done() and not self.cancelled() else None
+
+    def exception(self, timeout: float | None = None) -> BaseException | None:
+        """Return the exception that was set."""
+        return super().exception(timeout) if self.done() and not self.cancelled() else None
+
+    def set_result(self, result: T) -> None:
+        """Finish with a result, unless the future is done."""
+        with suppress(futures.InvalidStateError):
+            super().set_result(result)
+
+    def add_done_callback(self, callback: Callable[[Future[T]], Any]) -> None:
+        """Call `callback` with the future when it is done or cancelled, at once if it is now."""
+
+        def call(_: object) -> None:
+            if self.executor is None:
+                callback(self)
+            else:
+                self.executor.create_task(callback, self)
+
+        super().add_done_callback(call)
+
+    def wake_at_end(self, waiter: Callable[[], Any]) -> None:
+        """Call `waiter` on the thread that ends the future, or now."""
+        super().add_done_callback(lambda _: waiter())
+
+
 class CallbackGroup:
     """Decides which callbacks may run while a coroutine of the group waits."""
 
-    #: True if no callback starts before the last coroutine has ended.
-    is_exclusive = False
-
-    def __init__(self) -> None:
-        self.reset()
+    #: The last callback; others of an exclusive group wait for its end.
+    running: Future[Any] | None = None
 
     def reset(self) -> None:
-        """Forget coroutines of another executor."""
-        self.is_busy = False
-        self.waiting: list[Ready] = []
+        """Forget a coroutine of another executor."""
+        self.running = None
 
 
 class MutuallyExclusiveCallbackGroup(CallbackGroup):
     """One callback at a time, coroutines included; each node has such a group as the default."""
-
-    is_exclusive = True
 
 
 class ReentrantCallbackGroup(CallbackGroup):
@@ -61,34 +104,44 @@ class Ready:
         executor = self._executor
         if executor is not None and not self._is_queued:
             self._is_queued = True
-            executor.schedule(self)
+            executor.schedule(self.run, executor)
 
     def attach(self, executor: Executor | None) -> None:
         """Run in this executor from now on."""
         self._executor, self._is_queued = executor, False
         self.wake()
 
-    def runs_in(self, executor: Executor) -> bool:
-        """Return whether this is the executor that runs the callbacks."""
-        return self._executor is executor
-
-    def begin(self) -> None:
-        """Leave the executor's queue; `wake` may queue it again from now on."""
-        self._is_queued = False
-
     def take(self) -> Callable[[], Any] | None:
         """Return the next callback, `None` if there is none."""
         raise NotImplementedError
+
+    def run(self, executor: Executor) -> bool:
+        """Run the next callback; return whether there was one that may run now."""
+        group = self.callback_group
+        if self._executor is not executor:
+            return False
+        if group and group.running and not group.running.done():
+            group.running.wake_at_end(partial(executor.schedule, self.run, executor))
+            return False
+        self._is_queued = False
+        callback = self.take()
+        if callback is None:
+            return False
+        future: Future[Any] = Future(executor=executor)
+        if isinstance(group, MutuallyExclusiveCallbackGroup):
+            group.running = future
+        return executor.step(future, callback)
 
 
 class Owner(Protocol):
     """The part of a Node that executors use; the class Node itself imports this module."""
 
     timers: Any
+    executor: Executor | None
 
     @property
-    def executor(self) -> Executor | None:
-        """The executor that runs the callbacks."""
+    def context(self) -> Context:
+        """The context of the node."""
         ...
 
     def attach(self, executor: Executor | None) -> None:
@@ -103,19 +156,14 @@ class Executor(AbstractContextManager["Executor"]):
     """
 
     def __init__(self, *, context: Context | None = None) -> None:
-        self._context = context or get_default_context()
+        self.context = context or get_default_context()
         self._nodes: list[Owner] = []
         # its `put` may be called in signal handlers
-        self._queue: SimpleQueue[Ready | Task[Any] | None] = SimpleQueue()
+        self._queue: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._is_shutdown = False
         # threads that spin at the same time take turns; callbacks may spin
         self._turn = RLock()
-        self._context.wake_at_shutdown(self)
-
-    @property
-    def context(self) -> Context:
-        """The context that ends the executor."""
-        return self._context
+        self.context.wake_at_shutdown(self)
 
     def add_node(self, node: Owner) -> bool:
         """Run the callbacks of a node; return whether it is new here."""
@@ -133,28 +181,49 @@ class Executor(AbstractContextManager["Executor"]):
             self._nodes.remove(node)
             node.attach(None)
 
-    def get_nodes(self) -> list[Owner]:
-        """Return the nodes."""
-        return [*self._nodes]
-
-    def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task[Any]:
+    def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run a function or coroutine in the executor; return its future."""
-        task: Task[Any] = Task(callback, args, kwargs, self)
-        self.schedule(task)
-        return task
+        work = callback if inspect.iscoroutine(callback) else partial(callback, *args, **kwargs)
+        future: Future[Any] = Future(executor=self)
+        self.schedule(self.step, future, work)
+        return future
 
-    def schedule(self, work: Ready | Task[Any]) -> None:
-        """Append to the queue, from any thread."""
-        self._queue.put(work)
+    def step(self, future: Future[Any], work: Any) -> bool:
+        """Run a function, or a coroutine to its next `await`; the future gets the result."""
+        if future.done():
+            return True
+        try:
+            if not inspect.iscoroutine(work):
+                work = work()
+                if not inspect.iscoroutine(work):
+                    future.set_result(work)
+                    return True
+            awaited = work.send(None)
+        except StopIteration as end:
+            future.set_result(end.value)
+        except BaseException as error:
+            future.set_exception(error)
+            raise
+        else:
+            resume = partial(self.schedule, self.step, future, work)
+            if isinstance(awaited, Future):
+                awaited.wake_at_end(resume)
+            else:
+                resume()
+        return True
+
+    def schedule(self, work: Callable[..., bool], *args: Any) -> None:
+        """Append to the queue, from any thread; `work` returns whether it ran a callback."""
+        self._queue.put(partial(work, *args))
 
     def wake(self) -> None:
         """End the current wait, so that the executor looks at timers and the context again."""
-        self._queue.put(None)
+        self.schedule(lambda: False)
 
-    def shutdown(self, timeout_sec: float | None = None) -> bool:  # noqa: ARG002 - as in rclpy
+    def shutdown(self, timeout_sec: Limit = None) -> bool:  # noqa: ARG002 - as in rclpy
         """Stop spinning, and give up the nodes."""
         self._is_shutdown = True
-        for node in self.get_nodes():
+        for node in [*self._nodes]:
             self.remove_node(node)
         self.wake()
         return True
@@ -164,106 +233,69 @@ class Executor(AbstractContextManager["Executor"]):
 
     def spin(self) -> None:
         """Run callbacks until the executor or the context is shut down."""
-        while self._context.ok() and not self._is_shutdown:
+        while self.context.ok() and not self._is_shutdown:
             self.spin_once()
 
-    def spin_once(self, timeout_sec: float | None = None) -> None:
+    def spin_once(self, timeout_sec: Limit = None) -> None:
         """Run one callback, or wait for one for at most `timeout_sec` seconds.
 
         Raises ExternalShutdownException if the context is shut down while it waits.
         """
-        self._spin_once(timeout_sec, lambda: False)
+        end = _end(timeout_sec)
+        while not self._is_shutdown and not self._spin_once(end):
+            pass
 
-    def spin_until_future_complete(
-        self, future: Future[Any], timeout_sec: float | None = None
-    ) -> None:
+    def spin_until_future_complete(self, future: Future[Any], timeout_sec: Limit = None) -> None:
         """Run callbacks until the future is done or cancelled, or the time is over."""
         end = _end(timeout_sec)
         future.wake_at_end(self.wake)
-
-        def is_over() -> bool:
-            return future.done() or future.cancelled()
-
-        while self._context.ok() and not self._is_shutdown and not is_over():
-            left = None if end is None else end - time.monotonic()
-            if left is not None and left <= 0:
+        while not future.done() and self.context.ok() and not self._is_shutdown:
+            self._spin_once(end)
+            if time.monotonic() >= end:
                 return
-            self._spin_once(left, is_over)
 
-    def spin_once_until_future_complete(
-        self, future: Future[Any], timeout_sec: float | None = None
-    ) -> None:
-        """Run one callback, unless the future is done before there is one."""
-        future.wake_at_end(self.wake)
-        self._spin_once(timeout_sec, lambda: future.done() or future.cancelled())
-
-    def _spin_once(self, timeout: float | None, is_over: Callable[[], bool]) -> None:
-        end = _end(timeout)
-        while not self._is_shutdown and not is_over():
-            if not self._context.ok():
-                raise ExternalShutdownException
-            wait = min(_TICK, self._wake_timers())
-            left = None if end is None else end - time.monotonic()
-            try:
-                if left is not None:
-                    wait = min(wait, left)
-                work = self._queue.get(timeout=wait) if wait > 0 else self._queue.get_nowait()
-            except Empty:
-                if left is not None and left <= wait:
-                    return
-                continue
-            with self._turn:
-                if work is not None and self._run(work):
-                    return
-
-    def _wake_timers(self) -> float:
-        """Queue the timers that are due; return the seconds until the next one is."""
-        wait = _TICK
-        for node in self._nodes:
-            for timer in node.timers:
-                if (left := timer.seconds_left()) is not None:
-                    if left <= 0:
-                        timer.wake()
-                    else:
-                        wait = min(wait, left)
-        return wait
-
-    def _run(self, work: Ready | Task[Any]) -> bool:
-        """Run a callback or a step of a task; return whether there was one."""
-        if isinstance(work, Task):
-            self._step(work)
-            return True
-        if not work.runs_in(self):
-            return False
-        group = work.callback_group
-        if group is not None and group.is_busy:
-            group.waiting.append(work)
-            return False
-        work.begin()
-        callback = work.take()
-        if callback is None:
-            return False
-        task: Task[Any] = Task(callback, (), {}, self)
-        if group is not None and group.is_exclusive:
-            group.is_busy = True
-            task.wake_at_end(lambda: self._release(group))
-        self._step(task)
-        return True
-
-    def _step(self, task: Task[Any]) -> None:
-        task()
-        if (error := task.exception()) is not None:
-            raise error
-
-    def _release(self, group: CallbackGroup) -> None:
-        group.is_busy = False
-        waiting, group.waiting = group.waiting, []
-        for work in waiting:
-            self.schedule(work)
+    def _spin_once(self, end: float) -> bool:
+        """Take from the queue once; return whether a callback ran, or the time is over."""
+        if not self.context.ok():
+            raise ExternalShutdownException
+        waits = [timer.wake_if_ready() for node in self._nodes for timer in node.timers]
+        wait = min(_TICK, end - time.monotonic(), *waits)
+        try:
+            work = self._queue.get(timeout=max(0.0, wait))
+        except Empty:
+            return time.monotonic() >= end
+        with self._turn:
+            return work()
 
 
 SingleThreadedExecutor = Executor
 
 
-def _end(timeout: float | None) -> float | None:
-    return None if timeout is None or timeout < 0 else time.monotonic() + timeout
+def _end(timeout: Limit) -> float:
+    return float("inf") if timeout is None or timeout < 0 else time.monotonic() + timeout
+
+
+def _executor_of(node: Owner, executor: Executor | None) -> Executor:
+    chosen = executor or node.executor or Executor(context=node.context)
+    chosen.add_node(node)
+    return chosen
+
+
+def spin(node: Owner, executor: Executor | None = None) -> None:
+    """Run the callbacks of a node until the context is shut down.
+
+    Raises what callbacks raise, and ExternalShutdownException after SIGTERM.
+    """
+    _executor_of(node, executor).spin()
+
+
+def spin_once(node: Owner, *, executor: Executor | None = None, timeout_sec: Limit = None) -> None:
+    """Run one callback of a node, or wait for one for at most `timeout_sec` seconds."""
+    _executor_of(node, executor).spin_once(timeout_sec)
+
+
+def spin_until_future_complete(
+    node: Owner, future: Future[Any], executor: Executor | None = None, timeout_sec: Limit = None
+) -> None:
+    """Run callbacks until the future is done or cancelled, or the time is over."""
+    _executor_of(node, executor).spin_until_future_complete(future, timeout_sec)

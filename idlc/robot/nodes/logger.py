@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Any, NamedTuple
-
-from idlc.robot.errors import RobotError
 
 
 class LoggingSeverity(IntEnum):
@@ -23,14 +20,12 @@ class LoggingSeverity(IntEnum):
     FATAL = 50
 
 
-_COLOURS = {
-    LoggingSeverity.DEBUG: "\033[32m",
-    LoggingSeverity.WARN: "\033[33m",
-    LoggingSeverity.ERROR: "\033[31m",
-    LoggingSeverity.FATAL: "\033[31m",
-}
+#: The colours of levels, as numbers of ANSI.
+_COLOURS = {"DEBUG": 32, "WARN": 33, "ERROR": 31, "FATAL": 31}
 #: Levels by the name of a logger; the empty name is that of all others.
 _levels: dict[str, LoggingSeverity] = {}
+#: The times, in seconds, of the last messages of logging statements with options.
+_logged: dict[tuple[Any, int], float] = {}
 
 
 class Record(NamedTuple):
@@ -43,17 +38,6 @@ class Record(NamedTuple):
     file: str
     function: str
     line: int
-
-
-class _Place:
-    """The earlier calls of one logging statement."""
-
-    def __init__(self) -> None:
-        self.is_first = True
-        self.last = 0
-
-
-_places: dict[tuple[Any, int], _Place] = {}
 
 
 class Logger:
@@ -71,18 +55,12 @@ class Logger:
         """Log messages of this level and above."""
         _levels[self.name] = LoggingSeverity(level)
 
-    def get_effective_level(self) -> LoggingSeverity:
-        """Return the level of this logger, or of its nearest parent that has one."""
-        name = self.name
-        while name:
-            if level := _levels.get(name, LoggingSeverity.UNSET):
-                return level
-            name = name.rpartition(".")[0]
-        return _levels.get("", LoggingSeverity.INFO)
-
     def is_enabled_for(self, severity: int) -> bool:
-        """Return whether messages of this level are logged."""
-        return severity >= self.get_effective_level()
+        """Return whether messages of this level are logged, by the nearest parent with a level."""
+        name = self.name
+        while name and not _levels.get(name):
+            name = name.rpartition(".")[0]
+        return severity >= _levels.get(name, LoggingSeverity.INFO)
 
     def log(
         self,
@@ -91,34 +69,27 @@ class Logger:
         *,
         once: bool = False,
         skip_first: bool = False,
-        throttle_duration_sec: float | None = None,
-        throttle_time_source_type: Any = None,
+        throttle_duration_sec: float = 0.0,
     ) -> bool:
         """Log a message; return whether it was logged.
 
         The options apply to the line of the program: `once`, all times but the first, or once in
-        this many seconds, by the clock `throttle_time_source_type` if one is given.
+        this many seconds.
         """
-        level = LoggingSeverity(severity)
-        if level < self.get_effective_level():
+        if not self.is_enabled_for(severity):
             return False
         frame = sys._getframe(1)  # noqa: SLF001 - as rclpy and logging do
         while frame.f_code.co_filename == __file__ and frame.f_back is not None:
             frame = frame.f_back
-        code = frame.f_code
-        if once or skip_first or throttle_duration_sec is not None:
-            place = _places.setdefault((code, frame.f_lineno), _Place())
-            is_first, place.is_first = place.is_first, False
-            if (once and not is_first) or (skip_first and is_first):
+        code, line = frame.f_code, frame.f_lineno
+        if once or skip_first or throttle_duration_sec:
+            is_first, now = (code, line) not in _logged, time.monotonic()
+            last = _logged.setdefault((code, line), float("-inf"))
+            if (skip_first if is_first else once) or now - last < throttle_duration_sec:
                 return False
-            if throttle_duration_sec is not None:
-                source = throttle_time_source_type
-                now = time.monotonic_ns() if source is None else source.now().nanoseconds
-                if not is_first and 0 <= now - place.last < throttle_duration_sec * 1e9:
-                    return False
-                place.last = now
-        where = _text(code.co_filename), code.co_name, frame.f_lineno
-        record = Record(time.time_ns(), level, self.name, _text(message), *where)
+            _logged[code, line] = now
+        rest = _text(message), _text(code.co_filename), code.co_name, line
+        record = Record(time.time_ns(), LoggingSeverity(severity), self.name, *rest)
         _write(record)
         if self._publish is not None:
             self._publish(record)
@@ -152,35 +123,13 @@ def _text(value: object) -> str:
     return str(value).encode(errors="replace").decode()
 
 
-def get_logger(name: str) -> Logger:
-    """Return a logger that writes to stderr only."""
-    return Logger(name)
-
-
-def set_levels(levels: Iterable[tuple[str, str]]) -> None:
-    """Set levels by the names of loggers; raise RobotError for a level that does not exist."""
-    for name, level in levels:
-        try:
-            _levels[name] = LoggingSeverity[level.upper()]
-        except KeyError:
-            known = ", ".join(each.name.lower() for each in LoggingSeverity)
-            raise RobotError(
-                f"`{level}` is not a level of loggers", f"write one of {known}"
-            ) from None
+#: Without a node, a logger writes to stderr only.
+get_logger = Logger
 
 
 def _write(record: Record) -> None:
     seconds, rest = divmod(record.time, 10**9)
     text = f"[{record.level.name}] [{seconds}.{rest:09}] [{record.name}]: {record.message}"
-    stream = sys.stderr
-    if stream is None:  # as under pythonw on Windows
-        return
-    if (colour := _COLOURS.get(record.level)) and _has_colours(stream):
-        text = f"{colour}{text}\033[0m"
-    stream.write(f"{text}\n")
-    stream.flush()
-
-
-def _has_colours(stream: Any) -> bool:
-    wish = os.environ.get("RCUTILS_COLORIZED_OUTPUT", "")
-    return wish == "1" if wish in ("0", "1") else bool(stream.isatty())
+    if sys.stderr and sys.stderr.isatty() and (colour := _COLOURS.get(record.level.name)):
+        text = f"\033[{colour}m{text}\033[0m"
+    print(text, file=sys.stderr, flush=True)

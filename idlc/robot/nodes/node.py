@@ -12,7 +12,7 @@ from idlc.robot.graph import Graph
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.names import InvalidNameError, expand_namespace, is_node_name
 from idlc.robot.nodes.arguments import Arguments, parse_arguments
-from idlc.robot.nodes.clock import Clock, ClockType, Time
+from idlc.robot.nodes.clock import Clock, ClockType, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
 from idlc.robot.nodes.descriptions import SERVICE, describe
 from idlc.robot.nodes.endpoints import (
@@ -38,7 +38,6 @@ from idlc.robot.nodes.interfaces import (
 )
 from idlc.robot.nodes.logger import Logger, Record
 from idlc.robot.nodes.services import Client, Service
-from idlc.robot.nodes.timer import Timer
 from idlc.robot.parameters.declared import HasParameters, add_services
 from idlc.robot.parameters.overrides import overrides_of
 from idlc.robot.parameters.values import Parameter
@@ -125,7 +124,7 @@ class Node(HasParameters):
             f"{self._namespace}/{self._name}".strip("/").replace("/", "."), self._log
         )
         # in the order of rclpy, so that ids are equal
-        if enable_rosout and self.arguments.enable_rosout:
+        if enable_rosout:
             self._rosout = self._publisher(
                 "/rosout", standard("rcl_interfaces/msg/Log"), qos_profile_rosout_default
             )
@@ -537,3 +536,7 @@ class Node(HasParameters):
 
 def _listed(types: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
     return [(name, [*of]) for name, of in types.items()]
+
+
+#: rclpy has a function of this name, which does the same.
+create_node = Node

@@ -17,9 +17,8 @@ from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
 from idlc.robot.names import action_part
 from idlc.robot.nodes.endpoints import Bounded, Endpoint, is_instance
-from idlc.robot.nodes.executor import CallbackGroup, Ready
+from idlc.robot.nodes.executor import CallbackGroup, Future, Ready
 from idlc.robot.nodes.interfaces import Interface, RequestT, ResponseT
-from idlc.robot.nodes.tasks import Future
 from idlc.robot.qos import QoSProfile
 from idlc.robot.transport import Request, Sample
 
@@ -283,7 +282,7 @@ class Client(_ServiceEndpoint[RequestT, ResponseT]):
         future = self._pending.get(number)
         if future is None:
             return None
-        future.run_callbacks_in(self._executor)
+        future.executor = self._executor
         if sample is None:
             return partial(future.set_exception, self._no_response())
         response = self._response(number, sample)

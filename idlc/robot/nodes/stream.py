@@ -36,7 +36,7 @@ class Stream(Subscription[M], AsyncIterator[M]):
     async def __anext__(self) -> M:
         self._loop = asyncio.get_running_loop()
         while not self._is_closed and self.node.context.ok():
-            self.begin()
+            self._is_queued = False
             self._arrived.clear()
             item = self.next_message()
             if item is not None:

@@ -1,0 +1,90 @@
+"""Makes the offered part of rclpy, and ROS 2's standard interfaces, importable in this process."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+#: The classes in modules of their names, such as `rclpy.node.Node`.
+_CLASSES = "Client Context Duration Node Publisher Service Subscription Timer".split()
+#: The modules of rclpy, and the names in them; `docs/robot-nodes.md` lists them, too.
+OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
+    "rclpy": (
+        "Context Future Parameter create_node get_default_context init ok shutdown spin spin_once"
+        " spin_until_future_complete try_shutdown"
+    ),
+    "rclpy.action": "ActionClient ActionServer CancelResponse GoalResponse",
+    "rclpy.action.client": "ActionClient ClientGoalHandle",
+    "rclpy.action.server": "ActionServer CancelResponse GoalResponse ServerGoalHandle",
+    "rclpy.callback_groups": "CallbackGroup MutuallyExclusiveCallbackGroup ReentrantCallbackGroup",
+    "rclpy.clock": "Clock ClockType",
+    "rclpy.exceptions": (
+        "InvalidParameterException InvalidParameterTypeException InvalidParameterValueException"
+        " ParameterAlreadyDeclaredException ParameterException ParameterNotDeclaredException"
+        " ParameterUninitializedException"
+    ),
+    "rclpy.executors": "Executor ExternalShutdownException SingleThreadedExecutor",
+    "rclpy.logging": "LoggingSeverity get_logger",
+    "rclpy.parameter": "Parameter parameter_value_to_python",
+    "rclpy.qos": (
+        "DurabilityPolicy HistoryPolicy LivelinessPolicy QoSProfile ReliabilityPolicy"
+        " qos_profile_sensor_data qos_profile_services_default qos_profile_system_default"
+    ),
+    "rclpy.signals": "SignalHandlerOptions",
+    "rclpy.task": "Future",
+    "rclpy.time": "Duration Time",
+    "rclpy.utilities": "get_default_context ok remove_ros_args shutdown try_shutdown",
+}
+#: The modules of idlc that provide the names.
+_HOMES = (
+    "actions.client actions.goals actions.server nodes.arguments nodes.clock nodes.context"
+    " nodes.executor nodes.logger nodes.node parameters.values qos"
+).split()
+
+
+class _Offered(ModuleType):
+    """A module of rclpy, whose names are imported when a program asks for them."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, "A part of rclpy, as idlc offers it.")
+        self.__all__ = OFFERED[name].split()
+
+    def __getattr__(self, name: str) -> Any:
+        full_name = f"{self.__name__}.{name}"
+        if full_name in OFFERED:
+            return import_module(full_name)
+        if name not in self.__all__:
+            raise AttributeError(not_offered(full_name), name=name, obj=self)
+        homes = (import_module(f"idlc.robot.{home}") for home in _HOMES)
+        return next(getattr(home, name) for home in homes if hasattr(home, name))
+
+
+class Importer(MetaPathFinder, Loader):
+    """Finds the modules, unless they are installed; for `sys.meta_path`."""
+
+    def find_spec(self, name: str, _path: object = None, _target: object = None) -> Any:
+        """Return the spec of a module; raise ModuleNotFoundError for other parts of rclpy."""
+        if name in OFFERED:
+            return ModuleSpec(name, self, is_package=True)
+        package = name.partition(".")[0]
+        if package == "rclpy":
+            raise ModuleNotFoundError(not_offered(name), name=name)
+        from idlc.model.catalog import packages
+        from idlc.recordings.load import known_spec
+
+        return known_spec(package, name) if package in packages() else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return a part of rclpy."""
+        return _Offered(spec.name)
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Do nothing: names are imported on demand."""
+
+
+def not_offered(name: str) -> str:
+    """Return the message about a name of rclpy."""
+    return f"idlc does not offer `{name}`; docs/robot-nodes.md lists the names that idlc offers"
