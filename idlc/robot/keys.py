@@ -201,12 +201,13 @@ class Attachment(NamedTuple):
     gid: bytes
 
 
-_ATTACHMENT = struct.Struct(f"<qqB{GID_SIZE}s")
+#: A number, a time, the length of a gid, and the gid.
+ATTACHMENT = struct.Struct(f"<qqB{GID_SIZE}s")
 
 
 def pack_attachment(sequence: int, time: int, gid: bytes) -> bytes:
     """Return an attachment as bytes."""
-    return _ATTACHMENT.pack(sequence, time, GID_SIZE, gid)
+    return ATTACHMENT.pack(sequence, time, GID_SIZE, gid)
 
 
 def parse_attachment(data: bytes) -> Attachment | None:
@@ -214,7 +215,7 @@ def parse_attachment(data: bytes) -> Attachment | None:
 
     Further bytes, which a later version may add, are ignored.
     """
-    if len(data) < _ATTACHMENT.size:
+    if len(data) < ATTACHMENT.size:
         return None
-    sequence, time, size, gid = _ATTACHMENT.unpack_from(data)
+    sequence, time, size, gid = ATTACHMENT.unpack_from(data)
     return Attachment(sequence, time, gid) if size == GID_SIZE else None

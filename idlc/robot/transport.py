@@ -33,7 +33,7 @@ class Closeable(Protocol):
 class Sender(Closeable, Protocol):
     """A declared publisher."""
 
-    def put(self, payload: bytes, attachment: bytes) -> None:
+    def put(self, payload: bytes, *, attachment: bytes) -> None:
         """Send a message."""
 
 

@@ -152,7 +152,7 @@ class Robot:
             data = message if isinstance(message, bytes) else message.serialize()
             if attachment is None:
                 attachment = pack_attachment(next(count), time.time_ns(), entity.gid)
-            sender.put(data, attachment)
+            sender.put(data, attachment=attachment)
 
         return publish
 

@@ -39,6 +39,6 @@ def pass_on(left, right):
     right.transport.subscriber("0/last", QoSProfile(depth=1), passed.put)
     last = left.transport.publisher("0/last", QoSProfile(depth=1))
     while passed.empty():  # the declaration of a subscriber takes a moment to arrive
-        last.put(b"", b"")
+        last.put(b"", attachment=b"")
         with contextlib.suppress(Empty):
             passed.put(passed.get(timeout=0.1))

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 import idlc
-from idlc.robot import Parameter, RobotError
+from idlc.robot import Parameter, RobotError, Service
 from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.parameters import values
@@ -199,7 +199,8 @@ def test_changes_are_published(node, router):
 def test_hostile_requests_end_in_answers(node):
     node.declare_parameters("", [("a", 1), ("b.c", "text")])
     source = random.Random(29)
-    services = [each for each in node.services if "parameter" in each.srv_name]
+    services = [each for each in node.endpoints if isinstance(each, Service)]
+    services = [each for each in services if "parameter" in each.srv_name]
     assert len(services) == 6
     fields = {
         "GetParameters": {"names": ["a", "b.c"]},
@@ -210,8 +211,8 @@ def test_hostile_requests_end_in_answers(node):
     ends = []
     for number in range(10_000):
         service = services[number % 6]
-        kind = service.srv_type.Request
-        given = fields.get(service.srv_type.__name__, {"names": ["a"]})
+        kind = service.interface.kind.Request
+        given = fields.get(service.interface.kind.__name__, {"names": ["a"]})
         data = bytearray(kind(**given).serialize())
         for _ in range(source.randint(1, 6)):
             data[source.randrange(len(data))] = source.choice((0, 1, 9, 77, 255))

@@ -91,7 +91,7 @@ def test_latched_messages_reach_late_ends(sessions, first, reliability):
         right.transport.subscriber("0/a", profile, received.put)
     publisher = left.transport.publisher("0/a", profile)
     for number in range(5):
-        publisher.put(b"%d" % number, pack_attachment(number + 1, 2, bytes(16)))
+        publisher.put(b"%d" % number, attachment=pack_attachment(number + 1, 2, bytes(16)))
     if first == "publisher":
         # messages that the router passes on are no longer on their way to it
         pass_on(left, right)
@@ -106,7 +106,7 @@ def test_latched_messages_reach_late_ends(sessions, first, reliability):
     publisher.close()
     publisher.close()
     with pytest.raises(RuntimeError, match="the publisher is closed"):
-        publisher.put(b"", b"")
+        publisher.put(b"", attachment=b"")
     pass_on(left, right)
     late = queue.SimpleQueue()
     right.transport.subscriber("0/a", profile, late.put)
@@ -123,7 +123,7 @@ def test_volatile_messages_reach_those_that_are_there(sessions):
     publisher = left.transport.publisher("0/a/b", profile)
     sample = None
     while sample is None:  # the declaration of a subscriber takes a moment to arrive
-        publisher.put(b"from left", b"")
+        publisher.put(b"from left", attachment=b"")
         with suppress(queue.Empty):
             sample = received.get(timeout=0.1)
     assert sample == (b"from left", b"")

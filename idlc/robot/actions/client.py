@@ -29,13 +29,13 @@ class ClientGoalHandle:
 
     def cancel_goal_async(self) -> Future[Any]:
         """Ask the server to cancel the goal; the future has the action_msgs/srv/CancelGoal."""
-        request = self._client.cancel_client.srv_type.Request()
+        request = self._client.cancel_client.interface.kind.Request()
         request.goal_info.goal_id.uuid = [*self.goal_id.uuid]
         return self._client.cancel_client.call_async(request)
 
     def get_result_async(self) -> Future[Any]:
         """Ask for the result; the future has a response with `status` and `result`."""
-        request = self._client.result_client.srv_type.Request(goal_id=self.goal_id)
+        request = self._client.result_client.interface.kind.Request(goal_id=self.goal_id)
         future = self._client.result_client.call_async(request)
         callbacks = self._client.feedback_callbacks
         future.add_done_callback(lambda _: callbacks.pop(bytes(self.goal_id.uuid), None))

@@ -62,7 +62,7 @@ class ServerGoalHandle:
         publisher, action = self._server.feedback_publisher, self._server.action_type
         if not isinstance(feedback, action.Feedback):
             raise TypeError(f"{feedback!r} is not a {action.__name__}.Feedback")
-        publisher.publish(publisher.msg_type(goal_id=self.goal_id, feedback=feedback))
+        publisher.publish(publisher.interface.kind(goal_id=self.goal_id, feedback=feedback))
 
     def succeed(self) -> None:
         """End the goal as reached; raise RuntimeError if it is neither executed nor canceled."""
@@ -158,7 +158,7 @@ class ActionServer:
         with self.lock:
             kind, goals = _message("GoalStatus"), [*self._goals.values()]
             states = [kind(goal_info=goal.info, status=goal.status) for goal in goals]
-            self._status.publish(self._status.msg_type(status_list=states))
+            self._status.publish(self._status.interface.kind(status_list=states))
 
     def start(self, callback: Callable[..., Any], *arguments: Any) -> None:
         """Call a function or coroutine as a task, unless the node was removed in the meantime."""

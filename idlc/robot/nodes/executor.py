@@ -56,6 +56,11 @@ class Future(futures.Future[T]):
         with suppress(futures.InvalidStateError):
             super().set_result(result)
 
+    def set_exception(self, exception: BaseException | None) -> None:
+        """Finish with an exception, unless the future is done."""
+        with suppress(futures.InvalidStateError):
+            super().set_exception(exception)
+
     def add_done_callback(self, callback: Callable[[Future[T]], Any]) -> None:
         """Call `callback` with the future when it is done or cancelled, at once if it is now."""
 
@@ -137,7 +142,11 @@ class Owner(Protocol):
     """The part of a Node that executors use; the class Node itself imports this module."""
 
     timers: Any
-    executor: Executor | None
+
+    @property
+    def executor(self) -> Executor | None:
+        """The executor that runs the callbacks."""
+        ...
 
     @property
     def context(self) -> Context:

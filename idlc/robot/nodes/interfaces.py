@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 
 from idlc.robot.errors import RobotError
 from idlc.runtime.names import wire_name
-from idlc.runtime.typeinfo import Types, types_of
+from idlc.runtime.typeinfo import types_of
 
 
 class MessageLike(Protocol):
@@ -19,6 +19,7 @@ class MessageLike(Protocol):
         ...
 
 
+M = TypeVar("M", bound=MessageLike)
 RequestT = TypeVar("RequestT")
 ResponseT = TypeVar("ResponseT")
 _Request = TypeVar("_Request", covariant=True)
@@ -48,23 +49,17 @@ class Interface:
         self.name = name
         self.hash = hash_
         self._load = load
-        self._kind: Any = None
 
-    @property
+    @cached_property
     def kind(self) -> Any:
         """The class."""
-        if self._kind is None:
-            self._kind = self._load()
-        return self._kind
-
-    @property
-    def types(self) -> Types:
-        """The descriptions of the type, and of those that it uses."""
-        return types_of(self.kind)
+        return self._load()
 
 
 def interface_of(kind: Any) -> Interface:
     """Return the type of a message or service class; raise RobotError for another class."""
+    if isinstance(kind, Interface):
+        return kind
     metaclass = type(kind)
     owner: Any = getattr(metaclass, "_message", None) or getattr(metaclass, "_interface", None)
     try:
@@ -79,47 +74,31 @@ def interface_of(kind: Any) -> Interface:
         ) from None
 
 
-#: The types that every node announces; their hashes stand here so that no node compiles them
-#: before it uses them.
-_HASHES = {
-    "rcl_interfaces/msg/Log": "e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac",
-    "rcl_interfaces/msg/ParameterEvent": (
-        "043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204"
-    ),
-    "rcl_interfaces/srv/DescribeParameters": (
-        "845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff"
-    ),
-    "rcl_interfaces/srv/GetParameterTypes": (
-        "da199c878688b3e530bdfe3ca8f74cb9fa0c303101e980a9e8f260e25e1c80ca"
-    ),
-    "rcl_interfaces/srv/GetParameters": (
-        "bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc"
-    ),
-    "rcl_interfaces/srv/ListParameters": (
-        "3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d"
-    ),
-    "rcl_interfaces/srv/SetParameters": (
-        "56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0"
-    ),
-    "rcl_interfaces/srv/SetParametersAtomically": (
-        "0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd"
-    ),
-    "type_description_interfaces/srv/GetTypeDescription": (
-        "69b9c19c1021405984cc60dbbb1edceb147a6538b411d812ba6afabeed962cd5"
-    ),
-}
+#: The types that every node announces; their hashes stand here so that a node does not compile
+#: them, which takes a second, before it uses them.
+_HASHES = dict(
+    line.split("=")
+    for line in """
+rcl_interfaces/msg/Log=e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac
+rcl_interfaces/msg/ParameterEvent=043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204
+rcl_interfaces/srv/DescribeParameters=845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff
+rcl_interfaces/srv/GetParameterTypes=da199c878688b3e530bdfe3ca8f74cb9fa0c303101e980a9e8f260e25e1c80ca
+rcl_interfaces/srv/GetParameters=bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc
+rcl_interfaces/srv/ListParameters=3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d
+rcl_interfaces/srv/SetParameters=56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0
+rcl_interfaces/srv/SetParametersAtomically=0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd
+type_description_interfaces/srv/GetTypeDescription=69b9c19c1021405984cc60dbbb1edceb147a6538b411d812ba6afabeed962cd5
+""".split()
+)
 
 
 @cache
 def standard(name: str) -> Interface:
     """Return a type of the catalogue of ROS 2's interfaces."""
+    package = name.partition("/")[0]
     if name in _HASHES:
-        return Interface(name, f"RIHS01_{_HASHES[name]}", lambda: _loaded(name))
-    return interface_of(_loaded(name))
-
-
-def _loaded(name: str) -> Any:
-    return _package(name.partition("/")[0])[name]
+        return Interface(name, f"RIHS01_{_HASHES[name]}", lambda: _package(package)[name])
+    return interface_of(_package(package)[name])
 
 
 @cache

@@ -3,59 +3,39 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from typing import Any, TypeVar
+from collections.abc import AsyncGenerator
+from contextlib import suppress
 
 from idlc.robot.nodes.endpoints import Subscription
-from idlc.robot.nodes.interfaces import Interface, MessageLike
-from idlc.robot.qos import QoSProfile
-
-M = TypeVar("M", bound=MessageLike)
+from idlc.robot.nodes.interfaces import M
 
 
-class Stream(Subscription[M], AsyncIterator[M]):
-    """The messages of a topic for asyncio: `async for message in node.subscribe(...)`.
+class Stream(Subscription[M]):
+    """A subscription that wakes a coroutine, and needs no executor."""
 
-    It needs no executor. It ends when the context is shut down, or at `close`.
-    """
-
-    def __init__(self, node: Any, topic: str, interface: Interface, qos: QoSProfile) -> None:
-        self._loop: asyncio.AbstractEventLoop | None = None
+    def open(self) -> None:
+        """Declare the subscriber; the running event loop gets the messages."""
+        self._loop = asyncio.get_running_loop()
         self._arrived = asyncio.Event()
-        self._is_closed = False
-        super().__init__(node, topic, interface, lambda _: None, qos)
-        node.context.wake_at_shutdown(self)
+        self.node.context.wake_at_shutdown(self)
+        super().open()
 
     def wake(self) -> None:
         """Look at the queue and the context; for any thread."""
-        loop = self._loop
-        if loop is not None and not self._is_queued and not loop.is_closed():
+        if not self._is_queued:
             self._is_queued = True
-            loop.call_soon_threadsafe(self._arrived.set)
+            with suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(self._arrived.set)
 
-    async def __anext__(self) -> M:
-        self._loop = asyncio.get_running_loop()
-        while not self._is_closed and self.node.context.ok():
-            self._is_queued = False
-            self._arrived.clear()
-            item = self.next_message()
-            if item is not None:
-                message: M = item[0]
-                return message
-            await self._arrived.wait()
-        self.close()
-        raise StopAsyncIteration
-
-    def close(self) -> None:
-        """Withdraw the subscription."""
-        self.node.destroy_subscription(self)
-
-    def destroy(self) -> None:
-        """Withdraw the subscription, and end the iteration."""
-        super().destroy()
-        self._is_closed = True
-        self.wake()
-
-    async def aclose(self) -> None:
-        """Withdraw the subscription, for `contextlib.aclosing`."""
-        self.close()
+    async def messages(self) -> AsyncGenerator[M, None]:
+        """Yield the messages, until the context is shut down or the subscription destroyed."""
+        try:
+            while self in self.node.endpoints and self.node.context.ok():
+                self._arrived.clear()
+                self._is_queued = False
+                if (message := self.next_message()) is not None:
+                    yield message
+                else:
+                    await self._arrived.wait()
+        finally:
+            self.node.destroy_subscription(self)

@@ -212,7 +212,7 @@ def add_services(node: HasParameters, create_service: Callable[..., Any]) -> Non
     """Create the six services of a node; their messages are compiled for the first request."""
     for name, answer in _ANSWERS.items():
         kind = standard(f"rcl_interfaces/srv/{name.title().replace('_', '')}")
-        create_service(f"~/{name}", kind, partial(answer, node), qos_profile_parameters)
+        create_service(kind, f"~/{name}", partial(answer, node), qos_profile=qos_profile_parameters)
 
 
 def _read(get: Callable[..., Any], field: str, node: Any, request: Any, response: Any) -> Any:
