@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from idlc.cli import completion, options
 
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
+    from idlc.robot.session import Session
+
 
 @click.command(
     "call", epilog=options.example("idlc call tcp/robot:7447 /add_two_ints a=1 b=2 --format json")
 )
-@click.argument("address", metavar="ADDRESS")
-@click.argument("service", metavar="SERVICE", shell_complete=completion.robot_services)
+@options.on_robot
+@click.argument("service", metavar="SERVICE", shell_complete=completion.robot_names)
 @click.argument(
     "values", metavar="[FIELD=VALUE]...", nargs=-1, shell_complete=completion.robot_fields
 )
@@ -26,7 +31,14 @@ from idlc.cli import completion, options
     help="Stop waiting for the response after this time.",
 )
 @options.output_style(("yaml", "json"), "Output format: YAML, or one JSON object.")
-def command(address: str, service: str, values: tuple[str, ...], timeout: float, style: str) -> int:
+def command(
+    service: str,
+    values: tuple[str, ...],
+    timeout: float,
+    style: str,
+    session: Session,
+    report: Report,
+) -> None:
     """Call a service of a robot and print the response.
 
     ADDRESS is the endpoint of the robot's Zenoh router, such as tcp/robot:7447. FIELD=VALUE sets a
@@ -34,38 +46,25 @@ def command(address: str, service: str, values: tuple[str, ...], timeout: float,
     `ids=[1,2]`. Other fields have their default values. idlc checks all values before it sends the
     request.
     """
-    from idlc.cli import output
+    from idlc.cli import messages, output
     from idlc.diagnostics import codes
-    from idlc.diagnostics.report import Report
     from idlc.robot.keys import Kind
-    from idlc.robot.live import traffic
-    from idlc.robot.live.connect import connected, find_endpoints
+    from idlc.robot.live import connect, traffic
 
-    report = Report()
-    with connected(address, report) as session:
-        ends = find_endpoints(session, service, (Kind.SERVICE,), report) if session else []
-        end = traffic.version_of(ends, report)[0] if ends else None
-        kind = traffic.interface_class(session, address, end, report) if session and end else None
-        if session and end and kind:
-            try:
-                request = traffic.request_of(kind.Request, values)
-            except traffic.FieldError as error:
-                message, _, hint = str(error).partition("; ")
-                output.usage_error(message, hint or f"the request is a {end.type}_Request")
-                return 2
-            payload = traffic.call(session, end, request, timeout)
-            if payload is None:
-                message = f"`{end.name}` of `{end.node_name}` did not respond"
-                hint = f"idlc waited {timeout:g} s; raise --timeout"
-                report.add(codes.NO_ANSWER.of("", message, hint=hint))
-            else:
-                try:
-                    response = kind.Response.deserialize(payload)
-                    text = traffic.formatter(style, kind.Response)(response)
-                    output.lines(text.removesuffix(traffic.BETWEEN), sys.stdout)
-                except ValueError as error:
-                    message = f"`{end.name}` sent a malformed response: {error}"
-                    report.add(codes.NO_ANSWER.of("", message))
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    return output.status(report)
+    kind, ends = traffic.find_version(session, service, [Kind.SERVICE], report)
+    if kind is None:
+        return
+    request = messages.message_of(kind.Request, values)
+    replies = connect.call(session, [(ends[0], request)], timeout)
+    _, payload = next(replies, (0, None))
+    if payload is None:
+        message = f"`{ends[0].name}` of `{ends[0].node_name}` did not respond"
+        hint = f"idlc waited {timeout:g} s; raise --timeout"
+        report.add(codes.NO_ANSWER.of("", message, hint=hint))
+        return
+    try:
+        text = "".join(messages.texts(style, [kind.Response.deserialize(payload)]))
+        output.lines(text.removesuffix(messages.BETWEEN), sys.stdout)
+    except ValueError as error:
+        message = f"`{ends[0].name}` sent a malformed response: {error}"
+        report.add(codes.NO_ANSWER.of("", message))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from idlc.model import ir
     from idlc.project.library import Library
-    from idlc.robot.keys import Kind
     from idlc.robot.session import Session
 
 
@@ -54,61 +53,43 @@ def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
 ROBOT_TIMEOUT = 1.0
 
 
-@contextmanager
-def _robot(context: click.Context) -> Iterator[Session | None]:
-    """Yield a session with the robot that was typed; `None` if it does not answer soon."""
+def _robot(context: click.Context) -> AbstractContextManager[Session | None]:
+    """Return a session with the robot that was typed; `None` if it does not answer soon."""
     from idlc.diagnostics.report import Report
     from idlc.robot.live.connect import connected
 
     address = context.params.get("address") or next(iter(context.args), "")
-    with connected(str(address), Report(), ROBOT_TIMEOUT) as session:
-        yield session
+    return connected(str(address), Report(), ROBOT_TIMEOUT)
 
 
-def robot_topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
-    """Offer the topics of the robot that was typed."""
+def robot_names(
+    context: click.Context, parameter: click.Parameter, word: str
+) -> list[CompletionItem[str]]:
+    """Offer the topics or services of the robot that was typed, by the name of the parameter."""
     from idlc.robot.keys import Kind
+    from idlc.robot.live.connect import TOPICS, robot_entities
 
-    return _robot_names(context, word, Kind.PUBLISHER, Kind.SUBSCRIPTION)
-
-
-def robot_services(context: click.Context, _: click.Parameter, word: str) -> list[str]:
-    """Offer the services of the robot that was typed."""
-    from idlc.robot.keys import Kind
-
-    return _robot_names(context, word, Kind.SERVICE)
-
-
-def _robot_names(context: click.Context, word: str, *kinds: Kind) -> list[str]:
-    from idlc.robot.live.connect import robot_entities
-
+    kinds = (Kind.SERVICE,) if parameter.name == "service" else TOPICS
     with _robot(context) as session:
         entities = robot_entities(session, *kinds) if session else []
-    return sorted({end.name for end in entities if end.name.startswith(word)})
+    names = dict.fromkeys(end.name for end in entities)
+    return [_item(name) for name in names if name.startswith(word)]
 
 
 def robot_fields(
     context: click.Context, _: click.Parameter, word: str
 ) -> list[CompletionItem[str]]:
     """Offer the fields of the request of the service that was typed."""
+    from idlc.cli.messages import field_words
     from idlc.diagnostics.report import Report
     from idlc.robot.keys import Kind
-    from idlc.robot.live import traffic
-    from idlc.robot.live.connect import find_endpoints
-    from idlc.runtime.typeinfo import structure_of
+    from idlc.robot.live.traffic import find_version
 
-    name = str(context.params.get("service") or "")
-    address = str(context.params.get("address") or "")
+    name, kind = str(context.params.get("service") or ""), None
     with _robot(context) as session:
-        ends = find_endpoints(session, name, (Kind.SERVICE,), Report()) if session else []
-        kind = None
-        if session and ends:
-            kind = traffic.interface_class(session, address, ends[0], Report())
-    return (
-        [_item(each) for each in traffic.field_names(structure_of(kind.Request), word)]
-        if kind
-        else []
-    )
+        if session:
+            kind = find_version(session, name, [Kind.SERVICE], Report())[0]
+    return [_item(each) for each in field_words(kind.Request, word)] if kind else []
 
 
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import click
 
 from idlc.cli import completion, options
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
+    from idlc.robot.session import Session
 
 
 @click.command(
@@ -16,8 +22,8 @@ from idlc.cli import completion, options
         "idlc echo tcp/robot:7447 /odom --count 100 --format csv > odom.csv",
     ),
 )
-@click.argument("address", metavar="ADDRESS")
-@click.argument("topic", metavar="TOPIC", shell_complete=completion.robot_topics)
+@options.on_robot
+@click.argument("topic", metavar="TOPIC", shell_complete=completion.robot_names)
 @click.option(
     "--count",
     metavar="N",
@@ -27,7 +33,7 @@ from idlc.cli import completion, options
 @options.output_style(
     ("yaml", "json", "csv"), "Output format: YAML documents, one JSON object per line, or CSV."
 )
-def command(address: str, topic: str, count: int | None, style: str) -> int:
+def command(topic: str, count: int | None, style: str, session: Session, report: Report) -> None:
     """Print the messages of a robot's topic as they arrive.
 
     ADDRESS is the endpoint of the robot's Zenoh router, such as tcp/robot:7447. To use a Zenoh
@@ -36,28 +42,17 @@ def command(address: str, topic: str, count: int | None, style: str) -> int:
 
     In CSV, lists are JSON. In JSON, numbers that are not finite are null.
     """
-    from idlc.cli import output
-    from idlc.diagnostics.report import Report
+    from idlc.cli import messages, output
     from idlc.robot.live import traffic
-    from idlc.robot.live.connect import connected, find_endpoints
+    from idlc.robot.live.connect import TOPICS
 
-    report = Report()
-    try:
-        with connected(address, report) as session:
-            ends = find_endpoints(session, topic, traffic.TOPICS, report) if session else []
-            chosen = traffic.version_of(ends, report) if ends else []
-            kind = None
-            if session and chosen:
-                kind = traffic.interface_class(session, address, chosen[0], report)
-            if session and kind:
-                output.notes(report, sys.stderr)
-                report.notes.clear()
-                text = traffic.formatter(style, kind)
-                for message in traffic.messages(session, chosen, kind, count, report):
-                    output.lines(text(message), sys.stdout)
-                    sys.stdout.flush()
-    except KeyboardInterrupt:
-        pass
-    output.show(report, "text", sys.stderr)
+    kind, ends = traffic.find_version(session, topic, TOPICS, report)
+    if kind is None:
+        return
     output.notes(report, sys.stderr)
-    return output.status(report)
+    report.notes.clear()
+    arrived = traffic.messages(session, ends, kind, count, report)
+    with suppress(KeyboardInterrupt):
+        for text in messages.texts(style, arrived):
+            output.lines(text, sys.stdout)
+            sys.stdout.flush()

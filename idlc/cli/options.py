@@ -163,3 +163,26 @@ def scoped(
         return run
 
     return decorate
+
+
+def on_robot(command: Callable[..., None]) -> Callable[..., int]:
+    """Have a command called with the `session` with a robot whose ADDRESS is given, and a `report`.
+
+    The report is written after it.
+    """
+
+    @wraps(command)
+    def run(address: str, **arguments: Any) -> int:
+        from idlc.cli import output
+        from idlc.diagnostics.report import Report
+        from idlc.robot.live.connect import connected
+
+        report = Report()
+        with connected(address, report) as session:
+            if session:
+                command(session=session, report=report, **arguments)
+        output.show(report, "text", sys.stderr)
+        output.notes(report, sys.stderr)
+        return output.status(report)
+
+    return click.argument("address", metavar="ADDRESS")(run)

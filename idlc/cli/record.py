@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from idlc.cli import completion, options
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
+    from idlc.robot.session import Session
 
 
 @click.command(
@@ -16,8 +21,8 @@ from idlc.cli import completion, options
         "idlc columns drive.mcap /odom",
     ),
 )
-@click.argument("address", metavar="ADDRESS")
-@click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.robot_topics)
+@options.on_robot
+@click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.robot_names)
 @click.option(
     "-o", "--out", metavar="FILE", required=True, type=click.Path(), help="Output file (.mcap)."
 )
@@ -27,65 +32,49 @@ from idlc.cli import completion, options
     type=click.FloatRange(min=0, min_open=True),
     help="Stop after this time.  [default: Ctrl-C stops]",
 )
-def command(address: str, topics: tuple[str, ...], out: str, duration: float | None) -> int:
+def command(
+    topics: tuple[str, ...], out: str, duration: float | None, session: Session, report: Report
+) -> None:
     """Record topics of a robot into an MCAP file.
 
     ADDRESS is the endpoint of the robot's Zenoh router, such as tcp/robot:7447. Without TOPIC, idlc
     records all topics except the topics of actions, and adds topics that appear later. The file
     contains the definitions of all types. `idlc columns`, rosbag2 and Foxglove can read it.
     """
-    import signal
     import time
-    from threading import Event
 
-    from idlc.cli import output
+    from idlc.cli.streams import stop_signals
     from idlc.diagnostics import codes
-    from idlc.diagnostics.report import Report
     from idlc.diagnostics.text import one_line
-    from idlc.robot.live.connect import connected
+    from idlc.robot.live.connect import TOPICS, find_endpoints
 
     if not out.endswith(".mcap"):
         raise click.UsageError(f"'{out}' is not an MCAP file; write `-o {out}.mcap`")
     try:
-        from idlc.robot.live.recorder import Recorder, check_topics
+        from idlc.robot.live.recorder import Recorder
     except ImportError as error:
         raise click.UsageError(f"{error}; run `pip install 'idlc[zenoh,recordings]'`") from None
-    report = Report()
-    names = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
-    recorded = None
-    with connected(address, report) as session:
-        if session and (not names or check_topics(session, names, report)):
-            stopped = Event()
-            handlers = {
-                number: signal.signal(number, lambda *_: stopped.set())
-                for number in (signal.SIGINT, signal.SIGTERM)
-            }
-            end = None if duration is None else time.monotonic() + duration
+    names = {end.name for end in find_endpoints(session, topics, TOPICS, report)}
+    if report.had_errors:
+        return
+    end = float("inf") if duration is None else time.monotonic() + duration
+    try:
+        with stop_signals() as stopped, open(out, "xb") as file:  # noqa: PTH123 - never a link
+            recorder = Recorder(session, file, names, report)
+            sys.stderr.write(f"recording to {one_line(out)}; press Ctrl-C to stop\n")
+            sys.stderr.flush()
             try:
-                with open(out, "xb") as file:  # noqa: PTH123 - never follows a link
-                    recorder = Recorder(session, address, file, names, report)
-                    sys.stderr.write(f"recording to {one_line(out)}; press Ctrl-C to stop\n")
-                    sys.stderr.flush()
-                    try:
-                        recorder.run(
-                            lambda: stopped.is_set() or (end is not None and time.monotonic() > end)
-                        )
-                    finally:
-                        recorded = recorder.close()
-            except FileExistsError:
-                hint = "remove it, or choose another name"
-                report.add(codes.EXISTING_FILE.of(out, f"`{out}` exists", hint=hint))
-            except OSError as error:
-                message = f"cannot write `{out}`: {error.strerror or error}"
-                report.add(codes.CANNOT_WRITE.of(out, message))
+                recorder.run(
+                    lambda: stopped.is_set() or (end is not None and time.monotonic() > end)
+                )
             finally:
-                for number, handler in handlers.items():
-                    signal.signal(number, handler or signal.SIG_DFL)
-    if recorded:
-        for name, count in sorted(recorded.counts.items()):
+                counts = recorder.close()
+    except FileExistsError:
+        hint = "remove it, or choose another name"
+        report.add(codes.EXISTING_FILE.of(out, f"`{out}` exists", hint=hint))
+    except OSError as error:
+        message = f"cannot write `{out}`: {error.strerror or error}"
+        report.add(codes.CANNOT_WRITE.of(out, message))
+    else:
+        for name, count in sorted(counts.items()):
             sys.stderr.write(f"{name}: {count:,} messages → {one_line(out)}\n")
-        if recorded.lost:
-            report.notes.append(f"the disk was too slow: {recorded.lost:,} messages were lost")
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    return output.status(report)

@@ -31,18 +31,13 @@ def command(listen: tuple[str, ...], connect: tuple[str, ...]) -> int:
     Nodes on one machine find each other through the router. Other machines can reach the router
     only if --listen admits them.
     """
-    import signal
-    from threading import Event
-
     from idlc.cli import output
+    from idlc.cli.streams import stop_signals
     from idlc.robot.errors import RobotError
     from idlc.robot.session import open_router
 
-    stopped = Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopped.set())
     try:
-        with open_router(listen, connect):
+        with stop_signals() as stopped, open_router(listen, connect):
             sys.stdout.write(f"listening on {', '.join(listen)}; press Ctrl-C to stop\n")
             sys.stdout.flush()
             while not stopped.wait(0.5):  # on Windows, a wait without an end is not interrupted

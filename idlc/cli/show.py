@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from idlc.documents.show import TopicFacts
     from idlc.project.settings import Scope
     from idlc.robot.live.overview import Connection
+    from idlc.robot.qos import QoSProfile
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8
@@ -55,20 +56,34 @@ def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str
 
 def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
     from idlc.diagnostics.report import first_few
-    from idlc.robot.live.overview import qos_text
 
     rows: list[tuple[str, ...]] = [ROBOT_HEAD] if found else []
     for each in found:
         senders, receivers = (
             first_few(nodes, LISTED) if nodes else "-" for nodes in (each.senders, each.receivers)
         )
-        profiles = dict.fromkeys(map(qos_text, each.qos or each.requested))
+        profiles = dict.fromkeys(map(_qos, each.qos or each.requested))
         qos = first_few(profiles, LISTED) if each.noun == "topic" else ""
         hash_ = (each.hash or "-")[:SHORT]
         rows.append(
             (each.noun, each.name, each.type_name, hash_, each.here, senders, receivers, qos)
         )
     yield from _aligned(ROBOT_HEAD, rows)
+
+
+def _qos(qos: QoSProfile) -> str:
+    """Return a profile in few words, without what is the default."""
+    durability = [qos.durability.name.lower()] if qos.is_latched else []
+    kept = "keep_all" if qos.history.name == "KEEP_ALL" else f"depth {qos.depth}"
+    return " ".join((qos.reliability.name.lower(), *durability, kept))
+
+
+def _qos_facts(qos: QoSProfile) -> dict[str, Any]:
+    """Return a profile for JSON; durations are nanoseconds, 2**63 - 1 if they never end."""
+    from msgspec.structs import asdict
+
+    facts = asdict(qos).items()
+    return {key: value.name.lower() if hasattr(value, "name") else value for key, value in facts}
 
 
 def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
@@ -89,20 +104,19 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
             report.notes.append("the robot announces too many endpoints; some are missing")
     found = overview.connections(entities, LocalTypes(scope, report))
     nodes = sorted({end.node_name for end in entities if end.kind is Kind.NODE})
-    misfits, similar = [*overview.misfits(entities)], [*overview.similar_names(found)]
+    misfits, similar = overview.misfits(entities), overview.similar_names(found)
     if style == "json":
         for node in nodes:
             output.fact(sys.stdout, "node", name=node)
         for each in found:
             facts: dict[str, Any] = each._asdict()
-            profiles = {
-                key: [overview.qos_facts(qos) for qos in facts[key]] for key in ("qos", "requested")
-            }
-            output.fact(sys.stdout, facts.pop("noun"), **{**facts, **profiles})
-        for misfit in misfits:
-            output.fact(sys.stdout, "mismatch", **misfit._asdict())
-        for pair in similar:
-            output.fact(sys.stdout, "similar", **pair._asdict())
+            facts |= {key: [*map(_qos_facts, facts[key])] for key in ("qos", "requested")}
+            output.fact(sys.stdout, facts.pop("noun"), **facts)
+        for name, sender, receiver, reasons in misfits:
+            ends = {"sender": sender, "receiver": receiver}
+            output.fact(sys.stdout, "mismatch", name=name, **ends, reasons=reasons)
+        for sent, received in similar:
+            output.fact(sys.stdout, "similar", sent=sent, received=received)
         return
     shown = [each for each in found if not each.is_of_every_node]
     sys.stdout.writelines(_robot_table(shown))

@@ -1,4 +1,4 @@
-"""The standard streams: their encoding, and whether they have colours."""
+"""The standard streams: their encoding, and whether they have colours; and signals to stop."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import contextlib
 import io
 import os
 import sys
-from typing import TextIO
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from threading import Event
 
 #: Replacements of characters that an encoding does not have.
 _PLAIN = {"→": "->", "…": "..."}
@@ -49,3 +53,18 @@ def colours(stream: TextIO) -> bool:
     if os.environ.get("FORCE_COLOR") or os.environ.get("CLICOLOR_FORCE", "") not in ("", "0"):
         return True
     return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+@contextlib.contextmanager
+def stop_signals() -> Iterator[Event]:
+    """Yield an event that Ctrl-C and SIGTERM set instead of ending the program."""
+    import signal
+    from threading import Event
+
+    stopped, numbers = Event(), (signal.SIGINT, signal.SIGTERM)
+    handlers = [signal.signal(number, lambda *_: stopped.set()) for number in numbers]
+    try:
+        yield stopped
+    finally:
+        for number, handler in zip(numbers, handlers, strict=True):
+            signal.signal(number, handler or signal.SIG_DFL)

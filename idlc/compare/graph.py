@@ -29,6 +29,8 @@ _PART = re.compile(r"_((SendGoal|GetResult)_)?(Request|Response)$|_FeedbackMessa
 _SHARED = "action_msgs/"
 #: A sentence with more nodes than these names only the first.
 NAMED = 2
+#: Versions of one type that are compared, those of the most endpoints.
+MOST_VERSIONS = 16
 
 
 class Endpoint(NamedTuple):
@@ -242,6 +244,7 @@ def version_changes(
     All are compared with the last one. `problems` has the reason why a version has no model.
     Differences of a structure that several types hold are reported once: `seen` grows.
     """
+    count, versions = len(versions), versions[-MOST_VERSIONS:]
     *others, last = versions
     sides = [difference for version in others for difference in _all_sides(version, last, models)]
     structures = sorted({str(difference.new.name) for difference, *_ in sides})
@@ -261,7 +264,7 @@ def version_changes(
     yield Change(
         codes.SEVERAL_VERSIONS,
         last.type,
-        f"`{last.type}` has {len(versions)} versions: in {'; in '.join(whose)}",
+        f"`{last.type}` has {count} versions: in {'; in '.join(whose)}",
         frozenset(levels),
         path=last.type,
         hint="build all these programs with the same version of the type, and restart them",

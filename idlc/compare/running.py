@@ -43,7 +43,11 @@ from idlc.project import inputs
 from idlc.project.find import is_address, list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
-from idlc.robot.live.ends import RobotGraph, join_robot
+from idlc.robot.keys import Entity as RobotEntity
+from idlc.robot.keys import Kind
+from idlc.robot.live.connect import TOPICS, connected, place_of, robot_entities
+from idlc.robot.live.types import ask
+from idlc.robot.session import Session
 from idlc.wire.layout import oversized
 
 #: A graph that never comes to rest is watched for this many times the patience.
@@ -191,6 +195,40 @@ class Graph:
         return None
 
 
+class RobotGraph:
+    """The graph that a session sees, in the form in which `idlc breaking` compares graphs."""
+
+    #: Endpoints of services announce the hash of the whole service.
+    has_hashes_of_services = True
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def endpoints(self, patience: float) -> tuple[Endpoint, ...]:
+        """Return all ends of topics, services and actions, after waiting for the first one."""
+        self._session.graph.wait_for(lambda graph: graph.entities(), patience)
+        entities = robot_entities(self._session)
+        return tuple(sorted({each for end in entities for each in _robot_endpoints(end)}))
+
+    def ask(self, questions: Iterable[Question], patience: float) -> dict[Question, Answer]:
+        """Return the nodes' answers within `patience` seconds; each question has one."""
+        return ask(self._session, questions, patience)
+
+
+def _robot_endpoints(end: RobotEntity) -> Iterator[Endpoint]:
+    noun, name, _ = place_of(end)
+    sends = end.kind in (Kind.PUBLISHER, Kind.CLIENT)
+    role: Role = "server" if end.kind in (Kind.PUBLISHER, Kind.SERVICE) else "client"
+    if noun == "topic":
+        role = "publisher" if sends else "subscription"
+    if end.kind in TOPICS:
+        yield Endpoint(end.node_name, noun, name, role, sends, end.type, end.hash)
+    elif end.kind is not Kind.NODE:
+        for suffix, direction in (("_Request", sends), ("_Response", not sends)):
+            structure = f"{end.type}{suffix}"
+            yield Endpoint(end.node_name, noun, name, role, direction, structure, end.hash)
+
+
 #: A structure's full name and type hash.
 Key = tuple[str, str]
 _NO_NODE = "no node has the interface's description"
@@ -232,8 +270,9 @@ def compare_with_graph(
     if report.had_errors:
         return None
     is_robot = is_address(options.against)
-    graph: Graph | RobotGraph | None
-    with join_robot(options.against, report, patience) if is_robot else join_graph(report) as graph:
+    joined = connected(options.against, report, patience) if is_robot else join_graph(report)
+    with joined as view:
+        graph = RobotGraph(view) if isinstance(view, Session) else view
         endpoints = graph.endpoints(patience) if graph else ()
         if graph is None or not endpoints:
             hint = (

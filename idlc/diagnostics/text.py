@@ -106,6 +106,21 @@ def closest(name: str, names: Iterable[str]) -> str | None:
     return near[1] if near else None
 
 
+def near_pairs(left: Iterable[str], right: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield names of the left that differ in one letter from one of the right, in linear time."""
+    variants = {variant: name for name in right for variant in _variants(name)}
+    for name in left:
+        if other := next(filter(None, map(variants.get, _variants(name))), None):
+            yield name, other
+
+
+def _variants(name: str) -> Iterator[str]:
+    """Yield a name, and the name without each of its letters."""
+    yield name
+    for at in range(len(name)):
+        yield name[:at] + name[at + 1 :]
+
+
 def package_hint(name: str, names: Iterable[str]) -> str:
     """Return the hint for an unknown package."""
     near = closest_package(name, names)

@@ -128,6 +128,21 @@ def _type(type_: TypeDict) -> ir.FieldType:
 MAX_TEXT = 1 << 20
 
 
+def model_of_sources(
+    texts: Mapping[ir.TypeName, str], name: ir.TypeName, type_hash: str, program: str = "a node"
+) -> Model | None:
+    """Return the model of texts, if the type `name` has this hash in it."""
+    if sum(map(len, texts.values())) > MAX_TEXT:
+        return None
+    report = Report()
+    own = [
+        lower(parse(Source(f"{own} ({program})", text)), own, report, NEWEST)
+        for own, text in texts.items()
+    ]
+    model = link(name.package, own, catalog, report)
+    return model if not report.had_errors and model.hash(name) == type_hash else None
+
+
 def reported_model(
     description: DescriptionDict,
     sources: Mapping[str, str],
@@ -142,13 +157,8 @@ def reported_model(
     """
     texts = {_type_name(text_name): text for text_name, text in sources.items()}
     top = _type_name(name)
-    if top.kind == "msg" and top in texts and sum(map(len, sources.values())) <= MAX_TEXT:
-        report = Report()
-        own = [
-            lower(parse(Source(f"{own} ({program})", text)), own, report, NEWEST)
-            for own, text in texts.items()
-        ]
-        model = link(top.package, own, catalog, report)
-        if not report.had_errors and model.only({top}).describer.hash(name) == type_hash:
-            return model.only({top})
-    return model_of_description(description, name, type_hash, program)
+    is_file = top.kind == "msg" and top in texts
+    model = model_of_sources(texts, top, type_hash, program) if is_file else None
+    return (
+        model.only({top}) if model else model_of_description(description, name, type_hash, program)
+    )

@@ -253,6 +253,11 @@ class Model:
         self._pool.describer.add(self.interfaces)
         return self._pool.describer
 
+    def hash(self, name: ir.TypeName) -> str | None:
+        """Return the hash of a type; `None` if it is not in the model."""
+        is_known = name in self.messages or name in self.interfaces
+        return self.describer.hash(str(name)) if is_known else None
+
     @property
     def distro(self) -> Distro:
         """The distribution of ROS 2 that the files were read for."""

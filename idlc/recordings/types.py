@@ -206,13 +206,8 @@ class LocalTypes:
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
         """Return the hash of a type that an interface defines; `None` if it is not known."""
         if name not in self._hashes:
-            self._hashes[name] = _hash_in(self.model(interface.package, [interface]), name)
+            self._hashes[name] = self.model(interface.package, [interface]).hash(name)
         return self._hashes[name]
-
-
-def _hash_in(model: Model, name: ir.TypeName) -> str | None:
-    is_known = name in model.messages or name in model.interfaces
-    return model.describer.hash(str(name)) if is_known else None
 
 
 def recorded_types(version: Version, local: LocalTypes, report: Report) -> RecordedTypes:
@@ -393,4 +388,4 @@ class RecordedTypes:
 
     def hash(self, topic: DefinedTopic) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
-        return _hash_in(self.models[topic.name.package], topic.name)
+        return self.models[topic.name.package].hash(topic.name)

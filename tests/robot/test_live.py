@@ -180,11 +180,16 @@ def test_a_recording_is_read_by_idlc_and_mcap(robot, router, capsys, monkeypatch
     publish = robot.publisher("/drive", "demo_msgs/msg/Drive", LATCHED)
     for gear in range(3):
         publish(drive(gear=gear))
+
+    def written(recorder):
+        recorder._writer.flush()
+        return recorder._writer.counts.get(0) == 3
+
     run, handler = Recorder.run, signal.getsignal(signal.SIGTERM)
     monkeypatch.setattr(
         Recorder,
         "run",
-        lambda self, is_over: run(self, lambda: is_over() or self._counts.get("/drive") == 3),
+        lambda self, is_over: run(self, lambda: is_over() or written(self)),
     )
     assert main(["record", router, "-o", "a.mcap", "/drive", "--duration", "60"]) == 0
     assert main(["record", router, "-o", "b.mcap", "/drive", "--duration", "0.01"]) == 0

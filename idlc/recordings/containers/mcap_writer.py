@@ -5,13 +5,14 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from functools import cached_property
+from importlib.util import find_spec
 from struct import pack
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import Room
+from idlc.recordings.containers.compression import Room, compress
 from idlc.recordings.containers.mcap_messages import LEAST, MESSAGE
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.records import (
@@ -26,6 +27,7 @@ from idlc.recordings.containers.records import (
     read_records,
 )
 from idlc.recordings.containers.source import RecordingError
+from idlc.version import __version__
 
 
 class Definition(NamedTuple):
@@ -214,3 +216,41 @@ class McapWriter:
         head = pack("<QHI", total, schemas, kinds.count(CHANNEL_OP))
         counts = b"".join(map(INDEX_OFFSET.pack, self.counts, self.counts.values()))
         return head + pack("<IIIQQ", *of_kind, first, self._last) + text_field(counts)
+
+
+#: Bytes of records in a chunk of a new file.
+CHUNK = 1 << 20
+
+
+class ChunkWriter(McapWriter):
+    """Writes a new file of ROS 2, whose records are collected into chunks.
+
+    The file is complete after `close`; before, it lacks the records since the last `flush`.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        super().__init__(file.write)
+        self._file = file
+        self._records = bytearray()
+        self._compression = "zstd" if find_spec("zstandard") else ""
+        library = f"idlc {__version__}".encode()
+        self.write(record(records.HEADER_OP, text_field(b"ros2") + text_field(library)))
+
+    def append(self, op: int, content: Raw) -> None:
+        """Append a definition or a message."""
+        self._records += record(op, content)
+        if len(self._records) >= CHUNK:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the records that were collected."""
+        if self._records:
+            data, self._records = bytes(self._records), bytearray()
+            stored = compress(data, self._compression)
+            self.add_chunk(Content(data), self._compression, stored, zlib.crc32(data))
+            self._file.flush()
+
+    def close(self) -> None:
+        """Write what was collected, and the summary."""
+        self.flush()
+        super().close()

@@ -1,31 +1,44 @@
-"""Sessions for commands, the endpoints that they announce, and reports on robots."""
+"""Connections for commands: the endpoints of a robot, and what arrives from them."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
+from queue import Empty, SimpleQueue
+from threading import Lock
+from typing import Any, NamedTuple
 
+from msgspec.structs import replace
+
+from idlc.compare.graph import Entity as Noun
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import did_you_mean, one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.names import action_part
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import Session, open_session
-from idlc.robot.transport import Closeable
+from idlc.robot.transport import Sample
 
-#: Seconds that commands wait for a connection, and for a name to appear.
-CONNECTING = 5.0
+#: Seconds that commands wait for a name to appear.
 APPEARING = 1.0
-_TOPICS = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
+#: Seconds after which a wait is interrupted, because Windows does not interrupt one for Ctrl-C.
+TICK = 0.5
+#: Requests that wait for replies at a time.
+AT_ONCE = 32
+TOPICS = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
+#: Bytes of samples that wait to be read; more are lost.
+MOST_WAITING = 64 << 20
+#: Bytes that a sample takes besides its payload.
+_OVERHEAD = 200
 
 
 @contextmanager
-def connected(
-    address: str, report: Report, timeout: float = CONNECTING
-) -> Iterator[Session | None]:
+def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Session | None]:
     """Yield a session with a robot; reports IDL642, and yields `None`, without an answer."""
     try:
         session = open_session(address, timeout=timeout)
@@ -37,54 +50,103 @@ def connected(
         yield session
 
 
-def robot_entities(session: Session, *kinds: Kind, name: str | None = None) -> list[Entity]:
+def robot_entities(session: Session, *kinds: Kind) -> list[Entity]:
     """Return the entities of other sessions, sorted by name."""
-    entities = (session.graph.entities(kind, name=name) for kind in kinds or Kind)
-    return sorted(
-        (end for some in entities for end in some if end.session != session.id),
-        key=lambda end: (end.name, end.node_name, end.token),
-    )
+    entities = (end for end in session.graph.entities() if end.session != session.id)
+    chosen = [end for end in entities if not kinds or end.kind in kinds]
+    return sorted(chosen, key=lambda end: (end.name, end.node_name, end.token))
+
+
+def place_of(end: Entity) -> tuple[Noun, str, str]:
+    """Return the topic, service or action that an endpoint belongs to, and the action's part."""
+    if part := action_part(end.name):
+        return "action", *part
+    return "topic" if end.kind in TOPICS else "service", end.name, ""
 
 
 def find_endpoints(
-    session: Session, name: str, kinds: tuple[Kind, ...], report: Report
+    session: Session, names: Sequence[str], kinds: Sequence[Kind], report: Report
 ) -> list[Entity]:
-    """Return the endpoints of a topic or service; reports IDL655 if there are none."""
-    name = name if name.startswith("/") else f"/{name}"
+    """Return the endpoints of topics or services; reports IDL655 for each name without any."""
+    names = [f"/{name.removeprefix('/')}" for name in names]
 
-    def present(_: object) -> list[Entity]:
-        return robot_entities(session, *kinds, name=name)
+    def missing(_: object = None) -> list[str]:
+        graph = session.graph
+        return [name for name in names if not any(graph.count(kind, name) for kind in kinds)]
 
-    endpoints = session.graph.wait_for(present, APPEARING)
-    if not endpoints:
-        noun = "topic" if kinds == _TOPICS else "service"
-        names = list(dict.fromkeys(end.name for end in robot_entities(session, *kinds)))
-        hint = did_you_mean(name, names) or f"`idlc show` lists the {noun}s"
+    session.graph.wait_for(lambda _: not missing(), APPEARING)
+    entities = robot_entities(session, *kinds)
+    noun = "topic" if Kind.PUBLISHER in kinds else "service"
+    for name in missing():
+        hint = (
+            did_you_mean(name, {end.name for end in entities}) or f"`idlc show` lists the {noun}s"
+        )
         report.add(codes.NO_SUCH_TOPIC.of("", f"no {noun} `{one_line(name)}`", hint=hint))
-    return endpoints
+    return [end for end in entities if end.name in names]
 
 
 def own_endpoint(session: Session, like: Entity, kind: Kind, qos: QoSProfile) -> Entity:
     """Return an endpoint of a hidden node of idlc's, for what another endpoint uses."""
-    return Entity(
-        domain=session.domain,
-        session=session.id,
-        node_id=0,
-        id=session.next_id() + 1,
-        kind=kind,
-        node=f"_idlc_{os.getpid()}",
-        name=like.name,
-        type=like.type,
-        hash=like.hash,
-        qos=qos,
-    )
+    hidden = {"namespace": "/", "node": f"_idlc_{os.getpid()}", "node_id": 0, "token": ""}
+    own = {"session": session.id, "id": session.next_id() + 1, "kind": kind, "qos": qos}
+    return replace(like, enclave="/", **hidden, **own)
 
 
-def announce(session: Session, endpoint: Entity) -> Closeable:
-    """Announce an endpoint, so that publishers that wait for subscriptions begin."""
-    return session.transport.announce(endpoint.token)
+class Arrival(NamedTuple):
+    """A sample, `None` after the last reply; the number of its source, and its time in ns."""
+
+    number: int
+    sample: Sample | None
+    time: int
 
 
-def now() -> int:
-    """Return the time that attachments contain, in nanoseconds."""
-    return time.time_ns()
+class Inbox:
+    """Samples in the order of their arrival, from any thread; `lost` counts those without room."""
+
+    def __init__(self) -> None:
+        self.lost = 0
+        self._room = MOST_WAITING
+        self._lock = Lock()
+        self._arrivals: SimpleQueue[tuple[int, Arrival]] = SimpleQueue()
+
+    def put(self, number: int, sample: Sample | None) -> None:
+        """Add a sample, if there is room."""
+        size = _OVERHEAD + (len(sample.payload) if sample else 0)
+        with self._lock:
+            if size > self._room:
+                self.lost += 1
+            else:
+                self._room -= size
+                self._arrivals.put((size, Arrival(number, sample, time.time_ns())))
+
+    def get(self, timeout: float) -> Arrival | None:
+        """Return the next sample; `None` if none arrives within `timeout` seconds."""
+        try:
+            size, arrival = self._arrivals.get(timeout=timeout)
+        except Empty:
+            return None
+        with self._lock:
+            self._room += size
+        return arrival
+
+
+def call(
+    session: Session, requests: Iterable[tuple[Entity, Any]], timeout: float
+) -> Iterator[tuple[int, bytes]]:
+    """Send requests to services, some at a time; yield the number of a request with each reply."""
+    inbox, pending, unsent = Inbox(), 0, enumerate(requests)
+    end, following = time.monotonic() + timeout, next(unsent, None)
+    while (following or pending) and (left := end - time.monotonic()) > 0:
+        if following and pending < AT_ONCE:
+            number, (service, request) = following
+            client = own_endpoint(session, service, Kind.CLIENT, QoSProfile(depth=10))
+            attachment = pack_attachment(1, time.time_ns(), client.gid)
+            receive = partial(inbox.put, number)
+            payload = request.serialize()
+            session.transport.call(service.key, payload, attachment, receive, timeout=left)
+            pending, following = pending + 1, next(unsent, None)
+        elif arrival := inbox.get(min(left, TICK)):
+            if arrival.sample:
+                yield arrival.number, arrival.sample.payload
+            else:
+                pending -= 1

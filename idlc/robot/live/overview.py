@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple, TypeAlias
+from collections.abc import Iterable, Iterator
+from itertools import islice, product
+from typing import NamedTuple
 
-from idlc.model import ir
+from idlc.compare.graph import Entity as Noun
+from idlc.diagnostics.text import near_pairs
 from idlc.recordings.definitions import interface_of, type_name
 from idlc.recordings.types import LocalTypes
 from idlc.robot.graph import mismatches
 from idlc.robot.keys import Entity, Kind
-from idlc.robot.names import action_part
-from idlc.robot.qos import FOLLOWS, INFINITE, QoSProfile
+from idlc.robot.live.connect import place_of
+from idlc.robot.qos import QoSProfile
 
-Noun: TypeAlias = Literal["topic", "service", "action"]
-_SENDS = {Kind.PUBLISHER, Kind.CLIENT}
 #: What every node has; the table leaves these services out.
 _OF_EVERY_NODE = ("rcl_interfaces/srv/", "type_description_interfaces/srv/")
-#: Names that are compared with each other.
-MOST_NAMES = 2000
+#: Names of one type that are compared with each other.
+MOST_NAMES = 500
 #: Pairs of endpoints that are listed.
 MOST_MISMATCHES = 1000
 
@@ -47,117 +47,50 @@ class Connection(NamedTuple):
 
 
 def connections(entities: Iterable[Entity], local: LocalTypes) -> list[Connection]:
-    """Return what endpoints have in common, sorted; actions are put together from their parts."""
-    places: dict[tuple[Noun, str, str, str], list[Entity]] = {}
+    """Return what endpoints have in common, sorted; an action is that of its feedback."""
+    places: dict[tuple[Noun, str, str, str], tuple[list[Entity], list[Entity]]] = {}
     for end in entities:
-        noun: Noun = "topic" if end.kind in (Kind.PUBLISHER, Kind.SUBSCRIPTION) else "service"
-        name, type_, hash_, part = end.name, end.type, end.hash, action_part(end.name)
-        if end.kind is Kind.NODE or (part and part[1] != "feedback"):
-            continue
-        if part:
-            noun, name = "action", part[0]
-        places.setdefault((noun, name, type_, hash_), []).append(end)
+        noun, name, part = place_of(end)
+        if end.kind is not Kind.NODE and part in ("", "feedback"):
+            sides = places.setdefault((noun, name, end.type, end.hash), ([], []))
+            # a client of an action receives the feedback
+            is_receiver = (end.kind in (Kind.PUBLISHER, Kind.CLIENT)) == (noun == "action")
+            sides[is_receiver].append(end)
     found = []
-    for (noun, name, type_, hash_), ends in sorted(places.items()):
-        senders = [end for end in ends if end.kind in _SENDS]
-        receivers = [end for end in ends if end.kind not in _SENDS]
-        if noun == "action":  # a client receives the feedback
-            senders, receivers = receivers, senders
+    for (noun, name, type_, hash_), sides in sorted(places.items(), key=lambda item: item[0]):
         parsed = type_name(type_)
-        shown = str(interface_of(parsed)) if noun == "action" and parsed else type_
-        found.append(
-            Connection(
-                noun,
-                name,
-                shown,
-                hash_,
-                _nodes(senders),
-                _nodes(receivers),
-                tuple(dict.fromkeys(end.qos for end in senders)),
-                tuple(dict.fromkeys(end.qos for end in receivers)),
-                _here(parsed, hash_, local),
-            )
-        )
+        mine = local.hash(parsed, interface_of(parsed)) if parsed and hash_ else None
+        here = "unknown" if mine is None else "same" if mine == hash_ else "differs"
+        shown = str(interface_of(parsed)) if parsed and noun == "action" else type_
+        senders, receivers = (tuple(sorted({end.node_name for end in ends})) for ends in sides)
+        qos, requested = (tuple(dict.fromkeys(end.qos for end in ends)) for ends in sides)
+        found.append(Connection(noun, name, shown, hash_, senders, receivers, qos, requested, here))
     return found
 
 
-def _nodes(ends: Iterable[Entity]) -> tuple[str, ...]:
-    return tuple(sorted({end.node_name for end in ends}))
+def misfits(entities: Iterable[Entity]) -> list[tuple[str, str, str, tuple[str, ...]]]:
+    """Return name, nodes and reasons of endpoints that do not fit, at most so many."""
+    alike: dict[object, list[Entity]] = {}
+    for end in entities:
+        alike.setdefault((end.kind, end.name, end.type, end.hash, end.qos), []).append(end)
+    # endpoints with all of that in common fit the same others
+    groups = {ends[0]: ends for ends in alike.values()}
+    pairs = (
+        (sender.name, sender.node_name, receiver.node_name, reasons)
+        for first, second, reasons in mismatches(groups)
+        for sender, receiver in product(groups[first], groups[second])
+    )
+    return list(dict.fromkeys(islice(pairs, MOST_MISMATCHES)))
 
 
-def _here(name: ir.TypeName | None, hash_: str, local: LocalTypes) -> str:
-    mine = local.hash(name, interface_of(name)) if name else None
-    return "unknown" if not (mine and hash_) else "same" if mine == hash_ else "differs"
-
-
-class Misfit(NamedTuple):
-    """Endpoints of one name that do not fit together; `reasons` are those of `mismatches`."""
-
-    name: str
-    sender: str
-    receiver: str
-    reasons: tuple[str, ...]
-
-
-def misfits(entities: Iterable[Entity]) -> Iterator[Misfit]:
-    """Yield each pair of nodes with endpoints that do not fit, at most so many."""
-    seen: dict[Misfit, None] = {}
-    for sender, receiver, reasons in mismatches(entities):
-        misfit = Misfit(sender.name, sender.node_name, receiver.node_name, reasons)
-        if misfit not in seen:
-            seen[misfit] = None
-            yield misfit
-        if len(seen) == MOST_MISMATCHES:
-            return
-
-
-class Similar(NamedTuple):
-    """A name without receivers, and one without senders, which differ in one letter."""
-
-    sent: str
-    received: str
-
-
-def similar_names(found: Sequence[Connection]) -> Iterator[Similar]:
-    """Yield names of one type that one end may have misspelled."""
-    for noun in ("topic", "service", "action"):
-        mine = [connection for connection in found if connection.noun == noun]
-        sent = {(c.name, c.type_name) for c in mine if c.senders}
-        received = {(c.name, c.type_name) for c in mine if c.receivers}
-        variants: dict[tuple[str, str], str] = {}
-        for name, type_ in sorted(received - sent)[:MOST_NAMES]:
-            variants |= {(variant, type_): name for variant in _variants(name)}
-        for name, type_ in sorted(sent - received)[:MOST_NAMES]:
-            near = (variants.get((variant, type_)) for variant in _variants(name))
-            if other := next(filter(None, near), None):
-                yield Similar(name, other)
-
-
-def _variants(name: str) -> Iterator[str]:
-    """Yield a name, and the name without each of its letters."""
-    yield name
-    for at in range(1, len(name)):
-        yield name[:at] + name[at + 1 :]
-
-
-def qos_text(qos: QoSProfile) -> str:
-    """Return a profile in few words, without what is the default."""
-    words = [qos.reliability.name.lower()]
-    if qos.is_latched:
-        words.append(qos.durability.name.lower())
-    words.append("keep_all" if qos.history.name == "KEEP_ALL" else f"depth {qos.depth}")
-    return " ".join(words)
-
-
-def qos_facts(qos: QoSProfile) -> dict[str, Any]:
-    """Return a profile for JSON; durations are nanoseconds, and `None` if they never end."""
-    durations = ("lifespan", "deadline", "liveliness_lease_duration")
-    policies = ("history", "reliability", "durability", "liveliness")
-    return {
-        "depth": qos.depth,
-        **{name: getattr(qos, name).name.lower() for name in policies},
-        **{
-            name: None if (value := getattr(qos, name)) in (INFINITE, FOLLOWS) else value
-            for name in durations
-        },
-    }
+def similar_names(found: Iterable[Connection]) -> Iterator[tuple[str, str]]:
+    """Yield a name that nobody receives, and one that nobody sends, which differ in one letter."""
+    kinds: dict[tuple[str, str], tuple[set[str], set[str]]] = {}
+    for each in found:
+        sides = kinds.setdefault((each.noun, each.type_name), (set(), set()))
+        for side, nodes in zip(sides, (each.senders, each.receivers), strict=True):
+            if nodes:
+                side.add(each.name)
+    for sent, received in kinds.values():
+        pair = (sorted(names)[:MOST_NAMES] for names in (sent - received, received - sent))
+        yield from near_pairs(*pair)
