@@ -22,7 +22,6 @@ _TIMEOUT = 5.0
 _SETTLED = 1.0
 _TIMES = 10
 T = TypeVar("T")
-Listener = Callable[[Entity, bool], None]
 
 
 class Graph:
@@ -40,7 +39,6 @@ class Graph:
         self._bytes = 0
         self._entities: dict[str, Entity] = {}
         self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
-        self._listeners: dict[object, Listener] = {}
         self._changed = Condition()
         pattern = all_tokens(domain)
         # Zenoh answers the question only before the watch; what goes in between never arrives
@@ -103,53 +101,37 @@ class Graph:
                     return result
                 self._changed.wait(left)
 
-    def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with each entity that appears (True) or goes (False) from now on.
-
-        It runs on a thread of the transport, and hands over. Returns the function that ends it.
-        """
-        ticket = object()
-        with self._changed:
-            self._listeners[ticket] = listener
-
-        def end() -> None:
-            self._listeners.pop(ticket, None)
-
-        return end
-
     def _update(self, token: str, appears: bool) -> None:
         with self._changed:
-            entity = self._add(token) if appears else self._remove(token)
-            listeners = [*self._listeners.values()]
-            if entity is None:
-                return
-            self._changed.notify_all()
-        for listener in listeners:
-            listener(entity, appears)
+            if self._add(token) if appears else self._remove(token):
+                self._changed.notify_all()
 
-    def _add(self, token: str) -> Entity | None:
+    def _add(self, token: str) -> bool:
+        """Return whether a token is new and valid, and has room."""
         if token in self._entities:
-            return None
+            return False
         entity = parse_token(token)
         size = ENTITY_BYTES + CHARACTER_BYTES * len(token)
         if entity is None or self._bytes + size > self._limit:
             self.is_full |= entity is not None
             self.ignored += 1
-            return None
+            return False
         self._bytes += size
         self._entities[token] = entity
         self._named.setdefault((entity.kind, entity.name), {})[token] = entity
-        return entity
+        return True
 
-    def _remove(self, token: str) -> Entity | None:
+    def _remove(self, token: str) -> bool:
+        """Return whether the token was there."""
         entity = self._entities.pop(token, None)
-        if entity is not None:
-            self._bytes -= ENTITY_BYTES + CHARACTER_BYTES * len(token)
-            same = self._named[entity.kind, entity.name]
-            del same[token]
-            if not same:
-                del self._named[entity.kind, entity.name]
-        return entity
+        if entity is None:
+            return False
+        self._bytes -= ENTITY_BYTES + CHARACTER_BYTES * len(token)
+        same = self._named[entity.kind, entity.name]
+        del same[token]
+        if not same:
+            del self._named[entity.kind, entity.name]
+        return True
 
 
 class Mismatch(NamedTuple):

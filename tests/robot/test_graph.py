@@ -106,22 +106,14 @@ def test_garbage_is_counted_and_nothing_else():
     assert len(graph.entities()) == 1
 
 
-def test_listeners_hear_each_change_until_they_end():
-    tokens, changes = Tokens(), []
+def test_a_closed_graph_stays_as_it_is():
+    tokens = Tokens()
     graph = Graph(tokens, 0)
-    end = graph.listen(lambda entity, appears: changes.append((entity.id, appears)))
-    first, second = entity(Kind.PUBLISHER, 1), entity(Kind.PUBLISHER, 2)
-    tokens.update(first.token, True)
-    tokens.update(first.token, True)
-    tokens.update("garbage", True)
-    tokens.update(first.token, False)
-    end()
-    end()
-    tokens.update(second.token, True)
-    assert changes == [(1, True), (1, False)]
+    publisher = entity(Kind.PUBLISHER)
+    tokens.update(publisher.token, True)
     graph.close()
     assert tokens.update is None
-    assert graph.entities() == (second,)
+    assert graph.entities() == (publisher,)
 
 
 def test_waiting_ends_with_a_change_or_with_time():
