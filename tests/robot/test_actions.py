@@ -78,12 +78,11 @@ def test_a_goal_is_reached_with_feedback_in_order(pair):
     assert handle.stamp.sec > 0
     ends.until(lambda: len(ends.feedback) == 7)
     assert [message.feedback.sequence[0] for message in ends.feedback] == [*range(7)]
-    ends.until(lambda: handle.status == GoalState.EXECUTING)
+    assert ends.goals[0].status == GoalState.EXECUTING
     future = handle.get_result_async()
     ends.release.set_result(None)
     response = ends.result(future)
     assert (response.status, [*response.result.sequence]) == (GoalState.SUCCEEDED, [7])
-    ends.until(lambda: handle.status == GoalState.SUCCEEDED)
     # the result is kept
     assert ends.result(handle.get_result_async()) == response
 
@@ -106,7 +105,7 @@ def test_a_goal_can_be_cancelled(pair):
     answer = ends.result(handle.cancel_goal_async())
     assert answer.return_code == CancelCode.ERROR_NONE
     assert [[*each.goal_id.uuid] for each in answer.goals_canceling] == [[*handle.goal_id.uuid]]
-    ends.until(lambda: handle.status == GoalState.CANCELING)
+    assert ends.goals[0].status == GoalState.CANCELING
     assert ends.goals[0].is_cancel_requested
     ends.release.set_result(None)
     assert ends.result(handle.get_result_async()).status == GoalState.CANCELED
@@ -228,7 +227,7 @@ def test_results_are_forgotten_after_their_time(pair):
     ends = Ends(pair, result_timeout=0)
     handle = ends.send()
     ends.release.set_result(None)
-    ends.until(lambda: handle.status == GoalState.SUCCEEDED)
+    ends.until(lambda: ends.goals and ends.goals[0].status == GoalState.SUCCEEDED)
     assert ends.result(handle.get_result_async()).status == GoalState.UNKNOWN
 
 

@@ -1,4 +1,4 @@
-"""A client that sends goals, follows them, cancels them, and gets their results."""
+"""A client that sends goals, gets their feedback and results, and cancels them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 from uuid import uuid4
-from weakref import WeakValueDictionary
 
-from idlc.robot.actions.goals import GoalState
 from idlc.robot.names import action_names
 from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import standard
@@ -24,8 +22,6 @@ class ClientGoalHandle:
         self.goal_id = goal_id
         self.accepted: bool = response.accepted
         self.stamp = response.stamp
-        #: The last state that the server published, a number of action_msgs/msg/GoalStatus.
-        self.status: int = GoalState.UNKNOWN
 
     def cancel_goal_async(self) -> Future[Any]:
         """Ask the server to cancel the goal; the future has the action_msgs/srv/CancelGoal."""
@@ -50,9 +46,6 @@ class ActionClient:
     ) -> None:
         self._node = node
         self._type = action_type
-        self._goals: WeakValueDictionary[bytes, ClientGoalHandle] = WeakValueDictionary()
-        #: The states in the last message, which can arrive before the answer of the server.
-        self._states: dict[bytes, int] = {}
         self.feedback_callbacks: dict[bytes, Callable[[Any], Any] | None] = {}
         names = action_names(node.resolve_service_name(action_name))
         impl = action_type.Impl
@@ -65,9 +58,11 @@ class ActionClient:
         self._clients = (self._send, self.cancel_client, self.result_client)
         subscribe = partial(node.create_subscription, callback_group=callback_group)
         status_type = standard("action_msgs/msg/GoalStatusArray").kind
+        status_qos = qos_profile_action_status_default
+        # the states of goals are ignored; their publisher shows that there is a server
         self._subscriptions = (
             subscribe(impl.FeedbackMessage, names.feedback, self._follow, 10),
-            subscribe(status_type, names.status, self._update, qos_profile_action_status_default),
+            subscribe(status_type, names.status, lambda _: None, status_qos),
         )
 
     def server_is_ready(self) -> bool:
@@ -97,17 +92,16 @@ class ActionClient:
         sent: Future[ClientGoalHandle] = Future()
 
         def answer(future: Future[Any]) -> None:
+            accepted = False
             if (error := future.exception()) is not None:
                 sent.set_exception(error)
             elif future.cancelled():
                 sent.cancel()
             else:
                 handle = ClientGoalHandle(self, request.goal_id, future.result())
-                if handle.accepted:
-                    self._goals[key] = handle
-                    handle.status = self._states.get(key, GoalState.ACCEPTED)
+                accepted = handle.accepted
                 sent.set_result(handle)
-            if key not in self._goals:
+            if not accepted:
                 self.feedback_callbacks.pop(key, None)
 
         self._send.call_async(request).add_done_callback(answer)
@@ -115,17 +109,9 @@ class ActionClient:
 
     def destroy(self) -> None:
         """Remove the clients and subscriptions."""
-        for client in self._clients:
-            self._node.destroy_client(client)
-        for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
+        for endpoint in (*self._clients, *self._subscriptions):
+            self._node.destroy_client(endpoint)
 
     def _follow(self, message: Any) -> Any:
         callback = self.feedback_callbacks.get(bytes(message.goal_id.uuid))
         return callback and callback(message)
-
-    def _update(self, message: Any) -> None:
-        goals = message.status_list
-        self._states = {bytes(goal.goal_info.goal_id.uuid): goal.status for goal in goals}
-        for key, handle in [*self._goals.items()]:
-            handle.status = self._states.get(key, handle.status)

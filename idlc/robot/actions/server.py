@@ -128,7 +128,6 @@ class ActionServer:
         self.lock = RLock()
         names = action_names(node.resolve_service_name(action_name))
         impl = action_type.Impl
-        cancel_type = standard("action_msgs/srv/CancelGoal").kind
         serve = partial(node.create_service, callback_group=callback_group)
         # requests for results wait until goals end
         serve_result = partial(node.create_service, callback_group=ReentrantCallbackGroup())
@@ -138,7 +137,7 @@ class ActionServer:
         with self.lock:
             self._services = (
                 serve(impl.SendGoalService, names.send_goal, self._accept),
-                serve(cancel_type, names.cancel_goal, self._cancel),
+                serve(standard("action_msgs/srv/CancelGoal").kind, names.cancel_goal, self._cancel),
                 serve_result(impl.GetResultService, names.get_result, self._answer_result),
             )
             self.feedback_publisher = publish(impl.FeedbackMessage, names.feedback, 10)
@@ -146,10 +145,8 @@ class ActionServer:
 
     def destroy(self) -> None:
         """Remove the services and topics; goals that are executed go on unseen."""
-        for service in self._services:
-            self._node.destroy_service(service)
-        self._node.destroy_publisher(self.feedback_publisher)
-        self._node.destroy_publisher(self._status)
+        for endpoint in (*self._services, self.feedback_publisher, self._status):
+            self._node.destroy_service(endpoint)
 
     # for handles of goals
 

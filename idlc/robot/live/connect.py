@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
+from itertools import filterfalse
 from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple
@@ -37,17 +38,15 @@ MOST_WAITING = 64 << 20
 _OVERHEAD = 200
 
 
-@contextmanager
-def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Session | None]:
-    """Yield a session with a robot; reports IDL642, and yields `None`, without an answer."""
+def connected(
+    address: str, report: Report, timeout: float = 5.0
+) -> AbstractContextManager[Session | None]:
+    """Return a session with a robot for `with`; reports IDL642 for `None`, without an answer."""
     try:
-        session = open_session(address, timeout=timeout)
+        return open_session(address, timeout=timeout)
     except RobotError as error:
         report.add(codes.NO_ANSWER.of("", error.message, hint=error.hint))
-        yield None
-        return
-    with session:
-        yield session
+        return nullcontext()
 
 
 def robot_entities(session: Session, *kinds: Kind) -> list[Entity]:
@@ -70,17 +69,15 @@ def find_endpoints(
     """Return the endpoints of topics or services; reports IDL655 for each name without any."""
     names = [f"/{name.removeprefix('/')}" for name in names]
 
-    def missing(_: object = None) -> list[str]:
-        graph = session.graph
-        return [name for name in names if not any(graph.count(kind, name) for kind in kinds)]
+    def is_there(name: str) -> bool:
+        return any(session.graph.count(kind, name) for kind in kinds)
 
-    session.graph.wait_for(lambda _: not missing(), APPEARING)
+    session.graph.wait_for(lambda _: all(map(is_there, names)), APPEARING)
     entities = robot_entities(session, *kinds)
     noun = "topic" if Kind.PUBLISHER in kinds else "service"
-    for name in missing():
-        hint = (
-            did_you_mean(name, {end.name for end in entities}) or f"`idlc show` lists the {noun}s"
-        )
+    for name in filterfalse(is_there, names):
+        near = did_you_mean(name, {end.name for end in entities})
+        hint = near or f"`idlc show` lists the {noun}s"
         report.add(codes.NO_SUCH_TOPIC.of("", f"no {noun} `{one_line(name)}`", hint=hint))
     return [end for end in entities if end.name in names]
 
@@ -121,13 +118,12 @@ class Inbox:
 
     def get(self, timeout: float) -> Arrival | None:
         """Return the next sample; `None` if none arrives within `timeout` seconds."""
-        try:
+        with suppress(Empty):
             size, arrival = self._arrivals.get(timeout=timeout)
-        except Empty:
-            return None
-        with self._lock:
-            self._room += size
-        return arrival
+            with self._lock:
+                self._room += size
+            return arrival
+        return None
 
 
 def call(

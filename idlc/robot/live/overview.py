@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import islice, product
+from itertools import islice
 from typing import NamedTuple
 
 from idlc.compare.graph import Entity as Noun
@@ -70,17 +70,11 @@ def connections(entities: Iterable[Entity], local: LocalTypes) -> list[Connectio
 
 def misfits(entities: Iterable[Entity]) -> list[tuple[str, str, str, tuple[str, ...]]]:
     """Return name, nodes and reasons of endpoints that do not fit, at most so many."""
-    alike: dict[object, list[Entity]] = {}
-    for end in entities:
-        alike.setdefault((end.kind, end.name, end.type, end.hash, end.qos), []).append(end)
-    # endpoints with all of that in common fit the same others
-    groups = {ends[0]: ends for ends in alike.values()}
     pairs = (
         (sender.name, sender.node_name, receiver.node_name, reasons)
-        for first, second, reasons in mismatches(groups)
-        for sender, receiver in product(groups[first], groups[second])
+        for sender, receiver, reasons in islice(mismatches(entities), MOST_MISMATCHES)
     )
-    return list(dict.fromkeys(islice(pairs, MOST_MISMATCHES)))
+    return list(dict.fromkeys(pairs))
 
 
 def similar_names(found: Iterable[Connection]) -> Iterator[tuple[str, str]]:
