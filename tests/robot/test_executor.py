@@ -151,6 +151,24 @@ def test_a_callback_can_spin(executor):
     assert task.result() == 1
 
 
+def test_callbacks_of_a_group_wait_while_one_spins(executor):
+    clock, calls = simulated(), []
+
+    def spin():
+        calls.append("begin")
+        for _ in range(3):
+            executor.spin_once(timeout_sec=0)
+        calls.append("end")
+
+    group = MutuallyExclusiveCallbackGroup()
+    timers = Timer(spin, group, 10, clock), Timer(lambda: calls.append("other"), group, 10, clock)
+    executor.add_node(Timers(*timers))
+    clock.simulate(10)
+    executor.spin_once(timeout_sec=0)
+    executor.spin_once(timeout_sec=0)
+    assert calls == ["begin", "end", "other"]
+
+
 def test_a_group_goes_on_after_an_interrupt(executor):
     clock, calls = simulated(), []
 
@@ -219,7 +237,8 @@ def test_late_calls_are_left_out(executor):
 
 def test_timers_stop_and_begin_again(executor):
     clock, calls = simulated(), []
-    timer = Timer(lambda: calls.append(1), None, 10, clock, autostart=False)
+    timer = Timer(lambda: calls.append(1), None, 10, clock)
+    timer.cancel()
     executor.add_node(Timers(timer))
     clock.simulate(100)
     assert timer.is_canceled()
@@ -251,8 +270,12 @@ def test_times_and_durations_are_numbers():
     assert Duration.from_msg(Duration(nanoseconds=-1).to_msg()) == Duration(nanoseconds=-1)
     assert repr(time) == "Time(nanoseconds=1000000005, clock_type=SYSTEM_TIME)"
     assert repr(Duration(nanoseconds=1)) == "Duration(nanoseconds=1)"
+    other = Time(clock_type=ClockType.ROS_TIME)
+    assert other != Time()
+    with pytest.raises(TypeError, match="not supported between instances of 'ClockType'"):
+        time < other  # noqa: B015
     with pytest.raises(TypeError, match="are of different clocks"):
-        time < Time(clock_type=ClockType.ROS_TIME)  # noqa: B015
+        time - other
     with pytest.raises(ValueError, match="a time must be between"):
         Time(nanoseconds=-1)
     assert Clock(clock_type=ClockType.STEADY_TIME).now().nanoseconds > 0
@@ -307,7 +330,7 @@ def test_arguments_of_ros_are_read(lines):
     assert arguments.rename("x", "/s", "n", "rostopic") == "/s/y"
     assert arguments.rename("c", "/", "n", "rostopic") == "/d"
     assert arguments.rename("c", "/", "n", "rosservice") == "/c"
-    own = parse_arguments(["--ros-args", "-r", "x:=first", "-p", "k:=2"]) + arguments
+    own = parse_arguments(["--ros-args", "-r", "x:=first", "-p", "k:=2"], arguments)
     assert own.rename("x", "/", "n", "rostopic") == "/first"
     assert own.overrides[-1] == ("", "k", "2")
 

@@ -28,14 +28,6 @@ class Arguments(NamedTuple):
     overrides: tuple[tuple[str, str, str], ...] = ()
     parameter_files: tuple[str, ...] = ()
 
-    def __add__(self, other: Arguments) -> Arguments:  # type: ignore[override]
-        """Return both; where they differ, the first of them counts."""
-        return Arguments(
-            self.remaps + other.remaps,
-            other.overrides + self.overrides,
-            other.parameter_files + self.parameter_files,
-        )
-
     def special(self, node: str, source: str) -> str | None:
         """Return the replacement of `__node` or `__ns` for a node that the program calls `node`."""
         rules = (rule for rule in self.remaps if rule[0] in ("", node) and rule[2] == source)
@@ -54,27 +46,32 @@ class Arguments(NamedTuple):
         return absolute
 
 
+_NONE = Arguments()
+
+
 def remove_ros_args(args: Sequence[str]) -> list[str]:
     """Return arguments without `--ros-args`, and the words between it and `--`."""
     return _split(args)[0]
 
 
-def parse_arguments(args: Sequence[str]) -> Arguments:
+def parse_arguments(args: Sequence[str], others: Arguments = _NONE) -> Arguments:
     """Return the arguments after `--ros-args`, and set the levels of loggers that they name.
 
-    Raises RobotError if an argument is not valid.
+    They count before the others. Raises RobotError if an argument is not valid.
     """
     parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for flags in (("-r", "--remap"), ("-p", "--param"), ("--params-file",), ("--log-level",)):
         parser.add_argument(*flags, action="append", default=[])
     try:
-        known, others = parser.parse_known_args(_split(args)[1])
-        if others:
-            raise ValueError(f"`{others[0]}` is not an argument of ROS that idlc knows")
+        known, unknown = parser.parse_known_args(_split(args)[1])
+        if unknown:
+            raise ValueError(f"`{unknown[0]}` is not an argument of ROS that idlc knows")
         for text in known.log_level:
             _set_level(text)
-        remaps, overrides = map(_remap, known.remap), map(_override, known.param)
-        return Arguments(tuple(remaps), tuple(overrides), tuple(known.params_file))
+        # the first rule for a name counts, but the last value of a parameter
+        remaps = *map(_remap, known.remap), *others.remaps
+        overrides = *others.overrides, *map(_override, known.param)
+        return Arguments(remaps, overrides, (*others.parameter_files, *known.params_file))
     except (ArgumentError, ValueError) as error:
         raise RobotError(one_line(str(error)), _HINT) from None
 

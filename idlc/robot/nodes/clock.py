@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from enum import IntEnum
-from functools import total_ordering
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
-from idlc.robot.nodes.executor import CallbackGroup, Ready
+from idlc.robot.nodes.executor import Callback, CallbackGroup, Ready
 from idlc.robot.nodes.interfaces import standard
 
 _SECOND = 10**9
 
 
-class ClockType(IntEnum):
+class ClockType(Enum):
     """The kinds of clocks."""
 
     ROS_TIME = 1
@@ -26,42 +25,26 @@ class ClockType(IntEnum):
 _SYSTEM = ClockType.SYSTEM_TIME
 
 
-@total_ordering
+@dataclass(order=True, unsafe_hash=True, init=False)
 class _Nanoseconds:
     """The base class of times and durations."""
 
-    clock_type: Any = None
+    # compared first: the order of times of different clocks is a TypeError
+    clock_type: Any = field(default=None, repr=False)
+    nanoseconds: int = 0
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self.nanoseconds = int(seconds * _SECOND) + int(nanoseconds)
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and self.nanoseconds == self._number(other)
-
-    def __lt__(self, other: _Nanoseconds) -> bool:
-        return self.nanoseconds < self._number(other)
-
-    def __hash__(self) -> int:
-        return hash(self.nanoseconds)
-
-    def _number(self, other: _Nanoseconds) -> int:
-        """Return the nanoseconds of the other; raise TypeError if it cannot be compared."""
-        if self.clock_type is not other.clock_type:
-            raise TypeError(f"{self!r} and {other!r} are of different clocks")
-        return other.nanoseconds
-
     def to_msg(self) -> Any:
         """Return it as a message of builtin_interfaces."""
         seconds, rest = divmod(self.nanoseconds, _SECOND)
-        name = "Duration" if isinstance(self, Duration) else "Time"
-        return standard(f"builtin_interfaces/msg/{name}").kind(sec=seconds, nanosec=rest)
+        kind = standard(f"builtin_interfaces/msg/{type(self).__name__}").kind
+        return kind(sec=seconds, nanosec=rest)
 
 
 class Duration(_Nanoseconds):
     """A number of nanoseconds, which can be negative."""
-
-    def __repr__(self) -> str:
-        return f"Duration(nanoseconds={self.nanoseconds})"
 
     @classmethod
     def from_msg(cls, msg: Any) -> Duration:
@@ -93,7 +76,9 @@ class Time(_Nanoseconds):
     def __sub__(self, other: Any) -> Any:
         """Return the duration since another time, or the time before a duration."""
         if isinstance(other, Time):
-            return Duration(nanoseconds=self.nanoseconds - self._number(other))
+            if self.clock_type is not other.clock_type:
+                raise TypeError(f"{self!r} and {other!r} are of different clocks")
+            return Duration(nanoseconds=self.nanoseconds - other.nanoseconds)
         return Time(nanoseconds=self.nanoseconds - other.nanoseconds, clock_type=self.clock_type)
 
     @classmethod
@@ -133,13 +118,7 @@ class Timer(Ready):
     """Calls back once in each period; calls that come too late are left out, not made up for."""
 
     def __init__(
-        self,
-        callback: Callable[[], Any] | None,
-        group: CallbackGroup | None,
-        period: int,
-        clock: Clock,
-        *,
-        autostart: bool = True,
+        self, callback: Callback | None, group: CallbackGroup | None, period: int, clock: Clock
     ) -> None:
         super().__init__(group)
         if period < 0:
@@ -149,9 +128,7 @@ class Timer(Ready):
         #: The period in nanoseconds; a new one counts from the next call on.
         self.timer_period_ns = period
         #: The time of the next call; infinite if the timer is cancelled.
-        self._next = math.inf
-        if autostart:
-            self.begin_period()
+        self._next: float = clock.elapsed() + period
 
     def begin_period(self) -> None:
         """Begin a period now; the executor notices when the last period would have ended."""
@@ -193,7 +170,7 @@ class Timer(Ready):
         # /clock ends the wait for simulated time
         return math.inf if left <= 0 or self.clock.ros_time_is_active else left / 1e9
 
-    def take(self) -> Callable[[], Any] | None:
+    def take(self) -> Callback | None:
         """Return the callback if it is due."""
         left = self.nanoseconds_left()
         if left > 0:

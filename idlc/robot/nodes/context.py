@@ -6,10 +6,9 @@ import atexit
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from enum import Enum
-from functools import partial
 from typing import Any
 from weakref import WeakSet
 
@@ -30,20 +29,20 @@ class Context(AbstractContextManager["Context"]):
 
     def __init__(self, session: Session | None = None) -> None:
         self.arguments = Arguments()
-        #: Opens the session.
-        self.connect: Callable[[], Session] = open_session
+        self._address = ""
         self._session = session
         self._is_own = session is None
         self._is_valid = session is not None
         self._lock = threading.Lock()
-        self._sleepers: WeakSet[Any] = WeakSet()
+        #: Objects with a method `wake` to call at shutdown, also in a signal handler.
+        self.sleepers: WeakSet[Any] = WeakSet()
 
-    def init(self, args: Sequence[str] | None = None) -> None:
+    def init(self, args: Sequence[str] | None = None, address: str = "") -> None:
         """Begin; see the function `init`."""
         if self._is_valid:
             raise RobotError("the context is initialized already", "call `shutdown()` first")
         self.arguments = parse_arguments(sys.argv if args is None else args)
-        self._is_valid = True
+        self._address, self._is_valid = address, True
 
     @property
     def session(self) -> Session:
@@ -52,7 +51,7 @@ class Context(AbstractContextManager["Context"]):
             if not self._is_valid:
                 raise RobotError("the context is not initialized", "call `idlc.robot.init()` first")
             if self._session is None:
-                self._session = self.connect()
+                self._session = open_session(self._address)
                 # tokens go at once, and no thread of the transport calls a program that ends
                 atexit.register(self.shutdown)
             return self._session
@@ -61,14 +60,10 @@ class Context(AbstractContextManager["Context"]):
         """Return whether the context is initialized and not shut down."""
         return self._is_valid
 
-    def wake_at_shutdown(self, sleeper: Any) -> None:
-        """Call the method `wake` of an object at shutdown, also in a signal handler."""
-        self._sleepers.add(sleeper)
-
     def invalidate(self) -> None:
         """End all waits; nodes stay in the graph until `shutdown`. For signal handlers."""
         self._is_valid = False
-        for sleeper in [*self._sleepers]:
+        for sleeper in [*self.sleepers]:
             sleeper.wake()
 
     def shutdown(self) -> None:
@@ -102,7 +97,7 @@ def init(
     args: Sequence[str] | None = None,
     context: Context | None = None,
     signal_handler_options: SignalHandlerOptions | None = None,
-    address: str | None = None,
+    address: str = "",
 ) -> Context:
     """Begin; the result can be used in a `with` statement, which shuts it down.
 
@@ -111,9 +106,7 @@ def init(
     and SIGTERM shut the default context down. Raises RobotError.
     """
     chosen = context or _default
-    addresses = () if address is None else (address,)
-    chosen.init(args)
-    chosen.connect = partial(open_session, *addresses)
+    chosen.init(args, address)
     is_wanted = chosen is _default and signal_handler_options is not SignalHandlerOptions.NO
     if is_wanted and threading.current_thread() is threading.main_thread():
         for number in {signal.SIGINT, signal.SIGTERM} - _previous.keys():

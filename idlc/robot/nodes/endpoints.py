@@ -53,10 +53,6 @@ class Endpoint(Ready):
         """Show the endpoint to others; subclasses first declare what it needs."""
         self._closeables.append(self.node.transport.announce(self.entity.token))
 
-    def take(self) -> Callable[[], Any] | None:
-        """Return the next callback, `None` if there is none."""
-        return None
-
     def destroy(self) -> None:
         """Withdraw the endpoint; may be called twice."""
         while self._closeables:
@@ -74,7 +70,8 @@ class Endpoint(Ready):
                 return callback(DeadlineInfo(next(numbers), 1))
 
             clock = Clock(clock_type=ClockType.STEADY_TIME)
-            self.deadline = Timer(miss, self.callback_group, period, clock, autostart=False)
+            self.deadline = Timer(miss, self.callback_group, period, clock)
+            self.deadline.cancel()
             self.node.add(self.deadline)
 
     def count_others(self, kind: Kind) -> int:

@@ -5,7 +5,6 @@ Threads of the transport only append to bounded queues and wake it.
 
 from __future__ import annotations
 
-import inspect
 import time
 from collections.abc import Callable, Generator
 from concurrent import futures
@@ -13,7 +12,8 @@ from contextlib import AbstractContextManager, suppress
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import RLock
-from typing import Any, Protocol, TypeAlias, TypeVar
+from types import CoroutineType
+from typing import Any, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
 
@@ -22,6 +22,7 @@ T = TypeVar("T")
 _TICK = 0.5
 #: Seconds; `None` and negative numbers are no limit.
 Limit: TypeAlias = float | None
+Callback: TypeAlias = Callable[[], Any]
 
 
 class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
@@ -72,7 +73,7 @@ class Future(futures.Future[T]):
 
         super().add_done_callback(call)
 
-    def wake_at_end(self, waiter: Callable[[], Any]) -> None:
+    def wake_at_end(self, waiter: Callback) -> None:
         """Call `waiter` on the thread that ends the future, or now."""
         super().add_done_callback(lambda _: waiter())
 
@@ -80,12 +81,15 @@ class Future(futures.Future[T]):
 class CallbackGroup:
     """Decides which callbacks may run while a coroutine of the group waits."""
 
-    #: The last callback; others of an exclusive group wait for its end.
-    running: Future[Any] | None = None
+    #: Functions to call at the end of the callback that runs; `None` if others need not wait.
+    waiting: list[Callback] | None = None
 
-    def reset(self) -> None:
-        """Forget a coroutine of another executor."""
-        self.running = None
+    def end(self, waiting: list[Callback]) -> None:
+        """End a callback; in a new executor, another one may run already."""
+        if self.waiting is waiting:
+            self.waiting = None
+        for resume in waiting:
+            resume()
 
 
 class MutuallyExclusiveCallbackGroup(CallbackGroup):
@@ -100,7 +104,7 @@ class Ready:
     """Something that has callbacks to run, such as a subscription with its queue."""
 
     def __init__(self, group: CallbackGroup | None) -> None:
-        self.callback_group = group
+        self.callback_group = group or ReentrantCallbackGroup()
         self._executor: Executor | None = None
         self._is_queued = False
 
@@ -116,46 +120,37 @@ class Ready:
         self._executor, self._is_queued = executor, False
         self.wake()
 
-    def take(self) -> Callable[[], Any] | None:
+    def take(self) -> Callback | None:
         """Return the next callback, `None` if there is none."""
-        raise NotImplementedError
+        return None
 
     def run(self, executor: Executor) -> bool:
         """Run the next callback; return whether there was one that may run now."""
         group = self.callback_group
         if self._executor is not executor:
             return False
-        if group and group.running and not group.running.done():
-            group.running.wake_at_end(partial(executor.schedule, self.run, executor))
+        if group.waiting is not None:
+            group.waiting.append(partial(executor.schedule, self.run, executor))
             return False
         self._is_queued = False
         callback = self.take()
         if callback is None:
             return False
-        future: Future[Any] = Future(executor=executor)
+        waiting: list[Callback] = []
         if isinstance(group, MutuallyExclusiveCallbackGroup):
-            group.running = future
-        return executor.step(future, callback)
-
-
-class Owner(Protocol):
-    """The part of a Node that executors use; the class Node itself imports this module."""
-
-    timers: Any
-
-    @property
-    def executor(self) -> Executor | None:
-        """The executor that runs the callbacks."""
-        ...
-
-    @property
-    def context(self) -> Context:
-        """The context of the node."""
-        ...
-
-    def attach(self, executor: Executor | None) -> None:
-        """Run callbacks in this executor."""
-        ...
+            group.waiting = waiting
+        future: Future[Any] | None = None
+        try:
+            result = callback()
+            if isinstance(result, CoroutineType):
+                future = Future(executor=executor)
+                future.wake_at_end(partial(group.end, waiting))
+                executor.step(future, result)
+        finally:
+            # the end of a coroutine comes later
+            if future is None:
+                group.end(waiting)
+        return True
 
 
 class Executor(AbstractContextManager["Executor"]):
@@ -166,16 +161,16 @@ class Executor(AbstractContextManager["Executor"]):
 
     def __init__(self, *, context: Context | None = None) -> None:
         self.context = context or get_default_context()
-        self._nodes: list[Owner] = []
+        self._nodes: list[Any] = []
         # its `put` may be called in signal handlers
         self._queue: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._is_shutdown = False
         # threads that spin at the same time take turns; callbacks may spin
         self._turn = RLock()
-        self.context.wake_at_shutdown(self)
+        self.context.sleepers.add(self)
 
-    def add_node(self, node: Owner) -> bool:
-        """Run the callbacks of a node; return whether it is new here."""
+    def add_node(self, node: Any) -> bool:
+        """Run the callbacks of a Node, which imports this module; return whether it is new."""
         if node in self._nodes:
             return False
         if node.executor is not None:
@@ -184,7 +179,7 @@ class Executor(AbstractContextManager["Executor"]):
         node.attach(self)
         return True
 
-    def remove_node(self, node: Owner) -> None:
+    def remove_node(self, node: Any) -> None:
         """Stop running the callbacks of a node."""
         if node in self._nodes:
             self._nodes.remove(node)
@@ -192,7 +187,9 @@ class Executor(AbstractContextManager["Executor"]):
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run a function or coroutine in the executor; return its future."""
-        work = callback if inspect.iscoroutine(callback) else partial(callback, *args, **kwargs)
+        work = (
+            callback if isinstance(callback, CoroutineType) else partial(callback, *args, **kwargs)
+        )
         future: Future[Any] = Future(executor=self)
         self.schedule(self.step, future, work)
         return future
@@ -202,9 +199,9 @@ class Executor(AbstractContextManager["Executor"]):
         if future.done():
             return True
         try:
-            if not inspect.iscoroutine(work):
+            if not isinstance(work, CoroutineType):
                 work = work()
-                if not inspect.iscoroutine(work):
+                if not isinstance(work, CoroutineType):
                     future.set_result(work)
                     return True
             awaited = work.send(None)
@@ -284,13 +281,13 @@ def _end(timeout: Limit) -> float:
     return float("inf") if timeout is None or timeout < 0 else time.monotonic() + timeout
 
 
-def _executor_of(node: Owner, executor: Executor | None) -> Executor:
+def _executor_of(node: Any, executor: Executor | None) -> Executor:
     chosen = executor or node.executor or Executor(context=node.context)
     chosen.add_node(node)
     return chosen
 
 
-def spin(node: Owner, executor: Executor | None = None) -> None:
+def spin(node: Any, executor: Executor | None = None) -> None:
     """Run the callbacks of a node until the context is shut down.
 
     Raises what callbacks raise, and ExternalShutdownException after SIGTERM.
@@ -298,13 +295,13 @@ def spin(node: Owner, executor: Executor | None = None) -> None:
     _executor_of(node, executor).spin()
 
 
-def spin_once(node: Owner, *, executor: Executor | None = None, timeout_sec: Limit = None) -> None:
+def spin_once(node: Any, *, executor: Executor | None = None, timeout_sec: Limit = None) -> None:
     """Run one callback of a node, or wait for one for at most `timeout_sec` seconds."""
     _executor_of(node, executor).spin_once(timeout_sec)
 
 
 def spin_until_future_complete(
-    node: Owner, future: Future[Any], executor: Executor | None = None, timeout_sec: Limit = None
+    node: Any, future: Future[Any], executor: Executor | None = None, timeout_sec: Limit = None
 ) -> None:
     """Run callbacks until the future is done or cancelled, or the time is over."""
     _executor_of(node, executor).spin_until_future_complete(future, timeout_sec)

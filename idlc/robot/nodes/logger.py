@@ -6,7 +6,8 @@ import sys
 import time
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any, NamedTuple
+from functools import partialmethod
+from typing import Any
 
 
 class LoggingSeverity(IntEnum):
@@ -21,29 +22,20 @@ class LoggingSeverity(IntEnum):
 
 
 #: The colours of levels, as numbers of ANSI.
-_COLOURS = {"DEBUG": 32, "WARN": 33, "ERROR": 31, "FATAL": 31}
+_COLOURS = {10: 32, 30: 33, 40: 31, 50: 31}
 #: Levels by the name of a logger; the empty name is that of all others.
 _levels: dict[str, LoggingSeverity] = {}
 #: The times, in seconds, of the last messages of logging statements with options.
 _logged: dict[tuple[Any, int], float] = {}
 
 
-class Record(NamedTuple):
-    """A logged message; `time` is the system's, in nanoseconds."""
-
-    time: int
-    level: LoggingSeverity
-    name: str
-    message: str
-    file: str
-    function: str
-    line: int
-
-
 class Logger:
-    """A logger; `name` has dots between its parts, and children have the levels of parents."""
+    """A logger; `name` has dots between its parts, and children have the levels of parents.
 
-    def __init__(self, name: str, publish: Callable[[Record], None] | None = None) -> None:
+    `publish` gets the time in nanoseconds, and the other fields of rcl_interfaces/msg/Log.
+    """
+
+    def __init__(self, name: str, publish: Callable[..., None] | None = None) -> None:
         self.name = name
         self._publish = publish
 
@@ -79,8 +71,6 @@ class Logger:
         if not self.is_enabled_for(severity):
             return False
         frame = sys._getframe(1)  # noqa: SLF001 - as rclpy and logging do
-        while frame.f_code.co_filename == __file__ and frame.f_back is not None:
-            frame = frame.f_back
         code, line = frame.f_code, frame.f_lineno
         if once or skip_first or throttle_duration_sec:
             is_first, now = (code, line) not in _logged, time.monotonic()
@@ -88,34 +78,23 @@ class Logger:
             if (skip_first if is_first else once) or now - last < throttle_duration_sec:
                 return False
             _logged[code, line] = now
-        rest = _text(message), _text(code.co_filename), code.co_name, line
-        record = Record(time.time_ns(), LoggingSeverity(severity), self.name, *rest)
-        _write(record)
+        level, nanoseconds, message = LoggingSeverity(severity), time.time_ns(), _text(message)
+        seconds, rest = divmod(nanoseconds, 10**9)
+        text = f"[{level.name}] [{seconds}.{rest:09}] [{self.name}]: {message}"
+        if sys.stderr and sys.stderr.isatty() and (colour := _COLOURS.get(level)):
+            text = f"\033[{colour}m{text}\033[0m"
+        print(text, file=sys.stderr, flush=True)
         if self._publish is not None:
-            self._publish(record)
+            file = _text(code.co_filename)
+            self._publish(nanoseconds, level, self.name, message, file, code.co_name, line)
         return True
 
-    def debug(self, message: str, **options: Any) -> bool:
-        """Log for developers; options as `log`."""
-        return self.log(message, LoggingSeverity.DEBUG, **options)
-
-    def info(self, message: str, **options: Any) -> bool:
-        """Log for information; options as `log`."""
-        return self.log(message, LoggingSeverity.INFO, **options)
-
-    def warning(self, message: str, **options: Any) -> bool:
-        """Log a warning; options as `log`."""
-        return self.log(message, LoggingSeverity.WARN, **options)
-
-    warn = warning
-
-    def error(self, message: str, **options: Any) -> bool:
-        """Log an error; options as `log`."""
-        return self.log(message, LoggingSeverity.ERROR, **options)
-
-    def fatal(self, message: str, **options: Any) -> bool:
-        """Log an error that ends the node; options as `log`."""
-        return self.log(message, LoggingSeverity.FATAL, **options)
+    # bound as `partial` of C, so that the caller's frame is next to that of `log`
+    debug = partialmethod(log, severity=LoggingSeverity.DEBUG)
+    info = partialmethod(log, severity=LoggingSeverity.INFO)
+    warn = warning = partialmethod(log, severity=LoggingSeverity.WARN)
+    error = partialmethod(log, severity=LoggingSeverity.ERROR)
+    fatal = partialmethod(log, severity=LoggingSeverity.FATAL)
 
 
 def _text(value: object) -> str:
@@ -125,11 +104,3 @@ def _text(value: object) -> str:
 
 #: Without a node, a logger writes to stderr only.
 get_logger = Logger
-
-
-def _write(record: Record) -> None:
-    seconds, rest = divmod(record.time, 10**9)
-    text = f"[{record.level.name}] [{seconds}.{rest:09}] [{record.name}]: {record.message}"
-    if sys.stderr and sys.stderr.isatty() and (colour := _COLOURS.get(record.level.name)):
-        text = f"\033[{colour}m{text}\033[0m"
-    print(text, file=sys.stderr, flush=True)

@@ -20,7 +20,7 @@ from idlc.robot.nodes.descriptions import SERVICE, describe
 from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Subscription
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
-from idlc.robot.nodes.logger import Logger, Record
+from idlc.robot.nodes.logger import Logger
 from idlc.robot.nodes.services import Client, Service
 from idlc.robot.parameters.declared import HasParameters, add_services
 from idlc.robot.parameters.overrides import overrides_of
@@ -61,7 +61,7 @@ class Node(HasParameters):
         self.session = self.context.session
         self.transport = self.session.transport
         #: Replacements of names, and overrides of parameters.
-        self.arguments = parse_arguments(["--ros-args", *(cli_args or ())]) + self.context.arguments
+        self.arguments = parse_arguments(["--ros-args", *(cli_args or ())], self.context.arguments)
         name = self.arguments.special(node_name, "__node") or node_name
         if not is_node_name(name):
             raise InvalidNameError(f"`{name}` is not the name of a node; use letters, digits, `_`")
@@ -116,8 +116,8 @@ class Node(HasParameters):
         """Run callbacks in this executor; called by it."""
         self._executor = executor
         for part in (*self.timers, *self.endpoints):
-            if part.callback_group is not None:
-                part.callback_group.reset()
+            # a coroutine of another executor does not go on
+            part.callback_group.waiting = None
             part.attach(executor)
 
     def add(self, part: Timer | Endpoint) -> None:
@@ -183,10 +183,10 @@ class Node(HasParameters):
         with suppress(ValueError):  # before 1970
             self._clock.simulate(Time.from_msg(message.clock).nanoseconds)
 
-    def _log(self, record: Record) -> None:
+    def _log(self, nanoseconds: int, *fields: Any) -> None:
         with suppress(RobotError):
-            stamp = Time(nanoseconds=record.time).to_msg()
-            self._rosout.publish(self._rosout.interface.kind(stamp, *record[1:]))
+            stamp = Time(nanoseconds=nanoseconds).to_msg()
+            self._rosout.publish(self._rosout.interface.kind(stamp, *fields))
 
     # names
 

@@ -17,7 +17,7 @@ class Stream(Subscription[M]):
         """Declare the subscriber; the running event loop gets the messages."""
         self._loop = asyncio.get_running_loop()
         self._arrived = asyncio.Event()
-        self.node.context.wake_at_shutdown(self)
+        self.node.context.sleepers.add(self)
         super().open()
 
     def wake(self) -> None:
