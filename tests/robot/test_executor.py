@@ -270,12 +270,8 @@ def test_times_and_durations_are_numbers():
     assert Duration.from_msg(Duration(nanoseconds=-1).to_msg()) == Duration(nanoseconds=-1)
     assert repr(time) == "Time(nanoseconds=1000000005, clock_type=SYSTEM_TIME)"
     assert repr(Duration(nanoseconds=1)) == "Duration(nanoseconds=1)"
-    other = Time(clock_type=ClockType.ROS_TIME)
-    assert other != Time()
-    with pytest.raises(TypeError, match="not supported between instances of 'ClockType'"):
-        time < other  # noqa: B015
     with pytest.raises(TypeError, match="are of different clocks"):
-        time - other
+        time < Time(clock_type=ClockType.ROS_TIME)  # noqa: B015
     with pytest.raises(ValueError, match="a time must be between"):
         Time(nanoseconds=-1)
     assert Clock(clock_type=ClockType.STEADY_TIME).now().nanoseconds > 0
@@ -307,18 +303,18 @@ def lines(monkeypatch, capsys):
 
 def test_arguments_of_ros_are_read(lines):
     words = ["prog", "a", "--ros-args", "-r", "x:=y", "--remap", "n:__node:=m", "-p", "k:=1", "--"]
-    words += ["b", "--ros-args", "-r", "rostopic://c:=rostopic:///d", "-r", "__ns:=/e"]
+    words += ["b", "--ros-args", "-r", "c:=/d", "-r", "__ns:=/e"]
     words += ["--param", "n:k.l:=[1, 2]", "--params-file", "f.yaml", "--log-level", "debug"]
     words += ["--log-level", "a.b:=WARN", "-r", "__name:=z"]
     assert remove_ros_args(words) == ["prog", "a", "b"]
     arguments = parse_arguments(words)
     assert arguments == Arguments(
         (
-            ("", "", "x", "y"),
-            ("n", "", "__node", "m"),
-            ("", "rostopic://", "c", "/d"),
-            ("", "", "__ns", "/e"),
-            ("", "", "__node", "z"),
+            ("", "x", "y"),
+            ("n", "__node", "m"),
+            ("", "c", "/d"),
+            ("", "__ns", "/e"),
+            ("", "__node", "z"),
         ),
         (("", "k", "1"), ("n", "k.l", "[1, 2]")),
         ("f.yaml",),
@@ -327,11 +323,10 @@ def test_arguments_of_ros_are_read(lines):
     assert not get_logger("a.b.c").is_enabled_for(LoggingSeverity.INFO)
     assert arguments.special("n", "__node") == "m"
     assert arguments.special("other", "__node") == "z"
-    assert arguments.rename("x", "/s", "n", "rostopic") == "/s/y"
-    assert arguments.rename("c", "/", "n", "rostopic") == "/d"
-    assert arguments.rename("c", "/", "n", "rosservice") == "/c"
+    assert arguments.rename("x", "/s", "n") == "/s/y"
+    assert arguments.rename("c", "/", "n") == "/d"
     own = parse_arguments(["--ros-args", "-r", "x:=first", "-p", "k:=2"], arguments)
-    assert own.rename("x", "/", "n", "rostopic") == "/first"
+    assert own.rename("x", "/", "n") == "/first"
     assert own.overrides[-1] == ("", "k", "2")
 
 
@@ -343,6 +338,7 @@ def test_arguments_of_ros_are_read(lines):
         (["-r", "a"], "`a` is not of the form `old:=new` (write `-r old:=new` or "),
         (["-r", "__node:=a b"], "`a b` is not a name"),
         (["-r", "__ns:=//"], "`//` is not a namespace"),
+        (["-r", "rostopic://a:=b"], "`//a` is not a name; it contains `//` ("),
         (["-p", "a"], "`a` is not of the form `parameter:=value` ("),
         (["--log-level", "x"], "`x` is not a level of loggers, such as `debug` or `warn` ("),
         (["--enclave", "/"], "`--enclave` is not an argument of ROS that idlc knows"),

@@ -363,7 +363,7 @@ def test_names_are_as_rclpy_forms_them(router):
         "-r",
         "chatter:=talk",
         "-r",
-        "rosservice://s:=t",
+        "s:=t",
     ]
     with node_at(router, "a", namespace="n", cli_args=arguments) as node:
         assert node.get_fully_qualified_name() == "/x/b"
@@ -372,7 +372,8 @@ def test_names_are_as_rclpy_forms_them(router):
         assert node.create_publisher(String, "chatter", 1).topic_name == "/x/talk"
         assert node.create_publisher(String, "~/s", 1).topic_name == "/x/b/s"
         assert node.create_client(SetBool, "s").srv_name == "/x/t"
-        assert node.resolve_topic_name("s") == "/x/s"
+        assert node.resolve_topic_name("~/s") == "/x/b/s"
+        assert node.resolve_service_name("s") == "/x/t"
     with node_at(router, "a", namespace="n") as node:
         assert node.get_fully_qualified_name() == "/n/a"
     session = open_session(router, environ={}, timeout=LONG)

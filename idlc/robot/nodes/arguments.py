@@ -12,8 +12,7 @@ from idlc.robot.errors import RobotError
 from idlc.robot.names import expand_name, expand_namespace
 from idlc.robot.nodes.logger import LoggingSeverity, get_logger
 
-_SCHEME = r"(?:rostopic|rosservice)://"
-_RULE = re.compile(rf"(?:(\w+):(?!//))?({_SCHEME})?([^:=]+):=(?:{_SCHEME})?(.+)", re.ASCII)
+_RULE = re.compile(r"(?:(\w+):)?([^:=]+):=(.+)", re.ASCII)
 _PARAMETER = re.compile(r"(?:([\w/*]+):)?([^:=]+):=(.*)", re.ASCII | re.DOTALL)
 _HINT = "write `-r old:=new` or `-p parameter:=value`; `--` ends the arguments of ROS"
 
@@ -21,27 +20,26 @@ _HINT = "write `-r old:=new` or `-p parameter:=value`; `--` ends the arguments o
 class Arguments(NamedTuple):
     """The arguments after `--ros-args`."""
 
-    #: A node or nothing for all of them, `rostopic://`, `rosservice://` or nothing for both, a name
-    #: or `__node` or `__ns` for the node itself, and the name that replaces it.
-    remaps: tuple[tuple[str, str, str, str], ...] = ()
+    #: A node or nothing for all of them, a name or `__node` or `__ns` for the node itself, and the
+    #: name that replaces it.
+    remaps: tuple[tuple[str, str, str], ...] = ()
     #: A node or nothing for all of them, a parameter, and its value as YAML text.
-    overrides: tuple[tuple[str, str, str], ...] = ()
+    overrides: tuple[tuple[str, ...], ...] = ()
     parameter_files: tuple[str, ...] = ()
 
     def special(self, node: str, source: str) -> str | None:
         """Return the replacement of `__node` or `__ns` for a node that the program calls `node`."""
-        rules = (rule for rule in self.remaps if rule[0] in ("", node) and rule[2] == source)
+        rules = (rule for rule in self.remaps if rule[0] in ("", node) and rule[1] == source)
         return next((target for *_, target in rules), None)
 
-    def rename(self, name: str, namespace: str, node: str, scheme: str) -> str:
+    def rename(self, name: str, namespace: str, node: str) -> str:
         """Return the absolute name of a topic or service that a node calls `name`.
 
         Raises InvalidNameError.
         """
         absolute = expand_name(name, namespace, node)
-        for only, kind, source, target in self.remaps:
-            applies = only in ("", node) and kind in ("", f"{scheme}://")
-            if applies and absolute == expand_name(source, namespace, node):
+        for only, source, target in self.remaps:
+            if only in ("", node) and absolute == expand_name(source, namespace, node):
                 return expand_name(target, namespace, node)
         return absolute
 
@@ -70,8 +68,9 @@ def parse_arguments(args: Sequence[str], others: Arguments = _NONE) -> Arguments
             _set_level(text)
         # the first rule for a name counts, but the last value of a parameter
         remaps = *map(_remap, known.remap), *others.remaps
-        overrides = *others.overrides, *map(_override, known.param)
-        return Arguments(remaps, overrides, (*others.parameter_files, *known.params_file))
+        overrides = (_match(_PARAMETER, text, "parameter:=value") for text in known.param)
+        files = *others.parameter_files, *known.params_file
+        return Arguments(remaps, (*others.overrides, *overrides), files)
     except (ArgumentError, ValueError) as error:
         raise RobotError(one_line(str(error)), _HINT) from None
 
@@ -88,25 +87,22 @@ def _split(args: Sequence[str]) -> tuple[list[str], list[str]]:
     return parts
 
 
-def _remap(text: str) -> tuple[str, str, str, str]:
-    match = _RULE.fullmatch(text)
-    if match is None:
-        raise ValueError(f"`{text}` is not of the form `old:=new`")
-    node, scheme, source, target = match.groups(default="")
+def _remap(text: str) -> tuple[str, str, str]:
+    node, source, target = _match(_RULE, text, "old:=new")
     source = "__node" if source == "__name" else source
     expand_name(source, "/", "node")
     if source == "__ns":
         expand_namespace(target)
     else:
         expand_name(target, "/", "node")
-    return node, scheme, source, target
+    return node, source, target
 
 
-def _override(text: str) -> tuple[str, str, str]:
-    match = _PARAMETER.fullmatch(text)
+def _match(pattern: re.Pattern[str], text: str, form: str) -> tuple[str, ...]:
+    match = pattern.fullmatch(text)
     if match is None:
-        raise ValueError(f"`{text}` is not of the form `parameter:=value`")
-    return match[1] or "", match[2], match[3]
+        raise ValueError(f"`{text}` is not of the form `{form}`")
+    return match.groups(default="")
 
 
 def _set_level(text: str) -> None:

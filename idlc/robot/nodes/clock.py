@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
-from enum import Enum
+from enum import IntEnum
+from functools import total_ordering
 from typing import Any
 
 from idlc.robot.nodes.executor import Callback, CallbackGroup, Ready
@@ -14,7 +14,7 @@ from idlc.robot.nodes.interfaces import standard
 _SECOND = 10**9
 
 
-class ClockType(Enum):
+class ClockType(IntEnum):
     """The kinds of clocks."""
 
     ROS_TIME = 1
@@ -25,16 +25,29 @@ class ClockType(Enum):
 _SYSTEM = ClockType.SYSTEM_TIME
 
 
-@dataclass(order=True, unsafe_hash=True, init=False)
+@total_ordering
 class _Nanoseconds:
     """The base class of times and durations."""
 
-    # compared first: the order of times of different clocks is a TypeError
-    clock_type: Any = field(default=None, repr=False)
-    nanoseconds: int = 0
+    clock_type: Any = None
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self.nanoseconds = int(seconds * _SECOND) + int(nanoseconds)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and self.nanoseconds == self._number(other)
+
+    def __lt__(self, other: _Nanoseconds) -> bool:
+        return self.nanoseconds < self._number(other)
+
+    def __hash__(self) -> int:
+        return hash(self.nanoseconds)
+
+    def _number(self, other: _Nanoseconds) -> int:
+        """Return the nanoseconds of the other; raise TypeError if it cannot be compared."""
+        if self.clock_type is not other.clock_type:
+            raise TypeError(f"{self!r} and {other!r} are of different clocks")
+        return other.nanoseconds
 
     def to_msg(self) -> Any:
         """Return it as a message of builtin_interfaces."""
@@ -45,6 +58,9 @@ class _Nanoseconds:
 
 class Duration(_Nanoseconds):
     """A number of nanoseconds, which can be negative."""
+
+    def __repr__(self) -> str:
+        return f"Duration(nanoseconds={self.nanoseconds})"
 
     @classmethod
     def from_msg(cls, msg: Any) -> Duration:
@@ -76,9 +92,7 @@ class Time(_Nanoseconds):
     def __sub__(self, other: Any) -> Any:
         """Return the duration since another time, or the time before a duration."""
         if isinstance(other, Time):
-            if self.clock_type is not other.clock_type:
-                raise TypeError(f"{self!r} and {other!r} are of different clocks")
-            return Duration(nanoseconds=self.nanoseconds - other.nanoseconds)
+            return Duration(nanoseconds=self.nanoseconds - self._number(other))
         return Time(nanoseconds=self.nanoseconds - other.nanoseconds, clock_type=self.clock_type)
 
     @classmethod

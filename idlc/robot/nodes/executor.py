@@ -10,9 +10,9 @@ from collections.abc import Callable, Generator
 from concurrent import futures
 from contextlib import AbstractContextManager, suppress
 from functools import partial
+from inspect import iscoroutine
 from queue import Empty, SimpleQueue
 from threading import RLock
-from types import CoroutineType
 from typing import Any, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
@@ -142,7 +142,7 @@ class Ready:
         future: Future[Any] | None = None
         try:
             result = callback()
-            if isinstance(result, CoroutineType):
+            if iscoroutine(result):
                 future = Future(executor=executor)
                 future.wake_at_end(partial(group.end, waiting))
                 executor.step(future, result)
@@ -187,9 +187,7 @@ class Executor(AbstractContextManager["Executor"]):
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run a function or coroutine in the executor; return its future."""
-        work = (
-            callback if isinstance(callback, CoroutineType) else partial(callback, *args, **kwargs)
-        )
+        work = callback if iscoroutine(callback) else partial(callback, *args, **kwargs)
         future: Future[Any] = Future(executor=self)
         self.schedule(self.step, future, work)
         return future
@@ -199,9 +197,9 @@ class Executor(AbstractContextManager["Executor"]):
         if future.done():
             return True
         try:
-            if not isinstance(work, CoroutineType):
+            if not iscoroutine(work):
                 work = work()
-                if not isinstance(work, CoroutineType):
+                if not iscoroutine(work):
                     future.set_result(work)
                     return True
             awaited = work.send(None)

@@ -191,27 +191,20 @@ class Node(HasParameters):
     # names
 
     def resolve_topic_name(self, topic: str) -> str:
-        """Return the absolute name of a topic, replaced by `--ros-args`."""
-        return self._resolve(topic, "rostopic")
+        """Return the absolute name of a topic or service, replaced by `--ros-args`."""
+        return self.arguments.rename(topic, self.entity.namespace, self.entity.node)
 
-    def resolve_service_name(self, service: str) -> str:
-        """Return the absolute name of a service, replaced by `--ros-args`."""
-        return self._resolve(service, "rosservice")
-
-    def _resolve(self, name: str, scheme: str) -> str:
-        return self.arguments.rename(name, self.entity.namespace, self.entity.node, scheme)
+    resolve_service_name = resolve_topic_name
 
     # endpoints
 
     def entity_of(self, kind: Kind, name: str, interface: Interface, qos: QoSProfile) -> Entity:
         """Return the entity of a new endpoint; raise InvalidNameError."""
-        is_topic = kind in (Kind.PUBLISHER, Kind.SUBSCRIPTION)
-        absolute = self._resolve(name, "rostopic" if is_topic else "rosservice")
         return msgspec.structs.replace(
             self.entity,
             id=self.session.next_id(),
             kind=kind,
-            name=absolute,
+            name=self.resolve_topic_name(name),
             type=interface.name,
             hash=interface.hash,
             qos=qos,
