@@ -100,8 +100,6 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
         if session is None:
             return
         entities = robot_entities(session)
-        if session.graph.is_full:
-            report.notes.append("the robot announces too many endpoints; some are missing")
     found = overview.connections(entities, LocalTypes(scope, report))
     nodes = sorted({end.node_name for end in entities if end.kind is Kind.NODE})
     misfits, similar = overview.misfits(entities), overview.similar_names(found)

@@ -17,10 +17,13 @@ from idlc.robot.transport import Transport
 MOST_BYTES = 128 * 2**20
 ENTITY_BYTES = 500
 CHARACTER_BYTES = 4
+#: Seconds for the answers to a question; after ten, a router ends them as if they were all.
+_TIMEOUT = 9.0
 #: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
-_TIMEOUT = 5.0
 _SETTLED = 1.0
-_TIMES = 10
+_TIMES = 15
+#: Stands for the tokens that are missing in an answer, and never arrives.
+_UNKNOWN = ""
 T = TypeVar("T")
 
 
@@ -29,7 +32,8 @@ class Graph:
 
     An endpoint can appear before its node and outlive it. Methods can be called on any thread.
     `ignored` counts the malformed tokens and those beyond the limit. `is_full` is True if there
-    were too many, so that entities are missing.
+    were too many, so that entities are missing, and `is_incomplete` if some did
+    not arrive in time.
     """
 
     def __init__(self, transport: Transport, domain: int, limit: int = MOST_BYTES) -> None:
@@ -41,14 +45,35 @@ class Graph:
         self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
         self._changed = Condition()
         pattern = all_tokens(domain)
-        # Zenoh answers the question only before the watch; what goes in between never arrives
-        valid = filter(parse_token, transport.tokens(pattern, _TIMEOUT))
-        expected = {*islice(valid, limit // ENTITY_BYTES)}
+        # Zenoh may answer with nothing after the watch; what goes in between never arrives
+        self._expected, known = self._ask(transport, pattern), 0
+        while _UNKNOWN in self._expected and len(self._expected) > known:
+            known = len(self._expected)
+            self._expected = self._ask(transport, pattern)
         self._watch = transport.watch(pattern, self._update)
         for _ in range(_TIMES):
-            if self.wait_for(lambda _: self.is_full or expected <= self._entities.keys(), _SETTLED):
+            known = len(self._entities)
+            if self.wait_for(Graph._has_expected, _SETTLED):
                 break
-            expected.intersection_update(transport.tokens(pattern, _TIMEOUT))
+            answer = self._ask(transport, pattern)
+            self._expected = answer or self._expected
+            if _UNKNOWN in answer and len(self._entities) == known:
+                break
+        self.is_incomplete = not self._has_expected()
+        self._expected.clear()
+
+    def _ask(self, transport: Transport, pattern: str) -> set[str]:
+        """Return the valid tokens that exist, so many as have room."""
+        tokens: set[str] = set()
+        valid = filter(parse_token, transport.tokens(pattern, _TIMEOUT))
+        try:
+            tokens.update(islice(valid, self._limit // ENTITY_BYTES))
+        except TimeoutError:
+            tokens.add(_UNKNOWN)
+        return tokens
+
+    def _has_expected(self) -> bool:
+        return self.is_full or self._expected <= self._entities.keys()
 
     def close(self) -> None:
         """Stop watching; the entities stay as they are."""

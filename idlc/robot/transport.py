@@ -78,7 +78,10 @@ class Transport(Protocol):
         """Call `callback` with each token that matches, now and later: True appears, False goes."""
 
     def tokens(self, pattern: str, timeout: float) -> Iterable[str]:
-        """Yield the tokens that match now; waits for answers for at most `timeout` seconds."""
+        """Yield the tokens that match now.
+
+        Raises TimeoutError after `timeout` seconds if answers may be missing.
+        """
 
     def close(self) -> None:
         """Close the connection; all declarations end with it."""

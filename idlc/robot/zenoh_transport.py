@@ -107,8 +107,9 @@ class ZenohTransport:
     def tokens(self, pattern: str, timeout: float) -> Iterator[str]:
         """Query the liveliness tokens that exist."""
         for reply in self._liveliness.get(pattern, timeout=timeout):
-            if reply.ok is not None:
-                yield str(reply.ok.key_expr)
+            if reply.ok is None:
+                raise TimeoutError
+            yield str(reply.ok.key_expr)
 
     def close(self) -> None:
         """Close the Zenoh session."""

@@ -4,6 +4,7 @@ import threading
 
 import pytest
 
+from idlc.robot import graph as graph_module
 from idlc.robot.graph import Graph, Mismatch, mismatches
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.qos import QoSProfile, qos_profile_sensor_data
@@ -28,7 +29,7 @@ class Tokens:
         return self
 
     def tokens(self, pattern, timeout):
-        assert (pattern, timeout) == ("@ros2_lv/0/**", 5.0)
+        assert (pattern, timeout) == ("@ros2_lv/0/**", 9.0)
         tokens, self.initial = self.initial, [t for t in self.initial if t not in self.gone]
         return tokens
 
@@ -94,6 +95,52 @@ def test_a_token_that_went_while_the_others_were_fetched_stays_away():
     tokens = Tokens(stays.token, goes.token)
     tokens.gone.add(goes.token)
     assert Graph(tokens, 0).entities() == (stays,)
+
+
+class SlowTokens(Tokens):
+    """Tokens of a transport that answers the first questions with this many of them."""
+
+    def __init__(self, *initial, parts, late):
+        super().__init__(*initial)
+        self.parts = [*parts]
+        self.late = late
+
+    def watch(self, pattern, callback):
+        assert pattern == "@ros2_lv/0/**"
+        self.update = callback
+        return self
+
+    def tokens(self, pattern, timeout):
+        assert (pattern, timeout) == ("@ros2_lv/0/**", 9.0)
+        if self.update and self.late:
+            for token in self.initial:
+                self.update(token, True)
+        part = self.parts.pop(0) if self.parts else len(self.initial)
+        yield from self.initial[:part]
+        if part < len(self.initial):
+            raise TimeoutError
+
+
+@pytest.mark.parametrize(
+    ("parts", "late", "is_incomplete"),
+    [
+        ([0], True, False),  # asked again
+        ([1, 2, 3], True, False),  # the answers grow
+        ([1, 1, 1, 3], True, False),  # the watch is faster
+        ([0] * 99, True, True),  # all have arrived, but no answer says so
+        ([1] * 99, False, True),
+        ([], False, True),  # nothing arrives
+    ],
+)
+def test_a_slow_network_is_asked_again_or_its_graph_is_incomplete(
+    parts, late, is_incomplete, monkeypatch
+):
+    monkeypatch.setattr(graph_module, "_SETTLED", 0.01)
+    ends = [entity(Kind.PUBLISHER, number) for number in range(3)]
+    tokens = SlowTokens(*(end.token for end in ends), parts=parts, late=late)
+    graph = Graph(tokens, 0)
+    assert graph.is_incomplete == is_incomplete
+    assert graph.entities() == (tuple(ends) if late else ())
 
 
 def test_garbage_is_counted_and_nothing_else():

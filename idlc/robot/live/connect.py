@@ -38,15 +38,24 @@ MOST_WAITING = 64 << 20
 _OVERHEAD = 200
 
 
-def connected(
-    address: str, report: Report, timeout: float = 5.0
-) -> AbstractContextManager[Session | None]:
-    """Return a session with a robot for `with`; reports IDL642 for `None`, without an answer."""
+@contextmanager
+def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Session | None]:
+    """Yield a session with a robot; reports IDL642, and yields `None`, without an answer.
+
+    A note at the end says so if endpoints may be missing.
+    """
     try:
-        return open_session(address, timeout=timeout)
+        session = open_session(address, timeout=timeout)
     except RobotError as error:
         report.add(codes.NO_ANSWER.of("", error.message, hint=error.hint))
-        return nullcontext()
+        yield None
+        return
+    with session:
+        yield session
+        if session.graph.is_full:
+            report.notes.append("the robot announces too many endpoints; some are missing")
+        if session.graph.is_incomplete:
+            report.notes.append("the robot answers too slowly; endpoints may be missing")
 
 
 def robot_entities(session: Session, *kinds: Kind) -> list[Entity]:
