@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
+from queue import SimpleQueue
 from typing import Any
 
 import zenoh
@@ -14,6 +16,8 @@ from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
 #: Seconds between the heartbeats by which subscriptions notice that they missed a message.
 _HEARTBEAT = 0.5
+#: Tokens that wait to be read; more are lost.
+_MOST_WAITING = 2**18
 
 
 class ZenohTransport:
@@ -106,7 +110,16 @@ class ZenohTransport:
 
     def tokens(self, pattern: str, timeout: float) -> Iterator[str]:
         """Query the liveliness tokens that exist."""
-        for reply in self._liveliness.get(pattern, timeout=timeout):
+        # The session answers from its own memory before `get` returns, so nothing may block there
+        replies: SimpleQueue[Any] = SimpleQueue()
+
+        def receive(reply: zenoh.Reply) -> None:
+            if reply.ok is None or replies.qsize() < _MOST_WAITING:
+                replies.put(reply)
+
+        end = partial(replies.put, None)
+        self._liveliness.get(pattern, _direct(receive, end), timeout=timeout)
+        while (reply := replies.get()) is not None:
             if reply.ok is None:
                 raise TimeoutError
             yield str(reply.ok.key_expr)

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 from idlc.cli.main import main
 from idlc.project.find import is_address
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, Kind, all_tokens, pack_attachment
 from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from idlc.robot.session import open_router, open_session
 from tests.robot.conftest import free_endpoint, start_router
@@ -65,6 +66,17 @@ def test_nodes_and_endpoints_appear_in_the_other_graph_and_go(sessions):
     left.close()
     left.close()
     assert right.graph.wait_for(lambda graph: not graph.entities(), LONG)
+
+
+def test_a_session_that_knows_many_tokens_answers_its_own_question(sessions):
+    left, right = sessions
+    for _ in range(600):
+        left.transport.announce(entity(left).token)
+    assert right.graph.wait_for(lambda graph: len(graph.entities()) == 600, LONG)
+    answer, end = set(), time.monotonic() + LONG
+    while len(answer) < 600 and time.monotonic() < end:  # for a moment, Zenoh answers with nothing
+        answer = {*right.transport.tokens(all_tokens(right.domain), LONG)}
+    assert answer == {each.token for each in right.graph.entities()}
 
 
 def test_a_session_sees_itself_and_no_other_domain(sessions):
