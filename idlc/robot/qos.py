@@ -100,14 +100,6 @@ qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPol
 qos_profile_rosout_default = QoSProfile(
     depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=10 * 10**9
 )
-qos_profile_best_available = QoSProfile(
-    depth=10,
-    reliability=ReliabilityPolicy.BEST_AVAILABLE,
-    durability=DurabilityPolicy.BEST_AVAILABLE,
-    deadline=FOLLOWS,
-    liveliness=LivelinessPolicy.BEST_AVAILABLE,
-    liveliness_lease_duration=FOLLOWS,
-)
 
 
 def qos_profile(value: QoSProfile | int) -> QoSProfile:

@@ -25,13 +25,13 @@ from idlc.robot.qos import (
     QoSProfile,
     ReliabilityPolicy,
     qos_profile_action_status_default,
-    qos_profile_best_available,
     qos_profile_parameters,
     qos_profile_rosout_default,
     qos_profile_sensor_data,
     qos_profile_services_default,
     qos_profile_system_default,
 )
+from tests.robot.test_qos import BEST_AVAILABLE
 from tests.support.paths import ROOT
 
 CAPTURE = json.loads((ROOT / "golden/robot/rmw_zenoh.json").read_text(encoding="utf-8"))
@@ -131,8 +131,8 @@ def test_predefined_profiles_are_those_of_rmw_zenoh():
     assert format_qos(qos_profile_rosout_default) == texts["rosout"]
     assert format_qos(qos_profile_action_status_default) == ":1:,1:,:,:,,"
     best = "4:4:,10:,854775806:,:5,,854775806"
-    assert format_qos(qos_profile_best_available) == best
-    assert parse_qos(best) == qos_profile_best_available
+    assert format_qos(BEST_AVAILABLE) == best
+    assert parse_qos(best) == BEST_AVAILABLE
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,6 @@ from idlc.robot import (
 )
 from idlc.robot.keys import Kind, all_tokens, pack_attachment, parse_attachment
 from idlc.robot.qos import (
-    qos_profile_best_available,
     qos_profile_parameter_events,
     qos_profile_parameters,
     qos_profile_sensor_data,
@@ -27,6 +26,7 @@ from idlc.robot.qos import (
     qos_profile_system_default,
 )
 from tests.robot.nodes import LONG, String, node_at, spin_until
+from tests.robot.test_qos import BEST_AVAILABLE
 from tests.support.paths import ROOT
 
 CAPTURE = json.loads((ROOT / "golden/robot/rmw_zenoh.json").read_text(encoding="utf-8"))
@@ -49,7 +49,7 @@ PROFILES = {
     "qos_services": qos_profile_services_default,
     "qos_parameters": qos_profile_parameters,
     "qos_parameter_events": qos_profile_parameter_events,
-    "qos_best_available": qos_profile_best_available,
+    "qos_best_available": BEST_AVAILABLE,
     "qos_keep_all": QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=10),
     "qos_best_effort": QoSProfile(depth=5, reliability=BEST_EFFORT),
     "qos_latched": QoSProfile(depth=1, durability=LATCHED),

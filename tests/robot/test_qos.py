@@ -5,6 +5,7 @@ import datetime
 import pytest
 
 from idlc.robot.qos import (
+    FOLLOWS,
     INFINITE,
     DurabilityPolicy,
     HistoryPolicy,
@@ -13,11 +14,19 @@ from idlc.robot.qos import (
     ReliabilityPolicy,
     incompatible_policies,
     qos_profile,
-    qos_profile_best_available,
     qos_profile_sensor_data,
 )
 
 SECOND = 10**9
+#: The profile of this name in rclpy.
+BEST_AVAILABLE = QoSProfile(
+    depth=10,
+    reliability=ReliabilityPolicy.BEST_AVAILABLE,
+    durability=DurabilityPolicy.BEST_AVAILABLE,
+    deadline=FOLLOWS,
+    liveliness=LivelinessPolicy.BEST_AVAILABLE,
+    liveliness_lease_duration=FOLLOWS,
+)
 
 
 class Duration:
@@ -89,4 +98,4 @@ def test_a_publisher_offers_at_least_what_is_requested(policy, weak, strong):
     for offered, requested in ((more, less), (less, less), (more, more)):
         assert incompatible_policies(offered, requested) == ()
     for profile in (less, more):
-        assert incompatible_policies(profile, qos_profile_best_available) == ()
+        assert incompatible_policies(profile, BEST_AVAILABLE) == ()
