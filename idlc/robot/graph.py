@@ -22,6 +22,8 @@ _TIMEOUT = 9.0
 #: Seconds until a graph asks again for entities that exist and have not arrived, and the times.
 _SETTLED = 1.0
 _TIMES = 15
+#: Seconds after which a graph does not ask again.
+_PATIENCE = 60.0
 #: Stands for the tokens that are missing in an answer, and never arrives.
 _UNKNOWN = ""
 T = TypeVar("T")
@@ -45,9 +47,10 @@ class Graph:
         self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
         self._changed = Condition()
         pattern = all_tokens(domain)
+        end = time.monotonic() + _PATIENCE
         # Zenoh may answer with nothing after the watch; what goes in between never arrives
         self._expected, known = self._ask(transport, pattern), 0
-        while _UNKNOWN in self._expected and len(self._expected) > known:
+        while _UNKNOWN in self._expected and known < len(self._expected) and time.monotonic() < end:
             known = len(self._expected)
             self._expected = self._ask(transport, pattern)
         self._watch = transport.watch(pattern, self._update)
@@ -57,7 +60,8 @@ class Graph:
                 break
             answer = self._ask(transport, pattern)
             self._expected = answer or self._expected
-            if _UNKNOWN in answer and len(self._entities) == known:
+            is_over = time.monotonic() > end
+            if is_over or (_UNKNOWN in answer and len(self._entities) == known):
                 break
         self.is_incomplete = not self._has_expected()
         self._expected.clear()

@@ -192,7 +192,7 @@ def _open(zenoh: Any, config: Any, domain: int | None, environ: Mapping[str, str
     """Return a session with this configuration and those of rmw_zenoh's environment variables."""
     text = environ.get("ROS_DOMAIN_ID", "").strip() or "0" if domain is None else str(domain)
     if not (re.fullmatch("[0-9]{1,9}", text) and int(text) <= MOST_DOMAIN):
-        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0, say")
+        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0")
     for item in environ.get("ZENOH_CONFIG_OVERRIDE", "").split(";"):
         key, separator, value = item.partition("=")
         try:

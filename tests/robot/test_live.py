@@ -125,6 +125,16 @@ def test_the_graph_is_shown_with_what_does_not_fit(robot, router, capsys):
     assert (action["name"], action["receivers"]) == ("/move", ["/driver"])
 
 
+def test_a_slow_robot_is_noted(robot, router, capsys, monkeypatch):
+    def too_late(*_):
+        raise TimeoutError
+        yield
+
+    monkeypatch.setattr("idlc.robot.zenoh_transport.ZenohTransport.tokens", too_late)
+    assert main(["show", router]) == 0
+    assert "the robot answers too slowly; endpoints may be missing" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("style", ["yaml", "json", "csv"])
 def test_messages_are_printed_and_malformed_ones_counted(robot, router, capsys, style):
     string = standard("std_msgs/msg/String")

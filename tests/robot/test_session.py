@@ -260,7 +260,7 @@ def listening():
         (
             [],
             {"ROS_DOMAIN_ID": "x"},
-            "`x` is not a domain (set ROS_DOMAIN_ID to 0, say)",
+            "`x` is not a domain (set ROS_DOMAIN_ID to 0)",
         ),
         ([], {"ROS_DOMAIN_ID": "-1"}, "`-1` is not a domain"),
         (
