@@ -23,7 +23,8 @@ import idlc
 from benchmarks.measure import IDLC, Candidate, Goal, Repeated, Result, Row, measure
 from benchmarks.report import line
 from idlc.model import catalog, ir
-from idlc.robot import Node, QoSProfile, Session, open_session
+from idlc.robot import Node, QoSProfile, open_session
+from idlc.robot.session import Session
 
 ZENOH = "eclipse-zenoh"
 BARE_KEY = "idlc/benchmarks"
@@ -43,7 +44,7 @@ from idlc.robot import Node, QoSProfile, init, open_router, spin
 
 SetBool = idlc.load("std_srvs/srv/SetBool").SetBool
 String = idlc.load("std_msgs/msg/String").String
-with open_router([sys.argv[1]], environ={}), init(args=[], address=sys.argv[1], domain_id=0):
+with open_router([sys.argv[1]], environ={}), init(args=[], address=sys.argv[1]):
     node = Node("other")
     node.create_subscription(String, "chatter", lambda message: None, 1)
     bare = node.transport.subscriber(sys.argv[2], QoSProfile(depth=1), lambda sample: None)

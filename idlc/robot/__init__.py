@@ -7,7 +7,6 @@ from idlc.robot.actions.goals import GoalResponse as GoalResponse
 from idlc.robot.actions.server import ActionServer as ActionServer
 from idlc.robot.actions.server import ServerGoalHandle as ServerGoalHandle
 from idlc.robot.errors import RobotError as RobotError
-from idlc.robot.graph import Graph as Graph
 from idlc.robot.nodes.arguments import remove_ros_args as remove_ros_args
 from idlc.robot.nodes.clock import Clock as Clock
 from idlc.robot.nodes.clock import ClockType as ClockType
@@ -16,7 +15,6 @@ from idlc.robot.nodes.clock import Time as Time
 from idlc.robot.nodes.clock import Timer as Timer
 from idlc.robot.nodes.context import Context as Context
 from idlc.robot.nodes.context import SignalHandlerOptions as SignalHandlerOptions
-from idlc.robot.nodes.context import get_default_context as get_default_context
 from idlc.robot.nodes.context import init as init
 from idlc.robot.nodes.context import ok as ok
 from idlc.robot.nodes.context import shutdown as shutdown
@@ -36,19 +34,16 @@ from idlc.robot.nodes.executor import SingleThreadedExecutor as SingleThreadedEx
 from idlc.robot.nodes.executor import spin as spin
 from idlc.robot.nodes.executor import spin_once as spin_once
 from idlc.robot.nodes.executor import spin_until_future_complete as spin_until_future_complete
-from idlc.robot.nodes.logger import Logger as Logger
 from idlc.robot.nodes.logger import LoggingSeverity as LoggingSeverity
 from idlc.robot.nodes.logger import get_logger as get_logger
 from idlc.robot.nodes.node import Node as Node
 from idlc.robot.nodes.services import Client as Client
 from idlc.robot.nodes.services import Service as Service
 from idlc.robot.parameters.values import Parameter as Parameter
-from idlc.robot.parameters.values import parameter_value_to_python as parameter_value_to_python
 from idlc.robot.qos import DurabilityPolicy as DurabilityPolicy
 from idlc.robot.qos import HistoryPolicy as HistoryPolicy
 from idlc.robot.qos import LivelinessPolicy as LivelinessPolicy
 from idlc.robot.qos import QoSProfile as QoSProfile
 from idlc.robot.qos import ReliabilityPolicy as ReliabilityPolicy
-from idlc.robot.session import Session as Session
 from idlc.robot.session import open_router as open_router
 from idlc.robot.session import open_session as open_session

@@ -8,7 +8,6 @@ The node speaks the protocol of rmw_zenoh. ARGUMENTS are arguments for the node,
 
 from __future__ import annotations
 
-import re
 import runpy
 import shlex
 import sys
@@ -17,16 +16,16 @@ from pathlib import Path
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.offer import Importer, not_offered
+from idlc.robot.offer import Importer
 
 
 def main(words: list[str]) -> int:
     """Run the node that the command line names; return the exit status."""
+    if words[:1] in (["-h"], ["--help"]):
+        sys.stdout.write(__doc__)
+        return 0
     try:
-        if words[:1] in (["-h"], ["--help"]):
-            sys.stdout.write(__doc__)
-        else:
-            run(words)
+        run(words)
     except RobotError as error:
         hint = error.hint or "see docs/robot-nodes.md"
         sys.stderr.write(f"error: {error.message}\n  = hint: {hint}\n")
@@ -61,17 +60,10 @@ def run(words: list[str]) -> None:
         raise RobotError(problem, f"run the node with it: `{one_line(command)}`")
     sys.meta_path.append(Importer())
     sys.argv = words
-    try:
-        if is_module:
-            runpy.run_module(module, run_name="__main__", alter_sys=True)
-        else:
-            runpy.run_path(target, run_name="__main__")
-    except ImportError as error:
-        # `from rclpy.node import X` loses the message of the module
-        match = re.match(r"cannot import name '(\w+)'", str(error))
-        if match is None or not f"{error.name}.".startswith("rclpy."):
-            raise
-        raise ImportError(not_offered(f"{error.name}.{match[1]}"), name=error.name) from error
+    if is_module:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    else:
+        runpy.run_path(target, run_name="__main__")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
@@ -30,7 +31,8 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.logging": "LoggingSeverity get_logger",
     "rclpy.parameter": "Parameter parameter_value_to_python",
     "rclpy.qos": (
-        "DurabilityPolicy HistoryPolicy LivelinessPolicy QoSProfile ReliabilityPolicy"
+        "DurabilityPolicy HistoryPolicy LivelinessPolicy QoSDurabilityPolicy QoSHistoryPolicy"
+        " QoSLivelinessPolicy QoSProfile QoSReliabilityPolicy ReliabilityPolicy"
         " qos_profile_sensor_data qos_profile_services_default qos_profile_system_default"
     ),
     "rclpy.signals": "SignalHandlerOptions",
@@ -39,27 +41,18 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.utilities": "get_default_context ok remove_ros_args shutdown try_shutdown",
 }
 #: The modules of idlc that provide the names.
-_HOMES = (
-    "actions.client actions.goals actions.server nodes.arguments nodes.clock nodes.context"
-    " nodes.executor nodes.logger nodes.node parameters.values qos"
-).split()
+_HOMES = "robot robot.nodes.node robot.parameters.values robot.qos".split()
 
 
-class _Offered(ModuleType):
-    """A module of rclpy, whose names are imported when a program asks for them."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name, "A part of rclpy, as idlc offers it.")
-        self.__all__ = OFFERED[name].split()
-
-    def __getattr__(self, name: str) -> Any:
-        full_name = f"{self.__name__}.{name}"
-        if full_name in OFFERED:
-            return import_module(full_name)
-        if name not in self.__all__:
-            raise AttributeError(not_offered(full_name), name=name, obj=self)
-        homes = (import_module(f"idlc.robot.{home}") for home in _HOMES)
-        return next(getattr(home, name) for home in homes if hasattr(home, name))
+def _attribute(module: str, name: str) -> Any:
+    """Return a name in a module of rclpy; raise AttributeError if idlc does not offer it."""
+    full_name = f"{module}.{name}"
+    if full_name in OFFERED:
+        return import_module(full_name)
+    if name not in OFFERED[module].split():
+        raise AttributeError(not_offered(full_name), name=name)
+    homes = (vars(import_module(f"idlc.{home}")) for home in _HOMES)
+    return next(home[name] for home in homes if name in home)
 
 
 class Importer(MetaPathFinder, Loader):
@@ -71,18 +64,17 @@ class Importer(MetaPathFinder, Loader):
             return ModuleSpec(name, self, is_package=True)
         package = name.partition(".")[0]
         if package == "rclpy":
-            raise ModuleNotFoundError(not_offered(name), name=name)
+            # Python ignores errors with the full name of what `from rclpy.node import X` imports
+            raise ModuleNotFoundError(not_offered(name), name=package)
         from idlc.model.catalog import packages
         from idlc.recordings.load import known_spec
 
         return known_spec(package, name) if package in packages() else None
 
-    def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return a part of rclpy."""
-        return _Offered(spec.name)
-
     def exec_module(self, module: ModuleType) -> None:
-        """Do nothing: names are imported on demand."""
+        """Offer the names of a module."""
+        names = OFFERED[module.__name__].split()
+        vars(module).update(__all__=names, __getattr__=partial(_attribute, module.__name__))
 
 
 def not_offered(name: str) -> str:

@@ -90,6 +90,12 @@ class QoSProfile(msgspec.Struct, frozen=True, kw_only=True):
         return self.durability is DurabilityPolicy.TRANSIENT_LOCAL
 
 
+# rclpy's older names
+QoSReliabilityPolicy = ReliabilityPolicy
+QoSDurabilityPolicy = DurabilityPolicy
+QoSHistoryPolicy = HistoryPolicy
+QoSLivelinessPolicy = LivelinessPolicy
+
 qos_profile_default = QoSProfile(depth=10)
 qos_profile_system_default = QoSProfile()
 qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -15,18 +15,15 @@ def describe(endpoints: Sequence[Endpoint], request: Any, response: Any) -> Any:
     """Fill in the response to a request, from the types that a node uses."""
     used = {each.interface.name: each.interface for each in endpoints}
     interface = used.get(request.type_name)
-    if interface is None:
-        response.failure_reason = "the node does not use this type"
-        return response
-    if request.type_hash and request.type_hash != interface.hash:
-        response.failure_reason = f"the node uses the type with the hash {interface.hash}"
+    if interface is None or request.type_hash not in ("", interface.hash):
+        problem = f"uses the hash {interface.hash}" if interface else "does not use this type"
+        response.failure_reason = f"the node {problem}"
         return response
     types = types_of(interface.kind)
     names = [interface.name]
     for name in names:
-        fields = types.descriptions[name]["fields"]
-        nested = dict.fromkeys(field["type"]["nested_type_name"] for field in fields)
-        names += [other for other in nested if other and other not in names]
+        nested = dict.fromkeys(field.nested.name for field in types[name].members if field.nested)
+        names += [other for other in nested if other not in names]
     first, *others = [types.descriptions[name] for name in (names[0], *sorted(names[1:]))]
     sources = []
     for name in names if request.include_type_sources else ():

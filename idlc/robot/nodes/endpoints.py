@@ -1,14 +1,17 @@
-"""Publishers and subscriptions, with their deadlines."""
+"""Publishers and subscriptions, with their deadlines, and streams for asyncio."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
+from contextlib import suppress
 from functools import partial
-from itertools import count
+from itertools import count, repeat
 from threading import Lock
 from time import time_ns
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+import msgspec
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
@@ -17,7 +20,7 @@ from idlc.robot.nodes.clock import Clock, ClockType, Timer
 from idlc.robot.nodes.executor import Ready
 from idlc.robot.nodes.interfaces import M, interface_of
 from idlc.robot.qos import FOLLOWS, HistoryPolicy, QoSProfile, qos_profile
-from idlc.robot.transport import Sample
+from idlc.robot.transport import Closeable, Sample
 from idlc.runtime.names import DecodeError
 from idlc.runtime.typeinfo import is_copy
 
@@ -39,19 +42,35 @@ class Endpoint(Ready):
     kind: ClassVar[Kind]
     deadline: Timer | None = None
 
-    def __init__(self, node: Any, name: str, kind: Any, qos: QoSProfile | int) -> None:
-        super().__init__(None)
+    def __init__(
+        self, node: Any, name: str, kind: Any, qos: QoSProfile | int, group: Any, call: Any = None
+    ) -> None:
+        super().__init__(group or node.default_callback_group)
         self.node = node
+        self.callback = call
         self.interface = interface_of(kind)
         self.qos_profile = qos_profile(qos)
+        absolute: str = node.resolve_topic_name(name)
+        #: The absolute name.
+        self.topic_name = self.srv_name = absolute
         #: How the graph shows the endpoint.
-        self.entity: Entity = node.entity_of(self.kind, name, self.interface, self.qos_profile)
+        self.entity: Entity = msgspec.structs.replace(
+            node.entity,
+            name=absolute,
+            id=node.session.next_id(),
+            kind=self.kind,
+            type=self.interface.name,
+            hash=self.interface.hash,
+            qos=self.qos_profile,
+            token="",  # which is made of the others
+        )
         self.ignored = 0
-        self._closeables: list[Any] = []
+        self._closeables = [*self.open(), node.transport.announce(self.entity.token)]
+        node.add(self)
 
-    def open(self) -> None:
-        """Show the endpoint to others; subclasses first declare what it needs."""
-        self._closeables.append(self.node.transport.announce(self.entity.token))
+    def open(self) -> tuple[Closeable, ...]:
+        """Declare the endpoint, before others see it; return what `destroy` closes."""
+        raise NotImplementedError
 
     def destroy(self) -> None:
         """Withdraw the endpoint; may be called twice."""
@@ -64,12 +83,8 @@ class Endpoint(Ready):
         """Call back if no message came in time; the first message begins the period."""
         callback, period = events and events.deadline, self.qos_profile.deadline
         if callback is not None and period < FOLLOWS:
-            numbers = count(1)
-
-            def miss() -> Any:
-                return callback(DeadlineInfo(next(numbers), 1))
-
-            clock = Clock(clock_type=ClockType.STEADY_TIME)
+            infos = map(DeadlineInfo, count(1), repeat(1))
+            miss, clock = (lambda: callback(next(infos))), Clock(clock_type=ClockType.STEADY_TIME)
             self.deadline = Timer(miss, self.callback_group, period, clock)
             self.deadline.cancel()
             self.node.add(self.deadline)
@@ -86,9 +101,8 @@ class Endpoint(Ready):
             return kind.deserialize(payload)
         except DecodeError as error:
             self.ignored += 1
-            problem = f"idlc ignores data that is not {self.interface.name}: {one_line(str(error))}"
-            text = f"`{self.entity.name}`: {problem}"
-            self.node.get_logger().warning(text, throttle_duration_sec=10.0)
+            text = f"`{self.topic_name}`: idlc ignores data that is not {self.interface.name}: "
+            self.node.get_logger().warning(text + one_line(str(error)), throttle_duration_sec=10.0)
             return None
 
 
@@ -150,29 +164,19 @@ PublisherEventCallbacks = EventCallbacks
 SubscriptionEventCallbacks = EventCallbacks
 
 
-class _Topic(Endpoint, Generic[M]):
-    """The base class of publishers and subscriptions."""
-
-    @property
-    def topic_name(self) -> str:
-        """The absolute name of the topic."""
-        return self.entity.name
-
-
-class Publisher(_Topic[M]):
+class Publisher(Endpoint, Generic[M]):
     """Sends messages of a topic, from any thread."""
 
     kind = Kind.PUBLISHER
 
-    def open(self) -> None:
+    def open(self) -> tuple[Closeable, ...]:
         """Declare the publisher."""
         sender = self.node.transport.publisher(self.entity.key, self.qos_profile)
-        self._closeables.append(sender)
         # looked up once, as each call and attribute is a few per cent of a small message
         self._put, self._pack, self._gid = sender.put, ATTACHMENT.pack, self.entity.gid
         self._numbers = count(1)
         self._class: Any = None
-        super().open()
+        return (sender,)
 
     def publish(self, msg: M | bytes) -> None:
         """Send a message, or one that is encoded already.
@@ -186,7 +190,7 @@ class Publisher(_Topic[M]):
         try:
             self._put(payload, attachment=attachment)
         except Exception as error:
-            raise RobotError(f"`{self.entity.name}`: {one_line(str(error))}") from None
+            raise RobotError(f"`{self.topic_name}`: {one_line(str(error))}") from None
         if self.deadline is not None:
             self.deadline.begin_period()
 
@@ -197,26 +201,22 @@ class Publisher(_Topic[M]):
         if is_instance(msg, self._class):
             return bytes(msg.serialize())
         expected = f"{self.interface.name}, not {type(msg).__name__}"
-        raise TypeError(f"messages of `{self.entity.name}` are {expected}")
+        raise TypeError(f"messages of `{self.topic_name}` are {expected}")
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions that receive the messages."""
         return self.count_others(Kind.SUBSCRIPTION)
 
 
-class Subscription(_Topic[M]):
+class Subscription(Endpoint, Generic[M]):
     """Receives messages of a topic: a queue that drops the oldest beyond the depth."""
 
     kind = Kind.SUBSCRIPTION
-    callback: Callable[[M], Any]
 
-    def open(self) -> None:
+    def open(self) -> tuple[Closeable, ...]:
         """Declare the subscriber."""
         self._queue: Bounded[bytes] = Bounded(self.qos_profile)
-        self._closeables.append(
-            self.node.transport.subscriber(self.entity.key, self.qos_profile, self._receive)
-        )
-        super().open()
+        return (self.node.transport.subscriber(self.entity.key, self.qos_profile, self._receive),)
 
     def _receive(self, sample: Sample) -> None:
         if parse_attachment(sample.attachment) is None:
@@ -244,3 +244,36 @@ class Subscription(_Topic[M]):
     def get_publisher_count(self) -> int:
         """Return the number of publishers whose messages arrive here."""
         return self.count_others(Kind.PUBLISHER)
+
+
+class Stream(Subscription[M]):
+    """A subscription that wakes a coroutine, and needs no executor."""
+
+    def open(self) -> tuple[Closeable, ...]:
+        """Declare the subscriber; the running event loop gets the messages."""
+        import asyncio  # which other programs do not need
+
+        self._loop = asyncio.get_running_loop()
+        self._arrived = asyncio.Event()
+        self.node.context.sleepers.add(self)
+        return super().open()
+
+    def wake(self) -> None:
+        """Look at the queue and the context; for any thread."""
+        if not self._is_queued:
+            self._is_queued = True
+            with suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(self._arrived.set)
+
+    async def messages(self) -> AsyncGenerator[M, None]:
+        """Yield the messages, until the context is shut down or the subscription destroyed."""
+        try:
+            while self in self.node.endpoints and self.node.context.ok():
+                self._arrived.clear()
+                self._is_queued = False
+                if (message := self.next_message()) is not None:
+                    yield message
+                else:
+                    await self._arrived.wait()
+        finally:
+            self.node.destroy_subscription(self)

@@ -16,7 +16,6 @@ class MessageLike(Protocol):
 
     def serialize(self, *, byteorder: Literal["little", "big"] = "little") -> bytes:
         """Return the message as CDR."""
-        ...
 
 
 M = TypeVar("M", bound=MessageLike)
@@ -76,9 +75,7 @@ def interface_of(kind: Any) -> Interface:
 
 #: The types that every node announces; their hashes stand here so that a node does not compile
 #: them, which takes a second, before it uses them.
-_HASHES = dict(
-    line.split("=")
-    for line in """
+_ANNOUNCED = """
 rcl_interfaces/msg/Log=e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac
 rcl_interfaces/msg/ParameterEvent=043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204
 rcl_interfaces/srv/DescribeParameters=845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff
@@ -88,8 +85,8 @@ rcl_interfaces/srv/ListParameters=3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7b
 rcl_interfaces/srv/SetParameters=56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0
 rcl_interfaces/srv/SetParametersAtomically=0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd
 type_description_interfaces/srv/GetTypeDescription=69b9c19c1021405984cc60dbbb1edceb147a6538b411d812ba6afabeed962cd5
-""".split()
-)
+"""
+_HASHES = dict(line.split("=") for line in _ANNOUNCED.split())
 
 
 @cache

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
-import msgspec
-
+from idlc.robot import qos as profiles
 from idlc.robot.errors import RobotError
 from idlc.robot.graph import Graph
 from idlc.robot.keys import Entity, Kind
@@ -17,7 +16,7 @@ from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.clock import Clock, ClockType, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
 from idlc.robot.nodes.descriptions import SERVICE, describe
-from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Subscription
+from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Stream, Subscription
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger
@@ -25,15 +24,9 @@ from idlc.robot.nodes.services import Client, Service
 from idlc.robot.parameters.declared import HasParameters, add_services
 from idlc.robot.parameters.overrides import overrides_of
 from idlc.robot.parameters.values import Parameter
-from idlc.robot.qos import (
-    QoSProfile,
-    ReliabilityPolicy,
-    qos_profile_parameter_events,
-    qos_profile_rosout_default,
-)
+from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 from idlc.robot.session import Session
 
-E = TypeVar("E", bound=Endpoint)
 _CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -86,13 +79,11 @@ class Node(HasParameters):
         self._token = self.transport.announce(self.entity.token)
         self._logger = Logger(self.entity.node_name.strip("/").replace("/", "."), self._log)
         # in the order of rclpy, so that ids are equal
-        log = standard("rcl_interfaces/msg/Log")
-        self._rosout: Publisher[Any] = self.create_publisher(
-            log, "/rosout", qos_profile_rosout_default
-        )
-        event = standard("rcl_interfaces/msg/ParameterEvent")
-        self._parameter_events: Publisher[Any] = self.create_publisher(
-            event, "/parameter_events", qos_profile_parameter_events
+        log: Any = standard("rcl_interfaces/msg/Log")
+        self._rosout = self.create_publisher(log, "/rosout", profiles.qos_profile_rosout_default)
+        event: Any = standard("rcl_interfaces/msg/ParameterEvent")
+        self._parameter_events = self.create_publisher(
+            event, "/parameter_events", profiles.qos_profile_parameter_events
         )
         answer = partial(describe, self.endpoints)
         self.create_service(standard(SERVICE), "~/get_type_description", answer)
@@ -142,9 +133,8 @@ class Node(HasParameters):
         """Withdraw the node with its endpoints; may be called twice."""
         if self._executor is not None:
             self._executor.remove_node(self)
-        parts: list[Timer | Endpoint] = [*self.endpoints, *self.timers]
-        for part in parts:
-            self.destroy_timer(part)
+        while parts := self.endpoints or self.timers:
+            self.destroy_timer(parts[0])
         self._token.close()
 
     def get_name(self) -> str:
@@ -198,28 +188,6 @@ class Node(HasParameters):
 
     # endpoints
 
-    def entity_of(self, kind: Kind, name: str, interface: Interface, qos: QoSProfile) -> Entity:
-        """Return the entity of a new endpoint; raise InvalidNameError."""
-        return msgspec.structs.replace(
-            self.entity,
-            id=self.session.next_id(),
-            kind=kind,
-            name=self.resolve_topic_name(name),
-            type=interface.name,
-            hash=interface.hash,
-            qos=qos,
-            token="",  # which is made of the others
-        )
-
-    def _open(
-        self, endpoint: E, group: CallbackGroup | None, events: EventCallbacks | None = None
-    ) -> E:
-        endpoint.callback_group = group or self.default_callback_group
-        endpoint.watch(events)
-        endpoint.open()
-        self.add(endpoint)
-        return endpoint
-
     def create_publisher(
         self,
         msg_type: type[M] | Interface,
@@ -230,8 +198,9 @@ class Node(HasParameters):
         event_callbacks: EventCallbacks | None = None,
     ) -> Publisher[M]:
         """Return a publisher; a number is the depth of the default profile."""
-        publisher: Publisher[M] = Publisher(self, topic, msg_type, qos_profile)
-        return self._open(publisher, callback_group, event_callbacks)
+        publisher: Publisher[M] = Publisher(self, topic, msg_type, qos_profile, callback_group)
+        publisher.watch(event_callbacks)
+        return publisher
 
     def create_subscription(
         self,
@@ -244,18 +213,17 @@ class Node(HasParameters):
         event_callbacks: EventCallbacks | None = None,
     ) -> Subscription[M]:
         """Return a subscription; `callback` gets each message."""
-        subscription: Subscription[M] = Subscription(self, topic, msg_type, qos_profile)
-        subscription.callback = callback
-        return self._open(subscription, callback_group, event_callbacks)
+        subscription: Subscription[M]
+        subscription = Subscription(self, topic, msg_type, qos_profile, callback_group, callback)
+        subscription.watch(event_callbacks)
+        return subscription
 
     def subscribe(
         self, msg_type: type[M], topic: str, qos_profile: QoSProfile | int = 10
     ) -> AsyncGenerator[M, None]:
         """Return the messages of a topic for `async for` in asyncio; nothing has to spin."""
-        from idlc.robot.nodes.stream import Stream
-
-        stream: Stream[M] = Stream(self, topic, msg_type, qos_profile)
-        return self._open(stream, None).messages()
+        stream: Stream[M] = Stream(self, topic, msg_type, qos_profile, None)
+        return stream.messages()
 
     def create_service(
         self,
@@ -267,9 +235,7 @@ class Node(HasParameters):
         callback_group: CallbackGroup | None = None,
     ) -> Service[RequestT, ResponseT]:
         """Return a service; `callback` gets a request and an empty response, and returns it."""
-        service: Service[RequestT, ResponseT] = Service(self, srv_name, srv_type, qos_profile)
-        service.callback = callback
-        return self._open(service, callback_group)
+        return Service(self, srv_name, srv_type, qos_profile, callback_group, callback)
 
     def create_client(
         self,
@@ -280,8 +246,7 @@ class Node(HasParameters):
         callback_group: CallbackGroup | None = None,
     ) -> Client[RequestT, ResponseT]:
         """Return a client; responses arrive while callbacks of its group run."""
-        client: Client[RequestT, ResponseT] = Client(self, srv_name, srv_type, qos_profile)
-        return self._open(client, callback_group)
+        return Client(self, srv_name, srv_type, qos_profile, callback_group)
 
     def create_timer(
         self,

@@ -13,11 +13,10 @@ from typing import Any, Generic, cast
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
-from idlc.robot.names import action_part
 from idlc.robot.nodes.endpoints import Bounded, Endpoint, is_instance
 from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
-from idlc.robot.transport import Request, Sample
+from idlc.robot.transport import Closeable, Request, Sample
 from idlc.runtime.names import DecodeError
 
 #: Seconds until a call ends without a response, as in rmw_zenoh; results of actions take longer.
@@ -29,28 +28,17 @@ _TICK = 0.5
 MOST_OPEN = 10_000
 
 
-class _ServiceEndpoint(Endpoint, Generic[RequestT, ResponseT]):
-    """The base class of services and clients."""
-
-    @property
-    def srv_name(self) -> str:
-        """The absolute name of the service."""
-        return self.entity.name
-
-
-class Service(_ServiceEndpoint[RequestT, ResponseT]):
+class Service(Endpoint, Generic[RequestT, ResponseT]):
     """Answers requests: `callback` gets the request and an empty response, and returns it."""
 
     kind = Kind.SERVICE
-    callback: Callable[[RequestT, ResponseT], Any]
 
-    def open(self) -> None:
+    def open(self) -> tuple[Closeable, ...]:
         """Declare the service."""
         self._queue: Bounded[tuple[Request, Attachment]] = Bounded(self.qos_profile)
         #: The ids of the request objects that wait or are being answered.
         self._open: set[int] = set()
-        self._closeables.append(self.node.transport.service(self.entity.key, self._receive))
-        super().open()
+        return (self.node.transport.service(self.entity.key, self._receive),)
 
     def _receive(self, request: Request) -> None:
         attachment = parse_attachment(request.attachment)
@@ -89,7 +77,7 @@ class Service(_ServiceEndpoint[RequestT, ResponseT]):
                 response = await response
             if not is_instance(response, kind):
                 problem = f"returned {type(response).__name__}, not its response"
-                raise TypeError(f"the callback of `{self.entity.name}` {problem}")
+                raise TypeError(f"the callback of `{self.srv_name}` {problem}")
             sequence, _, gid = attachment
             request.reply(response.serialize(), pack_attachment(sequence, time.time_ns(), gid))
         except BaseException:
@@ -105,17 +93,17 @@ class Service(_ServiceEndpoint[RequestT, ResponseT]):
             self._drop(item[0])
 
 
-class Client(_ServiceEndpoint[RequestT, ResponseT]):
+class Client(Endpoint, Generic[RequestT, ResponseT]):
     """Sends requests, from any thread; a thread of the transport completes their futures."""
 
     kind = Kind.CLIENT
 
-    def open(self) -> None:
+    def open(self) -> tuple[Closeable, ...]:
         """Prepare calls."""
         self._gid = self.entity.gid
         self._numbers = count(1)
         self._pending: dict[int, Future[ResponseT]] = {}
-        super().open()
+        return ()
 
     def call(self, request: RequestT, timeout_sec: float | None = None) -> ResponseT | None:
         """Send a request and wait; return `None` if no response came in time.
@@ -124,7 +112,7 @@ class Client(_ServiceEndpoint[RequestT, ResponseT]):
         """
         future, ended = self.call_async(request), Event()
         future.wake_at_end(ended.set)
-        if not any(ended.wait(seconds) for seconds in self._waits(timeout_sec)):
+        if not any(map(ended.wait, self._waits(timeout_sec))):
             future.cancel()
         return future.result()
 
@@ -135,49 +123,42 @@ class Client(_ServiceEndpoint[RequestT, ResponseT]):
         """
         if not is_instance(request, self.interface.kind.Request):
             expected = f"{self.interface.name}.Request, not {type(request).__name__}"
-            raise TypeError(f"requests to `{self.entity.name}` are {expected}")
+            raise TypeError(f"requests to `{self.srv_name}` are {expected}")
         payload: bytes = cast("Any", request).serialize()
         number = next(self._numbers)
         attachment = pack_attachment(number, time.time_ns(), self._gid)
-        is_result = (action_part(self.entity.name) or ("", ""))[1] == "get_result"
+        timeout = _LONG_TIMEOUT if self.srv_name.endswith("/_action/get_result") else _TIMEOUT
+        receive = partial(self._receive, number)
         future: Future[ResponseT] = Future()
         self._pending[number] = future
         future.wake_at_end(partial(self._pending.pop, number, None))
         try:
-            self.node.transport.call(
-                self.entity.key,
-                payload,
-                attachment,
-                partial(self._receive, number),
-                timeout=_LONG_TIMEOUT if is_result else _TIMEOUT,
-            )
+            self.node.transport.call(self.entity.key, payload, attachment, receive, timeout=timeout)
         except Exception as error:
             future.cancel()
-            raise RobotError(f"`{self.entity.name}`: {one_line(str(error))}") from None
+            raise RobotError(f"`{self.srv_name}`: {one_line(str(error))}") from None
         return future
 
     def _receive(self, number: int, sample: Sample | None) -> None:
         """Complete the future of a request; only the first response to it counts."""
-        if sample is not None:
-            attachment = parse_attachment(sample.attachment)
-            if attachment is None or (attachment.sequence, attachment.gid) != (number, self._gid):
-                self.ignored += 1
-                return
-        future = self._pending.pop(number, None)
+        attachment = sample and parse_attachment(sample.attachment)
+        answered = attachment and (attachment.sequence, attachment.gid)
+        is_end = sample is None or answered == (number, self._gid)
+        future = self._pending.pop(number, None) if is_end else None
         if future is None:
             self.ignored += sample is not None
             return
         future.executor = self._executor
         if sample is None:
             hint = "is the service running? `wait_for_service` waits until the service runs"
-            future.set_exception(RobotError(f"no service answered `{self.entity.name}`", hint))
+            future.set_exception(RobotError(f"no service answered `{self.srv_name}`", hint))
             return
         try:
             future.set_result(self.interface.kind.Response.deserialize(sample.payload))
         except DecodeError as error:
             self.ignored += 1
             problem = f"sent data that is not its response: {one_line(str(error))}"
-            future.set_exception(RobotError(f"`{self.entity.name}` {problem}"))
+            future.set_exception(RobotError(f"`{self.srv_name}` {problem}"))
 
     def service_is_ready(self) -> bool:
         """Return whether there is a service."""
@@ -185,10 +166,8 @@ class Client(_ServiceEndpoint[RequestT, ResponseT]):
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until there is a service; return whether there is one now."""
-        for seconds in self._waits(timeout_sec):
-            if self.node.graph.wait_for(lambda _: self.service_is_ready(), seconds):
-                break
-        return self.service_is_ready()
+        wait = partial(self.node.graph.wait_for, lambda _: self.service_is_ready())
+        return any(map(wait, self._waits(timeout_sec))) or self.service_is_ready()
 
     def _waits(self, timeout: float | None) -> Iterator[float]:
         """Yield the seconds of short waits, until the time is over or the context is shut down."""
