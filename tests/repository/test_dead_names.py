@@ -14,8 +14,8 @@ PUBLIC = {"stacked"}
 #: What generated code has for numbers of each size, and what no golden package happens to use.
 NUMBERS = re.compile(r"(U?Int|Float)\d+(Array|Sequence)|(U?INT|FLOAT)\d+|PAD\d")
 UNUSUAL = {"PROTOCOL", "flags_writer"}
-#: The core of a room whose nodes and commands are not there yet; remove it with the last of them.
-UNFINISHED = "idlc.robot."
+#: The words of rclpy, which programs use.
+WORDS_OF_RCLPY = "idlc.robot."
 #: Classes of others that call nothing by its name: what a class adds to them is its own.
 RECORDS = {
     "NamedTuple",
@@ -88,7 +88,7 @@ def test_every_name_is_used():
         f"{module}: {name}"
         for module in MODULES
         for name in defined(tree(module), own)
-        if not module.startswith(UNFINISHED)
+        if not module.startswith(WORDS_OF_RCLPY)
         and name not in known
         and not CALLED.fullmatch(name)
         and not NUMBERS.fullmatch(name)
