@@ -64,9 +64,7 @@ def command(
             sys.stderr.write(f"recording to {one_line(out)}; press Ctrl-C to stop\n")
             sys.stderr.flush()
             try:
-                recorder.run(
-                    lambda: stopped.is_set() or (end is not None and time.monotonic() > end)
-                )
+                recorder.run(lambda: stopped.is_set() or time.monotonic() > end)
             finally:
                 counts = recorder.close()
     except FileExistsError:

@@ -129,14 +129,16 @@ class Ready:
         group = self.callback_group
         if self._executor is not executor:
             return False
-        if group.waiting is not None:
-            group.waiting.append(partial(executor.schedule, self.run, executor))
-            return False
+        if (waiting := group.waiting) is not None:
+            waiting.append(partial(executor.schedule, self.run, executor))
+            # otherwise another thread has ended the callback meanwhile, and may not see this one
+            if group.waiting is waiting:
+                return False
         self._is_queued = False
         callback = self.take()
         if callback is None:
             return False
-        waiting: list[Callback] = []
+        waiting = []
         if isinstance(group, MutuallyExclusiveCallbackGroup):
             group.waiting = waiting
         future: Future[Any] | None = None
