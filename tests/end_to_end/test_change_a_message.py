@@ -30,7 +30,9 @@ def test_its_commands_upgrade_and_translate(tmp_path, monkeypatch):
             versions += 1
             if versions == 1:
                 old = idlc.load("my_msgs")
-                write_recording(tmp_path / "drive.mcap", old.Drive, [old.Drive(speed=3, angle=180)])
+                messages = [old.Drive(speed=3, angle=180)]
+                write_recording(tmp_path / "drive.mcap", old.Drive, messages)
+                write_recording(tmp_path / "old.mcap", old.Drive, messages, defined=False)
                 for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "v1"], ["tag", "v1"]):
                     git(*words)
             continue
@@ -48,9 +50,10 @@ def test_its_commands_upgrade_and_translate(tmp_path, monkeypatch):
                     assert "0.017453292519943295" in text
     assert versions == 2
     new = idlc.load(tmp_path / "my_msgs")
-    with idlc.Recording(tmp_path / "upgraded/drive.mcap") as recording:
-        (view,) = [view for batch in recording["/drive"].batches() for view in batch.views()]
-        message = new.Drive.deserialize(view)
-    assert (message.velocity, round(message.angle, 6), message.gear) == (3.0, 3.141593, 1)
+    for name in ("drive", "old"):
+        with idlc.Recording(tmp_path / f"upgraded/{name}.mcap") as recording:
+            (view,) = [view for batch in recording["/drive"].batches() for view in batch.views()]
+            message = new.Drive.deserialize(view)
+        assert (message.velocity, round(message.angle, 6), message.gear) == (3.0, 3.141593, 1)
     conversion = (tmp_path / "bridge/bridge/translator_conversion.py").read_text(encoding="utf-8")
     assert "NotImplementedError" not in conversion
