@@ -10,7 +10,7 @@ import re
 import struct
 from enum import Enum
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -77,6 +77,10 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
         """Make the token of an own entity."""
         if not self.token:
             msgspec.structs.force_setattr(self, "token", _make_token(self))
+
+    def replace(self, **changes: Any) -> Entity:
+        """Return an entity with other values, and the token that is made of them."""
+        return Entity(**{**msgspec.structs.asdict(self), "token": "", **changes})
 
     @property
     def node_name(self) -> str:

@@ -12,8 +12,6 @@ from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple
 
-from msgspec.structs import replace
-
 from idlc.compare.graph import Entity as Noun
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
@@ -93,9 +91,9 @@ def find_endpoints(
 
 def own_endpoint(session: Session, like: Entity, kind: Kind, qos: QoSProfile) -> Entity:
     """Return an endpoint of a hidden node of idlc's, for what another endpoint uses."""
-    hidden = {"namespace": "/", "node": f"_idlc_{os.getpid()}", "node_id": 0, "token": ""}
+    hidden = {"namespace": "/", "node": f"_idlc_{os.getpid()}", "node_id": 0}
     own = {"session": session.id, "id": session.next_id() + 1, "kind": kind, "qos": qos}
-    return replace(like, enclave="/", **hidden, **own)
+    return like.replace(enclave="/", **hidden, **own)
 
 
 class Arrival(NamedTuple):

@@ -11,8 +11,6 @@ from threading import Lock
 from time import time_ns
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-import msgspec
-
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import ATTACHMENT, GID_SIZE, Entity, Kind, parse_attachment
@@ -54,15 +52,13 @@ class Endpoint(Ready):
         #: The absolute name.
         self.topic_name = self.srv_name = absolute
         #: How the graph shows the endpoint.
-        self.entity: Entity = msgspec.structs.replace(
-            node.entity,
+        self.entity: Entity = node.entity.replace(
             name=absolute,
             id=node.session.next_id(),
             kind=self.kind,
             type=self.interface.name,
             hash=self.interface.hash,
             qos=self.qos_profile,
-            token="",  # which is made of the others
         )
         self.ignored = 0
         self._closeables = [*self.open(), node.transport.announce(self.entity.token)]
