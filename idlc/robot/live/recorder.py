@@ -82,7 +82,8 @@ class Recorder:
         if new:
             self._add_schemas(chain.from_iterable(new.values()))
         for key, ends in new.items():
-            number = self._channels[key] = len(self._channels)
+            # from 1, as other writers do: rosbags 0.11.0 reads no channel 0
+            number = self._channels[key] = len(self._channels) + 1
             profiles = dict.fromkeys(end.qos for end in ends)
             offered = "\n".join(chain.from_iterable(map(qos_lines, profiles))).encode()
             metadata = {b"offered_qos_profiles": offered, b"topic_type_hash": key[2].encode()}
