@@ -242,7 +242,7 @@ def publishing() -> dict[str, Candidate]:
 
 
 def burst(publish: Callable[[], object]) -> float:
-    """Return the CPU time of a message, with that of the threads that send it afterwards."""
+    """Return the CPU time per message, including the threads that send it."""
     begin = time.process_time()
     for _ in range(BURST):
         publish()

@@ -304,7 +304,7 @@ class Target:
 
     @property
     def runtime(self) -> Runtime:
-        """Return the runtime mode: the chosen one, or that of the last run."""
+        """Return the chosen runtime mode, or else the mode of the last run."""
         return self._output.runtime or (self.lock.runtime if self.lock else "carried")
 
     @property

@@ -33,9 +33,8 @@ class Graph:
     """The entities of a domain, with those of the own session.
 
     An endpoint can appear before its node and outlive it. Methods can be called on any thread.
-    `ignored` counts the malformed tokens and those beyond the limit. `is_full` is True if there
-    were too many, so that entities are missing, and `is_incomplete` if some did
-    not arrive in time.
+    `ignored` counts malformed tokens and tokens beyond the limit. Entities are missing if
+    `is_full`, because there were too many, or `is_incomplete`, because some arrived too late.
     """
 
     def __init__(self, transport: Transport, domain: int, limit: int = MOST_BYTES) -> None:

@@ -36,8 +36,8 @@ _COMMON: dict[str, Any] = {
 class Session(AbstractContextManager["Session"]):
     """A connection to a robot, and what its nodes and endpoints share.
 
-    Closing it twice, or from another thread, is allowed. `domain` is the ROS_DOMAIN_ID, `id` the
-    id of the session in tokens.
+    Closing it twice, or from another thread, is allowed. `domain` is the ROS_DOMAIN_ID. Tokens
+    contain `id`.
     """
 
     def __init__(self, transport: Transport, domain: int) -> None:

@@ -51,7 +51,7 @@ class Request(Protocol):
 
 
 class Transport(Protocol):
-    """A connection to other programs; `id` is that of the session in tokens."""
+    """A connection to other programs; tokens contain its `id`."""
 
     id: str
 

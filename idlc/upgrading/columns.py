@@ -66,7 +66,7 @@ def _columns(plan: Plan, old: Columns, wanted: Columns) -> Columns:
 
 
 def _picked(column: Any, wanted: Any) -> Any:
-    """Return a column without what is not wanted of it."""
+    """Return a column with only the wanted fields."""
     if isinstance(wanted, Ragged):
         return Ragged(column.offsets, _picked(column.values, wanted.values), wanted.size)
     if not isinstance(wanted, Columns):

@@ -140,8 +140,8 @@ def test_classes_in_the_folder_are_compiled_anew(build, tmp_path):
     Path("src/trackkit/ros/msg/_track.py").write_text("edited\n")
     files = built(build, tmp_path / "two")
     assert {path: files[path] for path in fresh} == fresh
-    Path("src/trackkit/ros/__init__.py").write_text('"""How a track is told."""\n')
-    assert built(build, tmp_path / "three")["ros/__init__.py"] == '"""How a track is told."""\n'
+    Path("src/trackkit/ros/__init__.py").write_text('"""Tracks for ROS."""\n')
+    assert built(build, tmp_path / "three")["ros/__init__.py"] == '"""Tracks for ROS."""\n'
 
 
 KEYS = IDLC.splitlines()[1:]
@@ -160,7 +160,7 @@ def test_a_folder_of_setuptools_keeps_no_old_classes(build, tmp_path):
     write(Path.cwd(), {"interfaces/msg/Old.msg": "int8 old\n"})
     assert "ros/msg/_old.py" in built(build, tmp_path / "one")
     Path("interfaces/msg/Old.msg").unlink()
-    text = '"""How a track is told."""\n'
+    text = '"""Tracks for ROS."""\n'
     write(Path.cwd(), {"src/trackkit/ros/__init__.py": text})
     later = time.time() + 2  # setuptools compares whole seconds
     os.utime("src/trackkit/ros/__init__.py", (later, later))

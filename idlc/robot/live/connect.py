@@ -40,7 +40,7 @@ _OVERHEAD = 200
 def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Session | None]:
     """Yield a session with a robot; reports IDL642, and yields `None`, without an answer.
 
-    A note at the end says so if endpoints may be missing.
+    At the end, it adds a note if endpoints may be missing.
     """
     try:
         session = open_session(address, timeout=timeout)
