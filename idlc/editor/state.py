@@ -32,6 +32,9 @@ WATCHED = (
     f"**/{{{','.join(OTHER_INPUTS)}}}",
     f"**/{RULES}/*.py",
 )
+#: Problems that the client may have dropped, as it does with a document that it opens again. They
+#: are published again, or withdrawn if there are none.
+_DROPPED: tuple[int | None, bytes] = (None, b"")
 #: A client's name for showing documents which are no files.
 CONTENT = "textDocumentContent"
 
@@ -255,7 +258,7 @@ class ServerState:
     def _open(self, params: parts.DidOpen) -> None:
         document = Document(params.text_document, self.root)
         self.documents[document.uri] = document
-        self.published.pop(document.uri, None)  # the client may have dropped it since
+        self.published[document.uri] = _DROPPED
         self._follow(document.path, document.data)
 
     def _change(self, params: parts.DidChange) -> None:

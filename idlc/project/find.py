@@ -329,12 +329,13 @@ class DiskSnapshot:
         self, folders: Mapping[Path, os.stat_result], files: Iterable[Path], begun: int
     ) -> None:
         now = time.time_ns()
-        self._stamps = {path: _stamp_of(status) for path, status in folders.items()}
-        for path in files:
-            stamp = _stamp(path)
-            # a file that changed since then may have been read before its change
-            is_new = any(begun - TICK <= at <= now for at in stamp[:2])
-            self._stamps[path] = _UNKNOWN if is_new else stamp
+        stamps = {path: _stamp_of(status) for path, status in folders.items()}
+        stamps |= {path: _stamp(path) for path in files}
+        for path, (written, changed, *_) in stamps.items():
+            # it may have changed again since it was read, within the same tick
+            if any(begun - TICK <= at <= now for at in (written, changed)):
+                stamps[path] = _UNKNOWN
+        self._stamps = stamps
 
     def is_current(self) -> bool:
         """Return whether all of them are certainly unchanged."""

@@ -9,6 +9,7 @@ import pytest
 from lsprotocol import types as lsp
 
 from idlc.cli.main import main
+from idlc.editor.problems import publish
 from idlc.editor.state import ServerState
 from tests.support.editor import at, between
 
@@ -365,3 +366,22 @@ def test_the_text_that_counts_is_that_of_the_document_which_is_edited():
         state.handle_notification("textDocument/didOpen", params)
     path = Path("/x/A.msg")
     assert state.texts()[path] == state.document_at(path).data
+
+
+def test_problems_of_a_file_that_was_renamed_meanwhile_are_withdrawn(package):
+    """Neovim opens, renames and closes a file, all between two publications."""
+    folder = package({"msg/A.msg": "flot64 x\n"})
+    published = []
+    state = ServerState(
+        {"workspaceFolders": [{"uri": folder.as_uri(), "name": ""}]},
+        lambda _, params: published.append((params["uri"], bytes(params["diagnostics"]) != b"[]")),
+        lambda *_: None,
+    )
+    uri = (folder / "msg/A.msg").as_uri()
+    document = {"uri": uri, "languageId": "rosmsg", "version": 0, "text": "flot64 x\n"}
+    publish(state)
+    state.handle_notification("textDocument/didOpen", {"textDocument": document})
+    (folder / "msg/A.msg").unlink()
+    state.handle_notification("textDocument/didClose", {"textDocument": {"uri": uri}})
+    publish(state)
+    assert published == [(uri, True), (uri, False)]

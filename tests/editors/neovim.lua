@@ -210,7 +210,10 @@ local look = {
     local function save()
       vim.cmd('silent wall')
       wait('end of errors', function()
-        return #vim.diagnostic.get(nil, { severity = vim.diagnostic.severity.ERROR }) == 0
+        -- an old one keeps those of deleted buffers, where nobody sees them
+        return #vim.tbl_filter(function(problem)
+          return vim.api.nvim_buf_is_valid(problem.bufnr)
+        end, vim.diagnostic.get(nil, { severity = vim.diagnostic.severity.ERROR })) == 0
       end)
       table.insert(steps, { 'disk', disk() })
     end

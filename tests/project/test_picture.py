@@ -57,6 +57,14 @@ def test_what_may_have_changed_while_it_was_read_is_not_trusted(file):
     assert not picture(file, begun).is_current()
 
 
+def test_a_folder_that_changed_while_it_was_listed_is_not_trusted(file):
+    """A second change within the tick, such as the end of a rename, has the same time."""
+    status = file.parent.stat()
+    begun = time.time_ns()
+    assert not DiskSnapshot({file.parent: status}, [], begun).is_current()
+    assert DiskSnapshot({file.parent: status}, [], begun + SECOND).is_current()
+
+
 def test_times_in_the_future_are_like_others(file):
     future = time.time_ns() + 1000 * SECOND
     os.utime(file, ns=(future, future))
