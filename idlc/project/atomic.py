@@ -182,7 +182,7 @@ def _lock(folder: Path, created: list[Path]) -> int | None:
 def uninterrupted() -> Iterator[None]:
     """Defer signals that would end the process."""
     if sys.platform == "win32":
-        with _without_ctrl_c():
+        with without_ctrl_c():
             yield
         return
     ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -223,8 +223,11 @@ def ended_by_errors() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _without_ctrl_c() -> Iterator[None]:
-    """Defer Ctrl-C where signals cannot be blocked; only the main thread receives it."""
+def without_ctrl_c() -> Iterator[None]:
+    """Defer Ctrl-C, also if other threads exist; only the main thread receives it.
+
+    To block the signal is not enough there, as the system gives it to any thread.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -233,6 +236,6 @@ def _without_ctrl_c() -> Iterator[None]:
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
         if pressed:
             signal.raise_signal(signal.SIGINT)

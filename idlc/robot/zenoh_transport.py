@@ -11,6 +11,7 @@ from typing import Any
 import zenoh
 from zenoh import CongestionControl, Reliability, ext
 
+from idlc.project.atomic import without_ctrl_c
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
@@ -21,7 +22,11 @@ _MOST_WAITING = 2**18
 
 
 class ZenohTransport:
-    """The declarations of one Zenoh session."""
+    """The declarations of one Zenoh session.
+
+    Zenoh can call back before one of its functions returns. It prints exceptions of callbacks and
+    goes on, so that a KeyboardInterrupt would be lost there.
+    """
 
     def __init__(self, session: zenoh.Session) -> None:
         self._session: Any = session
@@ -76,6 +81,7 @@ class ZenohTransport:
         queryable = self._session.declare_queryable(key, receive, complete=True)
         return _Declared(self._declared, queryable)
 
+    @without_ctrl_c()
     def call(
         self, key: str, payload: bytes, attachment: bytes, callback: OnReply, *, timeout: float
     ) -> None:
@@ -95,10 +101,12 @@ class ZenohTransport:
             timeout=timeout,
         )
 
+    @without_ctrl_c()
     def announce(self, token: str) -> Closeable:
         """Declare a liveliness token."""
         return _Declared(self._declared, self._liveliness.declare_token(token))
 
+    @without_ctrl_c()
     def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
         """Subscribe to liveliness tokens, with those that exist."""
 
@@ -118,7 +126,8 @@ class ZenohTransport:
                 replies.put(reply)
 
         end = partial(replies.put, None)
-        self._liveliness.get(pattern, _direct(receive, end), timeout=timeout)
+        with without_ctrl_c():
+            self._liveliness.get(pattern, _direct(receive, end), timeout=timeout)
         while (reply := replies.get()) is not None:
             if reply.ok is None:
                 raise TimeoutError
@@ -143,6 +152,7 @@ class _Declared:
         self._declaration = declaration
         declared.add(self)
 
+    @without_ctrl_c()
     def close(self) -> None:
         """Withdraw it."""
         if self not in self._declared:

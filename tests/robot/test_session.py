@@ -79,6 +79,32 @@ def test_a_session_that_knows_many_tokens_answers_its_own_question(sessions):
     assert answer == {each.token for each in right.graph.entities()}
 
 
+@pytest.mark.parametrize("method", ["announce", "close", "watch", "call"])
+def test_ctrl_c_in_a_callback_of_the_main_thread_is_not_lost(sessions, method):
+    """Zenoh prints exceptions of callbacks, and goes on."""
+    session, _ = sessions
+    transport, pattern, handled = session.transport, all_tokens(session.domain), []
+
+    def interrupted(*_):
+        signal.raise_signal(signal.SIGINT)
+        handled.append(method)
+
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012 - at the end, or where a thread hits it
+        token = transport.announce(entity(session).token)
+        if method == "call":
+            transport.service("0/a", lambda request: (interrupted(), request.drop()))
+            transport.call("0/a", b"", b"", lambda _: None, timeout=LONG)
+        elif method == "watch":
+            transport.watch(pattern, interrupted)
+        else:
+            watched = []
+            transport.watch(pattern, lambda *_: watched and interrupted())
+            watched.append(True)
+            transport.announce(entity(session).token) if method == "announce" else token.close()
+        time.sleep(LONG)
+    assert handled[:1] == [method]
+
+
 def test_a_session_sees_itself_and_no_other_domain(sessions):
     left, right = sessions
     left.transport.announce(entity(left, Kind.NODE).token)
