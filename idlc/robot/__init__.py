@@ -1,11 +1,11 @@
 """A live robot: its graph and types, and nodes without ROS, over the protocol of rmw_zenoh."""
 
-from idlc.robot.actions.client import ActionClient as ActionClient
-from idlc.robot.actions.client import ClientGoalHandle as ClientGoalHandle
-from idlc.robot.actions.goals import CancelResponse as CancelResponse
-from idlc.robot.actions.goals import GoalResponse as GoalResponse
-from idlc.robot.actions.server import ActionServer as ActionServer
-from idlc.robot.actions.server import ServerGoalHandle as ServerGoalHandle
+from idlc.robot.actions import ActionClient as ActionClient
+from idlc.robot.actions import ActionServer as ActionServer
+from idlc.robot.actions import CancelResponse as CancelResponse
+from idlc.robot.actions import ClientGoalHandle as ClientGoalHandle
+from idlc.robot.actions import GoalResponse as GoalResponse
+from idlc.robot.actions import ServerGoalHandle as ServerGoalHandle
 from idlc.robot.errors import RobotError as RobotError
 from idlc.robot.nodes.arguments import remove_ros_args as remove_ros_args
 from idlc.robot.nodes.clock import Clock as Clock

@@ -14,8 +14,7 @@ from idlc.robot import (
     Parameter,
     Service,
 )
-from idlc.robot.actions.client import ClientGoalHandle
-from idlc.robot.actions.goals import GoalState
+from idlc.robot.actions import ClientGoalHandle, GoalState
 from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.qos import qos_profile_action_status_default

@@ -1,31 +1,49 @@
-"""A server that accepts goals of clients, executes them, and answers with results."""
+"""Actions: servers that execute goals, and clients that send them, in the words of rclpy."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from enum import Enum, IntEnum
 from functools import partial
 from inspect import isawaitable
 from threading import RLock
 from time import monotonic
 from traceback import format_exc
 from typing import Any, TypeAlias
+from uuid import uuid4
 
-from idlc.robot.actions.goals import CancelResponse, GoalResponse, GoalState
 from idlc.robot.names import action_names
 from idlc.robot.nodes.executor import Future, ReentrantCallbackGroup
 from idlc.robot.nodes.interfaces import standard
+from idlc.robot.nodes.services import Client
 from idlc.robot.qos import qos_profile_action_status_default
 
-#: The states from which a goal can enter a state.
-BEFORE: dict[GoalState, tuple[GoalState, ...]] = {
-    GoalState.EXECUTING: (GoalState.ACCEPTED,),
-    GoalState.CANCELING: (GoalState.ACCEPTED, GoalState.EXECUTING),
-    GoalState.SUCCEEDED: (GoalState.EXECUTING, GoalState.CANCELING),
-    GoalState.CANCELED: (GoalState.CANCELING,),
-    GoalState.ABORTED: (GoalState.EXECUTING, GoalState.CANCELING),
+
+class GoalState(IntEnum):
+    """The state of a goal; the numbers are those of action_msgs/msg/GoalStatus."""
+
+    UNKNOWN = 0
+    ACCEPTED = 1
+    EXECUTING = 2
+    CANCELING = 3
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+
+#: The states of goals that have not ended, and the states that can follow.
+_NEXT: dict[GoalState, tuple[GoalState, ...]] = {
+    GoalState.ACCEPTED: (GoalState.EXECUTING, GoalState.CANCELING),
+    GoalState.EXECUTING: (GoalState.CANCELING, GoalState.SUCCEEDED, GoalState.ABORTED),
+    GoalState.CANCELING: (GoalState.CANCELED, GoalState.SUCCEEDED, GoalState.ABORTED),
 }
+
+#: The answer to a new goal.
+GoalResponse = Enum("GoalResponse", "REJECT ACCEPT")
+#: The answer to a request to cancel a goal.
+CancelResponse = Enum("CancelResponse", "REJECT ACCEPT")
 
 
 class ServerGoalHandle:
@@ -44,24 +62,23 @@ class ServerGoalHandle:
     @property
     def is_active(self) -> bool:
         """True until the goal has succeeded or aborted, or is canceled."""
-        return self.status <= GoalState.CANCELING
+        return self.status in _NEXT
 
     @property
     def is_cancel_requested(self) -> bool:
         """True if the server accepted a client's request to cancel."""
         return self.status is GoalState.CANCELING
 
-    def execute(self, execute_callback: GoalCallback | None = None) -> None:
-        """Execute the goal soon, by the callback of the server or another one."""
+    def execute(self) -> None:
+        """Execute the goal soon, by the callback of the server."""
         if not self.is_cancel_requested:
             self.enter(GoalState.EXECUTING)
-        self._server.start(self._server.execute, self, execute_callback)
+        self._server.start(self._server.execute, self)
 
     def publish_feedback(self, feedback: Any) -> None:
         """Send feedback to the clients; raise TypeError if it is of another type."""
-        publisher, action = self._server.feedback_publisher, self._server.action_type
-        if not isinstance(feedback, action.Feedback):
-            raise TypeError(f"{feedback!r} is not a {action.__name__}.Feedback")
+        publisher = self._server.feedback_publisher
+        _check_type(feedback, self._server.action_type, "Feedback")
         publisher.publish(publisher.interface.kind(goal_id=self.goal_id, feedback=feedback))
 
     def succeed(self) -> None:
@@ -79,7 +96,7 @@ class ServerGoalHandle:
     def enter(self, state: GoalState) -> None:
         """Change the state, and publish it; raise RuntimeError if it cannot follow."""
         with self._server.lock:
-            if self.status not in BEFORE[state]:
+            if state not in _NEXT.get(self.status, ()):
                 raise RuntimeError(f"a goal that is {self.status.name} cannot become {state.name}")
             self.status = state
             if not self.is_active:
@@ -126,22 +143,21 @@ class ActionServer:
         self._goals: dict[bytes, ServerGoalHandle] = {}
         #: For the states of goals, which are published in the order in which they change.
         self.lock = RLock()
-        names = action_names(node.resolve_service_name(action_name))
-        impl = action_type.Impl
+        names, impl = action_names(node.resolve_service_name(action_name)), action_type.Impl
         serve = partial(node.create_service, callback_group=callback_group)
         # requests for results wait until goals end
         serve_result = partial(node.create_service, callback_group=ReentrantCallbackGroup())
-        publish = node.create_publisher
-        status_type = _message("GoalStatusArray")
+        states, qos = standard("action_msgs/msg/GoalStatusArray"), qos_profile_action_status_default
         # in the order of rclpy, so that ids are equal; goals that arrive meanwhile wait
         with self.lock:
             self._services = (
                 serve(impl.SendGoalService, names.send_goal, self._accept),
-                serve(standard("action_msgs/srv/CancelGoal").kind, names.cancel_goal, self._cancel),
+                serve(standard("action_msgs/srv/CancelGoal"), names.cancel_goal, self._cancel),
                 serve_result(impl.GetResultService, names.get_result, self._answer_result),
             )
+            publish = node.create_publisher
             self.feedback_publisher = publish(impl.FeedbackMessage, names.feedback, 10)
-            self._status = publish(status_type, names.status, qos_profile_action_status_default)
+            self._status = publish(states, names.status, qos)
 
     def destroy(self) -> None:
         """Remove the services and topics; goals that are executed go on unseen."""
@@ -157,17 +173,16 @@ class ActionServer:
             states = [kind(goal_info=goal.info, status=goal.status) for goal in goals]
             self._status.publish(self._status.interface.kind(status_list=states))
 
-    def start(self, callback: Callable[..., Any], *arguments: Any) -> None:
+    def start(self, callback: GoalCallback, goal: ServerGoalHandle) -> None:
         """Call a function or coroutine as a task, unless the node was removed in the meantime."""
         if self._node.executor is not None:
-            self._node.executor.create_task(callback, *arguments)
+            self._node.executor.create_task(callback, goal)
 
-    async def execute(self, goal: ServerGoalHandle, callback: GoalCallback | None) -> None:
+    async def execute(self, goal: ServerGoalHandle) -> None:
         """Execute a goal, and respond to the requests for its result."""
         try:
-            result = await _result_of((callback or self._execute_callback)(goal))
-            if not isinstance(result, self.action_type.Result):
-                raise TypeError(f"{result!r} is not a {self.action_type.__name__}.Result")
+            result = await _result_of(self._execute_callback(goal))
+            _check_type(result, self.action_type, "Result")
         except Exception:
             self._logger.error(f"the callback that executes goals failed: {format_exc()}")
             result = self.action_type.Result()
@@ -180,9 +195,8 @@ class ActionServer:
     # services
 
     async def _accept(self, request: Any, response: Any) -> Any:
-        self._expire()
         key = bytes(request.goal_id.uuid)
-        if key in self._goals:
+        if key in self._kept_goals():
             self._logger.warning("the server rejects a goal, because another goal has the same id")
             return response
         answer = await _result_of(self._goal_callback(request.goal))
@@ -199,18 +213,16 @@ class ActionServer:
         return response
 
     async def _answer_result(self, request: Any, response: Any) -> Any:
-        self._expire()
-        goal = self._goals.get(bytes(request.goal_id.uuid))
+        goal = self._kept_goals().get(bytes(request.goal_id.uuid))
         return response if goal is None else await goal.response
 
     async def _cancel(self, request: Any, response: Any) -> Any:
-        self._expire()
         key, until = bytes(request.goal_info.goal_id.uuid), _time(request.goal_info.stamp)
         # an id means this goal, a time means all goals up to it, and neither means all goals
         limit = until or (-1 if any(key) else math.inf)
-        known = self._goals.items()
+        known = self._kept_goals().items()
         goals = [goal for id_, goal in known if id_ == key or _time(goal.info.stamp) <= limit]
-        active = [goal for goal in goals if goal.status in BEFORE[GoalState.CANCELING]]
+        active = [goal for goal in goals if GoalState.CANCELING in _NEXT.get(goal.status, ())]
         for goal in active:
             answer = await _result_of(self._cancel_callback(goal))
             if answer is CancelResponse.ACCEPT:
@@ -225,10 +237,114 @@ class ActionServer:
             response.return_code = response.ERROR_GOAL_TERMINATED
         return response
 
-    def _expire(self) -> None:
-        """Forget goals whose results were kept long enough."""
+    def _kept_goals(self) -> dict[bytes, ServerGoalHandle]:
+        """Return the goals by their ids, without those whose results were kept long enough."""
         oldest = monotonic() - self._timeout
         self._goals = {key: goal for key, goal in self._goals.items() if goal.ended_at >= oldest}
+        return self._goals
+
+
+class ClientGoalHandle:
+    """A goal that a server has answered; `accepted` is the answer, `stamp` its time."""
+
+    def __init__(self, client: ActionClient, goal_id: Any, response: Any) -> None:
+        self._client = client
+        self.goal_id = goal_id
+        self.accepted: bool = response.accepted
+        self.stamp = response.stamp
+
+    def cancel_goal_async(self) -> Future[Any]:
+        """Ask the server to cancel the goal; the future has the action_msgs/srv/CancelGoal."""
+        request = self._client.cancel_client.interface.kind.Request()
+        request.goal_info.goal_id = self.goal_id
+        return self._client.cancel_client.call_async(request)
+
+    def get_result_async(self) -> Future[Any]:
+        """Ask for the result; the future has a response with `status` and `result`."""
+        request = self._client.result_client.interface.kind.Request(goal_id=self.goal_id)
+        future = self._client.result_client.call_async(request)
+        callbacks = self._client.feedback_callbacks
+        future.add_done_callback(lambda _: callbacks.pop(bytes(self.goal_id.uuid), None))
+        return future
+
+
+class ActionClient:
+    """A client of an action."""
+
+    def __init__(
+        self, node: Any, action_type: Any, action_name: str, *, callback_group: Any = None
+    ) -> None:
+        self._node = node
+        self._type = action_type
+        self.feedback_callbacks: dict[bytes, Callable[[Any], Any] | None] = {}
+        names, impl = action_names(node.resolve_service_name(action_name)), action_type.Impl
+        # in the order of rclpy, so that ids are equal
+        client, cancel = node.create_client, standard("action_msgs/srv/CancelGoal")
+        self._send: Client[Any, Any] = client(impl.SendGoalService, names.send_goal)
+        self.cancel_client: Client[Any, Any] = client(cancel, names.cancel_goal)
+        self.result_client: Client[Any, Any] = client(impl.GetResultService, names.get_result)
+        self._clients = (self._send, self.cancel_client, self.result_client)
+        subscribe = partial(node.create_subscription, callback_group=callback_group)
+        states, qos = standard("action_msgs/msg/GoalStatusArray"), qos_profile_action_status_default
+        # the states of goals are ignored; their publisher shows that there is a server
+        self._subscriptions = (
+            subscribe(impl.FeedbackMessage, names.feedback, self._follow, 10),
+            subscribe(states, names.status, lambda _: None, qos),
+        )
+
+    def server_is_ready(self) -> bool:
+        """Return whether all services and topics of a server are there."""
+        return all(client.service_is_ready() for client in self._clients) and all(
+            subscription.get_publisher_count() for subscription in self._subscriptions
+        )
+
+    def wait_for_server(self, timeout_sec: float | None = None) -> bool:
+        """Wait until a server is there; return whether it is, for at most `timeout_sec` seconds."""
+        return bool(self._node.graph.wait_for(lambda _: self.server_is_ready(), timeout_sec))
+
+    def send_goal_async(
+        self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None
+    ) -> Future[ClientGoalHandle]:
+        """Send a goal; the future has a ClientGoalHandle when the server has answered.
+
+        `feedback_callback` gets messages with `feedback`. Raises TypeError if the goal is of
+        another type.
+        """
+        _check_type(goal, self._type, "Goal")
+        request = self._type.Impl.SendGoalService.Request(goal=goal)
+        key = uuid4().bytes
+        request.goal_id.uuid = [*key]
+        self.feedback_callbacks[key] = feedback_callback
+        sent: Future[ClientGoalHandle] = Future()
+
+        def answer(future: Future[Any]) -> None:
+            error = future.exception()
+            response = None if error else future.result()
+            if error is not None:
+                sent.set_exception(error)
+            elif response is not None:
+                sent.set_result(ClientGoalHandle(self, request.goal_id, response))
+            sent.cancel()  # if the request was
+            if response is None or not response.accepted:
+                self.feedback_callbacks.pop(key, None)
+
+        self._send.call_async(request).add_done_callback(answer)
+        return sent
+
+    def destroy(self) -> None:
+        """Remove the clients and subscriptions."""
+        for endpoint in (*self._clients, *self._subscriptions):
+            self._node.destroy_client(endpoint)
+
+    def _follow(self, message: Any) -> Any:
+        callback = self.feedback_callbacks.get(bytes(message.goal_id.uuid))
+        return callback and callback(message)
+
+
+def _check_type(message: Any, action: Any, part: str) -> None:
+    """Raise TypeError if a message is not this part of an action."""
+    if not isinstance(message, getattr(action, part)):
+        raise TypeError(f"{message!r} is not a {action.__name__}.{part}")
 
 
 def _time(stamp: Any) -> int:
