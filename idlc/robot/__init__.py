@@ -39,7 +39,7 @@ from idlc.robot.nodes.logger import get_logger as get_logger
 from idlc.robot.nodes.node import Node as Node
 from idlc.robot.nodes.services import Client as Client
 from idlc.robot.nodes.services import Service as Service
-from idlc.robot.parameters.values import Parameter as Parameter
+from idlc.robot.parameters import Parameter as Parameter
 from idlc.robot.qos import DurabilityPolicy as DurabilityPolicy
 from idlc.robot.qos import HistoryPolicy as HistoryPolicy
 from idlc.robot.qos import LivelinessPolicy as LivelinessPolicy

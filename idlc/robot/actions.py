@@ -53,7 +53,7 @@ class ServerGoalHandle:
         self._server = server
         self.request = request.goal
         self.goal_id = request.goal_id
-        self.info = _message("GoalInfo")(goal_id=request.goal_id, stamp=stamp)
+        self.info = standard("action_msgs/msg/GoalInfo").kind(goal_id=request.goal_id, stamp=stamp)
         self.status = GoalState.ACCEPTED
         self.ended_at = math.inf
         #: It ends with the response to clients that ask for the result.
@@ -169,7 +169,7 @@ class ActionServer:
     def publish_status(self) -> None:
         """Publish the states of all goals."""
         with self.lock:
-            kind, goals = _message("GoalStatus"), [*self._goals.values()]
+            kind, goals = standard("action_msgs/msg/GoalStatus").kind, [*self._goals.values()]
             states = [kind(goal_info=goal.info, status=goal.status) for goal in goals]
             self._status.publish(self._status.interface.kind(status_list=states))
 
@@ -349,10 +349,6 @@ def _check_type(message: Any, action: Any, part: str) -> None:
 
 def _time(stamp: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
-
-
-def _message(name: str) -> Any:
-    return standard(f"action_msgs/msg/{name}").kind
 
 
 async def _result_of(value: Any) -> Any:

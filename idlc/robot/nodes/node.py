@@ -20,10 +20,9 @@ from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Stre
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger
+from idlc.robot.nodes.overrides import overrides_of
 from idlc.robot.nodes.services import Client, Service
-from idlc.robot.parameters.declared import HasParameters, add_services
-from idlc.robot.parameters.overrides import overrides_of
-from idlc.robot.parameters.values import Parameter
+from idlc.robot.parameters import HasParameters, Parameter
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 from idlc.robot.session import Session
 
@@ -94,7 +93,7 @@ class Node(HasParameters):
             declare_overrides=automatically_declare_parameters_from_overrides,
         )
         if start_parameter_services:
-            add_services(self, self.create_service)
+            self._serve_parameters(self.create_service)
 
     # the node itself
 

@@ -15,10 +15,8 @@ import yaml
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.nodes.arguments import Arguments
-from idlc.robot.parameters.values import Parameter
+from idlc.robot.parameters import Parameter
 
-#: A file has at most this many characters of names and values, each alias counted as what it means.
-MOST_CHARACTERS = 1_000_000
 _MARK = "ros__parameters"
 _PLAIN = "!plain"
 _STRING = "tag:yaml.org,2002:str"
@@ -52,18 +50,15 @@ def overrides_of(arguments: Arguments, node: str) -> dict[str, Parameter]:
 def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[str, Parameter]:
     """Return the parameters for a node in a file, or in a text that belongs below names."""
     parameters: dict[str, Parameter] = {}
-    left = MOST_CHARACTERS
     mark = None
     try:
         text = Path(source).read_text(encoding="utf-8") if text is None else text
+        for event in yaml.parse(text, _Loader):
+            if isinstance(event, yaml.AliasEvent):
+                raise yaml.MarkedYAMLError(None, None, "ROS 2 refuses aliases", event.start_mark)
         tree = yaml.compose(text, _Loader) or yaml.ScalarNode("nothing", "")
-        for path, value in _entries(tree, *names):
+        for path, value in [(names, tree)] if names else _entries(tree):
             mark = value.start_mark
-            left -= sum(map(len, path)) + len(value.value)
-            if left < 0:
-                raise ValueError("it has too many values")
-            if isinstance(value, yaml.MappingNode) and not names:
-                continue
             if _MARK not in path[:-1]:
                 raise ValueError(f"expected `node:`, `{_MARK}:` and `name: value`")
             end = path.index(_MARK)
@@ -79,13 +74,14 @@ def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[
 
 
 def _entries(node: yaml.Node, *names: str) -> Iterator[tuple[tuple[str, ...], yaml.Node]]:
-    """Yield a value with the names around it, and all values in it; follow aliases again."""
-    yield names, node
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode) or not key.value:
-                raise ValueError("a name is missing")
-            yield from _entries(value, *names, key.value)
+    """Yield the values in a node, each with the names around it."""
+    if not isinstance(node, yaml.MappingNode):
+        yield names, node
+        return
+    for key, value in node.value:
+        if not isinstance(key, yaml.ScalarNode) or not key.value:
+            raise yaml.MarkedYAMLError(None, None, "a name is missing", key.start_mark)
+        yield from _entries(value, *names, key.value)
 
 
 def _matches(pattern: str, node: str) -> bool:
@@ -101,11 +97,7 @@ def _matches(pattern: str, node: str) -> bool:
 
 def _value(node: yaml.Node) -> object:
     if isinstance(node, yaml.SequenceNode):
-        return [_scalar(item) for item in node.value]
-    return _scalar(node)
-
-
-def _scalar(node: yaml.Node) -> object:
+        return [_value(item) for item in node.value]
     if node.tag not in (_PLAIN, _STRING):
         raise ValueError(f"expected a value or a list of values, not {node.tag}")
     text: str = node.value
