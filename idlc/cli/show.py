@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,6 +25,8 @@ ROBOT_HEAD = ("", "name", "type", "hash", "here", "from", "to", "QoS")
 #: Nodes, profiles and mismatches that text lists.
 LISTED = 3
 MISMATCHES = 20
+#: Pairs of endpoints that JSON lists.
+MOST_MISMATCHES = 1000
 
 
 def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
@@ -102,7 +105,8 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
         entities = robot_entities(session)
     found = overview.connections(entities, LocalTypes(scope, report))
     nodes = sorted({end.node_name for end in entities if end.kind is Kind.NODE})
-    misfits, similar = overview.misfits(entities), overview.similar_names(found)
+    misfits = [*dict.fromkeys(islice(overview.mismatches(entities), MOST_MISMATCHES))]
+    similar = overview.similar_names(found)
     if style == "json":
         for node in nodes:
             output.fact(sys.stdout, "node", name=node)

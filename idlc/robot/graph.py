@@ -1,15 +1,14 @@
-"""The graph of a domain: its nodes and endpoints, from liveliness tokens, and mismatches in it."""
+"""The graph of a domain: its nodes and endpoints, from liveliness tokens."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
-from itertools import islice, product
+from collections.abc import Callable
+from itertools import islice
 from threading import Condition
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from idlc.robot.keys import Entity, Kind, all_tokens, parse_token
-from idlc.robot.qos import incompatible_policies
 from idlc.robot.transport import Transport
 
 #: The memory of a graph's entities, about so much for each and for each character of its token.
@@ -82,25 +81,11 @@ class Graph:
         """Stop watching; the entities stay as they are."""
         self._watch.close()
 
-    def entities(
-        self,
-        kind: Kind | None = None,
-        *,
-        name: str | None = None,
-        type: str | None = None,  # noqa: A002 - the word for it
-    ) -> tuple[Entity, ...]:
-        """Return the entities of this kind, with this absolute name and type."""
+    def entities(self, kind: Kind | None = None, name: str | None = None) -> tuple[Entity, ...]:
+        """Return the entities of this kind; with a kind and an absolute name, those of both."""
         with self._changed:
-            is_indexed = kind is not None and name is not None
-            known = self._named.get((kind, name), {}) if is_indexed else self._entities
-            entities = [*known.values()]
-        return tuple(
-            entity
-            for entity in entities
-            if kind in (None, entity.kind)
-            and name in (None, entity.name)
-            and type in (None, entity.type)
-        )
+            known = self._entities if name is None else self._named.get((kind, name), {})
+            return tuple(entity for entity in known.values() if kind in (None, entity.kind))
 
     def count(self, kind: Kind, name: str) -> int:
         """Return the number of publishers, say, of the topic with this absolute name."""
@@ -120,83 +105,28 @@ class Graph:
 
         The condition is called again after each change of the graph.
         """
-        end = None if timeout is None else time.monotonic() + timeout
         with self._changed:
-            while True:
-                result = condition(self)
-                left = None if end is None else end - time.monotonic()
-                if result or (left is not None and left <= 0):
-                    return result
-                self._changed.wait(left)
+            return self._changed.wait_for(lambda: condition(self), timeout)
 
     def _update(self, token: str, appears: bool) -> None:
-        with self._changed:
-            if self._add(token) if appears else self._remove(token):
-                self._changed.notify_all()
-
-    def _add(self, token: str) -> bool:
-        """Return whether a token is new and valid, and has room."""
-        if token in self._entities:
-            return False
-        entity = parse_token(token)
+        """Add a token if it is new and valid, and has room, or remove it."""
         size = ENTITY_BYTES + CHARACTER_BYTES * len(token)
-        if entity is None or self._bytes + size > self._limit:
-            self.is_full |= entity is not None
-            self.ignored += 1
-            return False
-        self._bytes += size
-        self._entities[token] = entity
-        self._named.setdefault((entity.kind, entity.name), {})[token] = entity
-        return True
-
-    def _remove(self, token: str) -> bool:
-        """Return whether the token was there."""
-        entity = self._entities.pop(token, None)
-        if entity is None:
-            return False
-        self._bytes -= ENTITY_BYTES + CHARACTER_BYTES * len(token)
-        same = self._named[entity.kind, entity.name]
-        del same[token]
-        if not same:
-            del self._named[entity.kind, entity.name]
-        return True
-
-
-class Mismatch(NamedTuple):
-    """Two endpoints of one name that do not fit together.
-
-    `sender` is a publisher or a client, `receiver` a subscription or a service. `reasons` contains
-    `type`, or `hash`, or names of QoS policies.
-    """
-
-    sender: Entity
-    receiver: Entity
-    reasons: tuple[str, ...]
-
-
-_PAIRS = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.CLIENT: Kind.SERVICE}
-#: A topic with more pairs than these is compared in part.
-MOST_PAIRS = 100_000
-
-
-def mismatches(entities: Iterable[Entity]) -> Iterator[Mismatch]:
-    """Yield the pairs of endpoints with one name that differ in type, version or QoS.
-
-    Endpoints without a hash fit every version.
-    """
-    places: dict[tuple[Kind, str], list[Entity]] = {}
-    for entity in entities:
-        places.setdefault((entity.kind, entity.name), []).append(entity)
-    for (kind, name), senders in sorted(places.items()):
-        receivers = places.get((_PAIRS[kind], name), []) if kind in _PAIRS else []
-        for sender, receiver in islice(product(senders, receivers), MOST_PAIRS):
-            if reasons := _reasons(sender, receiver):
-                yield Mismatch(sender, receiver, reasons)
-
-
-def _reasons(sender: Entity, receiver: Entity) -> tuple[str, ...]:
-    if sender.type != receiver.type:
-        return ("type",)
-    if sender.hash and receiver.hash and sender.hash != receiver.hash:
-        return ("hash",)
-    return incompatible_policies(sender.qos, receiver.qos)
+        with self._changed:
+            entity = self._entities.get(token)
+            if appears == (entity is not None):
+                return
+            entity = entity or parse_token(token)
+            if entity is None or (appears and self._bytes + size > self._limit):
+                self.is_full |= entity is not None
+                self.ignored += 1
+                return
+            same = self._named.setdefault((entity.kind, entity.name), {})
+            if appears:
+                self._bytes += size
+                self._entities[token] = same[token] = entity
+            else:
+                self._bytes -= size
+                del self._entities[token], same[token]
+                if not same:
+                    del self._named[entity.kind, entity.name]
+            self._changed.notify_all()

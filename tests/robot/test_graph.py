@@ -5,8 +5,9 @@ import threading
 import pytest
 
 from idlc.robot import graph as graph_module
-from idlc.robot.graph import Graph, Mismatch, mismatches
+from idlc.robot.graph import Graph
 from idlc.robot.keys import Entity, Kind
+from idlc.robot.live.overview import mismatches
 from idlc.robot.qos import QoSProfile, qos_profile_sensor_data
 
 HASH = "RIHS01_" + "0" * 64
@@ -81,7 +82,7 @@ def test_entities_are_selected_by_all_that_is_known():
     ]
     graph = Graph(Tokens(*(end.token for end in ends)), 0)
     assert graph.entities(Kind.PUBLISHER, name="/chatter") == tuple(ends[:2])
-    assert graph.entities(type="std_msgs/msg/Int8") == (ends[2],)
+    assert graph.entities(Kind.SUBSCRIPTION) == (ends[2],)
     assert graph.entities(Kind.CLIENT, name="/add") == ()
     assert graph.count(Kind.PUBLISHER, "/chatter") == 2
     assert graph.types(Kind.PUBLISHER, Kind.SUBSCRIPTION) == {
@@ -195,13 +196,10 @@ def test_waiting_ends_with_a_change_or_with_time():
     ],
 )
 def test_ends_of_one_name_are_compared(changed, reasons):
-    publisher, subscription = entity(Kind.PUBLISHER), entity(Kind.SUBSCRIPTION, 1, **changed)
-    expected = [Mismatch(publisher, subscription, reasons)] if reasons else []
-    assert [*mismatches([subscription, publisher])] == expected
-    client, service = entity(Kind.CLIENT), entity(Kind.SERVICE, 1, **changed)
-    assert [mismatch.reasons for mismatch in mismatches([client, service])] == (
-        [reasons] if reasons else []
-    )
+    expected = [("/chatter", "/talker", "/other", reasons)] if reasons else []
+    for sends, receives in ((Kind.PUBLISHER, Kind.SUBSCRIPTION), (Kind.CLIENT, Kind.SERVICE)):
+        sender, receiver = entity(sends), entity(receives, 1, node="other", **changed)
+        assert [*mismatches([receiver, sender])] == expected
 
 
 def test_many_ends_of_one_topic_do_not_cost_the_square():

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import islice
+from itertools import islice, product
 from typing import NamedTuple
 
 from idlc.compare.graph import Entity as Noun
 from idlc.diagnostics.text import near_pairs
 from idlc.recordings.definitions import interface_of, type_name
 from idlc.recordings.types import LocalTypes
-from idlc.robot.graph import mismatches
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.live.connect import place_of
-from idlc.robot.qos import QoSProfile
+from idlc.robot.qos import QoSProfile, incompatible_policies
 
 #: What every node has; the table leaves these services out.
 _OF_EVERY_NODE = ("rcl_interfaces/srv/", "type_description_interfaces/srv/")
 #: Names of one type that are compared with each other.
 MOST_NAMES = 500
-#: Pairs of endpoints that are listed.
-MOST_MISMATCHES = 1000
+_PAIRS = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.CLIENT: Kind.SERVICE}
+#: A topic with more pairs than these is compared in part.
+MOST_PAIRS = 100_000
 
 
 class Connection(NamedTuple):
@@ -68,13 +68,28 @@ def connections(entities: Iterable[Entity], local: LocalTypes) -> list[Connectio
     return found
 
 
-def misfits(entities: Iterable[Entity]) -> list[tuple[str, str, str, tuple[str, ...]]]:
-    """Return name, nodes and reasons of endpoints that do not fit, at most so many."""
-    pairs = (
-        (sender.name, sender.node_name, receiver.node_name, reasons)
-        for sender, receiver, reasons in islice(mismatches(entities), MOST_MISMATCHES)
-    )
-    return list(dict.fromkeys(pairs))
+def mismatches(entities: Iterable[Entity]) -> Iterator[tuple[str, str, str, tuple[str, ...]]]:
+    """Yield name, sender, receiver and differences of endpoints of one name that do not fit.
+
+    The differences are `type`, or `hash`, or names of QoS policies. Endpoints without a hash fit
+    every version.
+    """
+    places: dict[tuple[Kind, str], list[Entity]] = {}
+    for entity in entities:
+        places.setdefault((entity.kind, entity.name), []).append(entity)
+    for (kind, name), senders in sorted(places.items()):
+        receivers = places.get((_PAIRS[kind], name), []) if kind in _PAIRS else []
+        for sender, receiver in islice(product(senders, receivers), MOST_PAIRS):
+            if differences := _differences(sender, receiver):
+                yield name, sender.node_name, receiver.node_name, differences
+
+
+def _differences(sender: Entity, receiver: Entity) -> tuple[str, ...]:
+    if sender.type != receiver.type:
+        return ("type",)
+    if sender.hash and receiver.hash and sender.hash != receiver.hash:
+        return ("hash",)
+    return incompatible_policies(sender.qos, receiver.qos)
 
 
 def similar_names(found: Iterable[Connection]) -> Iterator[tuple[str, str]]:

@@ -88,8 +88,8 @@ class Endpoint(Ready):
     def count_others(self, kind: Kind) -> int:
         """Return the number of endpoints with the same name, type and hash."""
         own = self.entity
-        others = self.node.graph.entities(kind, name=own.name, type=own.type)
-        return sum(other.hash == own.hash for other in others)
+        others = self.node.graph.entities(kind, own.name)
+        return sum((other.type, other.hash) == (own.type, own.hash) for other in others)
 
     def decode(self, kind: Any, payload: bytes) -> Any:
         """Return a message; warn once in a while and return `None` if it is not one."""
