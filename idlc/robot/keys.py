@@ -15,13 +15,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from idlc.robot.names import dds_type, full_name, is_absolute, is_namespace, is_node_name, ros_type
-from idlc.robot.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSProfile,
-    ReliabilityPolicy,
-)
+from idlc.robot.qos import QoSProfile
 
 #: The longest token that idlc reads.
 MOST_TOKEN = 2048
@@ -32,8 +26,10 @@ _SECOND = 10**9
 _PREFIX = "@ros2_lv"
 #: A node, or a node and an endpoint: names, a type of DDS, a hash and QoS. `/` in names is `%`.
 _TOKEN = re.compile(
-    rf"{_PREFIX}/(\d{{1,6}})/([0-9a-f]{{1,32}})/(\d{{1,10}})/(\d{{1,10}})/(NN|M[PS]|S[SC])"
-    r"/([^/]+)/([^/]+)/([^/]+)(?:/([^/]+)/([^/]+)/(\w{1,128})/([^/]+))?(?:/|\Z)",
+    rf"{_PREFIX}/(?P<domain>\d{{1,6}})/(?P<session>[0-9a-f]{{1,32}})/(?P<node_id>\d{{1,10}})"
+    r"/(?P<id>\d{1,10})/(?:NN|(?P<kind>M[PS]|S[SC]))/(?P<enclave>[^/]+)/(?P<namespace>[^/]+)"
+    r"/(?P<node>[^/]+)(?(kind)/(?P<name>[^/]+)/(?P<type>[^/]+)/(?P<hash>\w{1,128})/(?P<qos>[^/]+))"
+    r"(?:/|\Z)",
     re.ASCII,
 )
 _QOS = "{}:{}:{},{}:{},{}:{},{}:{},{},{}"
@@ -124,30 +120,19 @@ def parse_token(token: str) -> Entity | None:
     match = _TOKEN.match(token) if len(token) <= MOST_TOKEN else None
     if match is None:
         return None
-    domain, session, node_id, id_, mark, *parts, hash_, qos_part = match.groups("")
-    enclave, namespace, node, name, dds = (part.replace("%", "/") for part in parts)
-    kind, type_, qos = Kind(mark), ros_type(dds), parse_qos(qos_part)
-    if not (is_namespace(enclave) and is_namespace(namespace) and is_node_name(node)):
+    parts: dict[str, Any] = match.groupdict("")
+    for name in ("enclave", "namespace", "node", "name", "type"):
+        parts[name] = parts[name].replace("%", "/")
+    type_, qos = ros_type(parts["type"]), parse_qos(parts["qos"])
+    is_endpoint = is_absolute(parts["name"]) and type_ and qos
+    if not (is_namespace(parts["enclave"]) and is_namespace(parts["namespace"])):
         return None
-    if kind is Kind.NODE:
-        name, type_, hash_, qos = "", "", "", QoSProfile()
-    elif not (is_absolute(name) and type_ and qos):
+    if not is_node_name(parts["node"]) or (parts["kind"] and not is_endpoint):
         return None
-    return Entity(
-        domain=int(domain),
-        session=session,
-        node_id=int(node_id),
-        id=int(id_),
-        kind=kind,
-        enclave=enclave,
-        namespace=namespace,
-        node=node,
-        name=name,
-        type=type_ or "",
-        hash="" if hash_ == NO_HASH else hash_,
-        qos=qos or QoSProfile(),
-        token=token,
-    )
+    parts |= {name: int(parts[name]) for name in ("domain", "node_id", "id")}
+    parts["hash"] = "" if parts["hash"] == NO_HASH else parts["hash"]
+    parts |= {"kind": Kind(parts["kind"] or Kind.NODE), "type": type_ or ""}
+    return Entity(**parts | {"qos": qos or QoSProfile(), "token": token})
 
 
 def _numbers(qos: QoSProfile) -> tuple[int, ...]:
@@ -177,17 +162,17 @@ def parse_qos(text: str) -> QoSProfile | None:
     if match is None:
         return None
     pairs = zip(match.groups(), _DEFAULTS, strict=True)
-    values = [int(number) if number else default for number, default in pairs]
+    numbers: Any = [int(number) if number else default for number, default in pairs]
     try:
         return QoSProfile(
-            reliability=ReliabilityPolicy(values[0]),
-            durability=DurabilityPolicy(values[1]),
-            history=HistoryPolicy(values[2]),
-            depth=values[3],
-            deadline=values[4] * _SECOND + values[5],
-            lifespan=values[6] * _SECOND + values[7],
-            liveliness=LivelinessPolicy(values[8]),
-            liveliness_lease_duration=values[9] * _SECOND + values[10],
+            reliability=numbers[0],
+            durability=numbers[1],
+            history=numbers[2],
+            depth=numbers[3],
+            deadline=numbers[4] * _SECOND + numbers[5],
+            lifespan=numbers[6] * _SECOND + numbers[7],
+            liveliness=numbers[8],
+            liveliness_lease_duration=numbers[9] * _SECOND + numbers[10],
         )
     except ValueError:
         return None

@@ -9,9 +9,11 @@ from typing import NamedTuple
 MOST_NAME = 247
 MOST_NODE_NAME = 255
 
-_PART = r"[A-Za-z_][A-Za-z0-9_]*"
-_ABSOLUTE = re.compile(rf"(?:/{_PART})+", re.ASCII)
-_RELATIVE = re.compile(rf"(?:~|(?:~/|/)?{_PART}(?:/{_PART})*)", re.ASCII)
+_ABSOLUTE = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]*)+", re.ASCII)
+_RULE = (
+    f"write at most {MOST_NAME} characters, such as `arm/joint_1`: letters, digits, `_`, and `/` "
+    "between parts that start with no digit"
+)
 _TYPE = re.compile(r"([a-z]\w*)/(msg|srv|action)/([A-Za-z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"([a-z]\w*)::(msg|srv|action)::dds_::([A-Za-z]\w*)_", re.ASCII)
 #: The longest name of a type.
@@ -65,40 +67,21 @@ def expand_namespace(namespace: str) -> str:
 
     Raises InvalidNameError if it is not valid.
     """
-    name = namespace if namespace.startswith("/") else f"/{namespace}"
-    if not is_namespace(name):
-        raise InvalidNameError(f"`{namespace}` is not a namespace; write `/robot/arm`")
-    return name
+    return "/" if namespace in ("", "/") else expand_name(namespace, "/", "")
 
 
 def expand_name(name: str, namespace: str, node: str) -> str:
     """Return the absolute name of a topic or service that a node calls `name`.
 
-    `~/x` is private to the node, `x` is in its namespace, `/x` is absolute; `{node}`, `{ns}` and
-    `{namespace}` are replaced. Raises InvalidNameError if the name is not valid.
+    `~/x` is private to the node, `x` is in its namespace, `/x` is absolute. Raises InvalidNameError
+    if the name is not valid.
     """
-    filled = name.replace("{node}", node)
-    for braces in ("{ns}", "{namespace}"):
-        filled = filled.replace(braces, namespace if filled.startswith(braces) else namespace[1:])
-    if not _RELATIVE.fullmatch(filled):
-        raise InvalidNameError(f"`{name}` is not a name; {_reason(filled)}")
-    if filled.startswith("~"):
-        filled = f"{full_name(namespace, node)}{filled[1:]}"
-    elif not filled.startswith("/"):
-        filled = full_name(namespace, filled)
-    if len(filled) > MOST_NAME:
-        raise InvalidNameError(f"`{name}` is too long; a name has at most {MOST_NAME} characters")
-    return filled
-
-
-def _reason(name: str) -> str:
-    if not name or name.endswith("/"):
-        return "it has no part after the last `/`"
-    if "//" in name:
-        return "it contains `//`"
-    if other := re.search(r"[^A-Za-z0-9_/~]", name):
-        return f"it contains {other[0]!r}; letters, digits, `_` and `/` are allowed"
-    return "`~` stands only at the start" if "~" in name else "a part starts with a digit"
+    absolute = name if name.startswith("/") else full_name(namespace, name)
+    if name == "~" or name.startswith("~/"):
+        absolute = full_name(namespace, node) + name[1:]
+    if not is_absolute(absolute):
+        raise InvalidNameError(f"`{name}` is not a name; {_RULE}")
+    return absolute
 
 
 class ActionParts(NamedTuple):

@@ -89,30 +89,20 @@ def open_session(
     ZENOH_CONFIG_OVERRIDE applies always. Only a configuration can admit other machines. Raises
     RobotError.
     """
-    zenoh = _import_zenoh()
     path = environ.get("ZENOH_SESSION_CONFIG_URI", "")
     if address:
         path = address.removeprefix(_FILE) if address.startswith(_FILE) else ""
-    if path:
-        config = _read(zenoh, path)
-    else:
-        endpoint = _checked(address) if address else f"tcp/localhost:{ROUTER_PORT}"
-        settings = {
-            "mode": "client" if address else "peer",
-            "connect/endpoints": [endpoint],
-            "connect/timeout_ms": int(timeout * 1000) if address else -1,
-            "connect/exit_on_failure": bool(address),
-            "listen/endpoints": _LOOPBACK,
-        }
-        config = _configured(zenoh.Config(), _COMMON | settings)
-    try:
-        return _open(zenoh, config, domain, environ)
-    except zenoh.ZError as error:
-        where = f"`{one_line(address or path)}`" if address or path else "the router"
-        raise RobotError(
-            f"{where} does not answer: {_reason(error)}",
-            f"is rmw_zenohd or `idlc robot router` running there? idlc waited {timeout:g} s",
-        ) from None
+    endpoint = _checked(address) if address and not path else f"tcp/localhost:{ROUTER_PORT}"
+    settings = {
+        "mode": "client" if address else "peer",
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": int(timeout * 1000) if address else -1,
+        "connect/exit_on_failure": bool(address),
+        "listen/endpoints": _LOOPBACK,
+    }
+    where = f"`{one_line(address or path)}`" if address or path else "the router"
+    hint = f"is rmw_zenohd or `idlc robot router` running there? idlc waited {timeout:g} s"
+    return _open(path or settings, domain, environ, f"{where} does not answer", hint)
 
 
 def open_router(
@@ -125,7 +115,6 @@ def open_router(
     Other machines reach it only if `listen` contains an address of theirs, such as
     `tcp/0.0.0.0:7447`. It runs until it is closed. Raises RobotError.
     """
-    zenoh = _import_zenoh()
     endpoints = [_checked(word) for word in listen]
     settings = {
         "mode": "router",
@@ -134,26 +123,9 @@ def open_router(
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
     }
-    try:
-        config = _configured(zenoh.Config(), _COMMON | settings)
-        return _open(zenoh, config, None, environ)
-    except zenoh.ZError as error:
-        raise RobotError(
-            f"no router can listen on {', '.join(endpoints)}: {_reason(error)}",
-            "is another router running? choose another port with `--listen tcp/127.0.0.1:7448`",
-        ) from None
-
-
-def _import_zenoh() -> Any:
-    try:
-        import xxhash  # noqa: F401 - the ids of endpoints need it
-        import zenoh
-    except ImportError as error:
-        raise RobotError(
-            f"eclipse-zenoh and xxhash are required: {error}",
-            'install it: `pip install "idlc[zenoh]"`',
-        ) from None
-    return zenoh
+    problem = f"no router can listen on {', '.join(endpoints)}"
+    hint = "is another router running? choose another port with `--listen tcp/127.0.0.1:7448`"
+    return _open(settings, None, environ, problem, hint)
 
 
 def _checked(endpoint: str) -> str:
@@ -163,6 +135,38 @@ def _checked(endpoint: str) -> str:
         return endpoint
     good = f"{match[1] if match else 'tcp/localhost'}:{ROUTER_PORT}"
     raise RobotError(f"`{one_line(endpoint)}` is not an endpoint", f"write `{good}`")
+
+
+def _open(
+    source: str | dict[str, Any],
+    domain: int | None,
+    environ: Mapping[str, str],
+    problem: str,
+    hint: str,
+) -> Session:
+    """Return a session with these settings, or of a file, and rmw_zenoh's environment variables."""
+    try:
+        import xxhash  # noqa: F401 - the ids of endpoints need it
+        import zenoh
+    except ImportError as error:
+        raise RobotError(
+            f"eclipse-zenoh and xxhash are required: {error}",
+            'install it: `pip install "idlc[zenoh]"`',
+        ) from None
+    from idlc.robot.zenoh_transport import ZenohTransport
+
+    text = environ.get("ROS_DOMAIN_ID", "").strip() or "0" if domain is None else str(domain)
+    if not (re.fullmatch("[0-9]{1,9}", text) and int(text) <= MOST_DOMAIN):
+        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0")
+    try:
+        if isinstance(source, str):
+            config = _read(zenoh, source)
+        else:
+            config = _configured(zenoh.Config(), _COMMON | source)
+        _override(config, environ.get("ZENOH_CONFIG_OVERRIDE", ""))
+        return Session(ZenohTransport(zenoh.open(config)), int(text))
+    except zenoh.ZError as error:
+        raise RobotError(f"{problem}: {_reason(error)}", hint) from None
 
 
 def _read(zenoh: Any, path: str) -> Any:
@@ -188,24 +192,17 @@ def _configured(config: Any, settings: Mapping[str, Any]) -> Any:
     return config
 
 
-def _open(zenoh: Any, config: Any, domain: int | None, environ: Mapping[str, str]) -> Session:
-    """Return a session with this configuration and those of rmw_zenoh's environment variables."""
-    text = environ.get("ROS_DOMAIN_ID", "").strip() or "0" if domain is None else str(domain)
-    if not (re.fullmatch("[0-9]{1,9}", text) and int(text) <= MOST_DOMAIN):
-        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0")
-    for item in environ.get("ZENOH_CONFIG_OVERRIDE", "").split(";"):
-        key, separator, value = item.partition("=")
+def _override(config: Any, settings: str) -> None:
+    """Apply the settings in ZENOH_CONFIG_OVERRIDE."""
+    for item in filter(str.strip, settings.split(";")):
+        key, _, value = item.partition("=")
         try:
-            if item.strip():
-                config.insert_json5(key.strip(), value.strip() if separator else "")
+            config.insert_json5(key.strip(), value.strip())
         except Exception as error:  # ValueError or ZError, by the version of eclipse-zenoh
             raise RobotError(
                 f"ZENOH_CONFIG_OVERRIDE has `{one_line(item)}`: {_reason(error)}",
                 'write `mode="client";connect/endpoints=["tcp/robot:7447"]`',
             ) from None
-    from idlc.robot.zenoh_transport import ZenohTransport
-
-    return Session(ZenohTransport(zenoh.open(config)), int(text))
 
 
 def _reason(error: Exception) -> str:

@@ -18,11 +18,6 @@ from idlc.robot.names import InvalidNameError, expand_name, expand_namespace
         ("/chatter", "/chatter"),
         ("~", "/ns/deep/talker"),
         ("~/private", "/ns/deep/talker/private"),
-        ("{node}/x", "/ns/deep/talker/x"),
-        ("/{node}", "/talker"),
-        ("{ns}/x", "/ns/deep/x"),
-        ("{namespace}/x", "/ns/deep/x"),
-        ("/x/{ns}/y", "/x/ns/deep/y"),
         ("_hidden/_a__b", "/ns/deep/_hidden/_a__b"),
         ("a" * 238, "/ns/deep/" + "a" * 238),
     ],
@@ -35,33 +30,18 @@ def test_names_are_expanded(name, expanded):
 def test_the_root_namespace_adds_nothing():
     assert expand_name("x", "/", "talker") == "/x"
     assert expand_name("~/x", "/", "talker") == "/talker/x"
-    assert expand_name("a/{ns}b", "/", "talker") == "/a/b"
 
 
 @pytest.mark.parametrize(
-    ("name", "reason"),
+    "name",
     [
-        ("", "no part after"),
-        ("/", "no part after"),
-        ("a/", "no part after"),
-        ("a//b", "contains `//`"),
-        ("a b", "contains ' '"),
-        ("a-b", "contains '-'"),
-        ("ä", "contains 'ä'"),
-        ("{other}", "contains '{'"),
-        ("a\n", "contains '\\n'"),
-        ("a/~", "only at the start"),
-        ("~x", "only at the start"),
-        ("1a", "starts with a digit"),
-        ("a/1", "starts with a digit"),
-        ("/~", "only at the start"),
-        ("a" * 239, "too long"),
+        *("", "/", "a/", "a//b", "a b", "a-b", "ä", "{node}", "a\n"),
+        *("a/~", "~x", "1a", "a/1", "/~", "a" * 239),
     ],
 )
-def test_invalid_names_are_refused_with_a_reason(name, reason):
-    with pytest.raises(InvalidNameError) as caught:
+def test_invalid_names_are_refused_with_the_rule(name):
+    with pytest.raises(InvalidNameError, match="is not a name; write at most 247 characters"):
         expand_name(name, "/ns/deep", "talker")
-    assert reason in str(caught.value)
 
 
 @given(st.text("/~_a1 {}ns.\n"))
