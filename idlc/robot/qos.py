@@ -96,10 +96,9 @@ QoSDurabilityPolicy = DurabilityPolicy
 QoSHistoryPolicy = HistoryPolicy
 QoSLivelinessPolicy = LivelinessPolicy
 
-qos_profile_default = QoSProfile(depth=10)
 qos_profile_system_default = QoSProfile()
 qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-qos_profile_services_default = qos_profile_default
+qos_profile_services_default = QoSProfile(depth=10)
 qos_profile_parameters = QoSProfile(depth=1000)
 qos_profile_parameter_events = qos_profile_parameters
 qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import filterfalse
 from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple
@@ -82,9 +81,9 @@ def find_endpoints(
     session.graph.wait_for(lambda _: all(map(is_there, names)), APPEARING)
     entities = robot_entities(session, *kinds)
     noun = "topic" if Kind.PUBLISHER in kinds else "service"
-    for name in filterfalse(is_there, names):
-        near = did_you_mean(name, {end.name for end in entities})
-        hint = near or f"`idlc show` lists the {noun}s"
+    known = {end.name for end in entities}
+    for name in sorted({*names} - known):
+        hint = did_you_mean(name, known) or f"`idlc show` lists the {noun}s"
         report.add(codes.NO_SUCH_TOPIC.of("", f"no {noun} `{one_line(name)}`", hint=hint))
     return [end for end in entities if end.name in names]
 
