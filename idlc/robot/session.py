@@ -144,7 +144,7 @@ def _open(
     problem: str,
     hint: str,
 ) -> Session:
-    """Return a session with these settings, or of a file, and rmw_zenoh's environment variables."""
+    """Return a session with these settings, or a file of them, and rmw_zenoh's variables."""
     try:
         import xxhash  # noqa: F401 - the ids of endpoints need it
         import zenoh
