@@ -78,6 +78,12 @@ class Future(futures.Future[T]):
         super().add_done_callback(lambda _: waiter())
 
 
+async def call(callback: Callable[..., Any], *args: Any) -> Any:
+    """Call a function or a coroutine function; return its result."""
+    result = callback(*args)
+    return await result if iscoroutine(result) else result
+
+
 class CallbackGroup:
     """Decides which callbacks may run while a coroutine of the group waits."""
 
@@ -139,20 +145,11 @@ class Ready:
         if callback is None:
             return False
         waiting = []
+        future: Future[Any] = Future(executor=executor)
+        future.wake_at_end(partial(group.end, waiting))
         if isinstance(group, MutuallyExclusiveCallbackGroup):
             group.waiting = waiting
-        future: Future[Any] | None = None
-        try:
-            result = callback()
-            if iscoroutine(result):
-                future = Future(executor=executor)
-                future.wake_at_end(partial(group.end, waiting))
-                executor.step(future, result)
-        finally:
-            # the end of a coroutine comes later
-            if future is None:
-                group.end(waiting)
-        return True
+        return executor.step(future, callback)
 
 
 class Executor(AbstractContextManager["Executor"]):
@@ -198,20 +195,16 @@ class Executor(AbstractContextManager["Executor"]):
         """Run a function, or a coroutine to its next `await`; the future gets the result."""
         if future.done():
             return True
+        coroutine = work if iscoroutine(work) else call(work)
         try:
-            if not iscoroutine(work):
-                work = work()
-                if not iscoroutine(work):
-                    future.set_result(work)
-                    return True
-            awaited = work.send(None)
+            awaited = coroutine.send(None)
         except StopIteration as end:
             future.set_result(end.value)
         except BaseException as error:
             future.set_exception(error)
             raise
         else:
-            resume = partial(self.schedule, self.step, future, work)
+            resume = partial(self.schedule, self.step, future, coroutine)
             if isinstance(awaited, Future):
                 awaited.wake_at_end(resume)
             else:

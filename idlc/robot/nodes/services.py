@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -14,7 +13,7 @@ from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
 from idlc.robot.nodes.endpoints import Bounded, Endpoint, is_instance
-from idlc.robot.nodes.executor import Future
+from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
 from idlc.robot.transport import Closeable, Request, Sample
 from idlc.runtime.names import DecodeError
@@ -72,9 +71,7 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
     async def _answer(self, request: Request, attachment: Attachment, message: RequestT) -> None:
         kind = self.interface.kind.Response
         try:
-            response: Any = self.callback(message, kind())
-            if inspect.iscoroutine(response):
-                response = await response
+            response = await call(self.callback, message, kind())
             if not is_instance(response, kind):
                 problem = f"returned {type(response).__name__}, not its response"
                 raise TypeError(f"the callback of `{self.srv_name}` {problem}")
