@@ -41,7 +41,7 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.utilities": "get_default_context ok remove_ros_args shutdown try_shutdown",
 }
 #: The modules of idlc that provide the names.
-_HOMES = "robot robot.nodes.node robot.parameters robot.qos".split()
+_HOMES = "robot robot.nodes.context robot.nodes.node robot.parameters robot.qos".split()
 
 
 def _attribute(module: str, name: str) -> Any:

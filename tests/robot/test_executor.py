@@ -1,5 +1,6 @@
 """The executor, futures, tasks, timers, clocks, arguments and loggers, without a network."""
 
+import math
 import sys
 
 import pytest
@@ -52,7 +53,7 @@ def executor():
 
 def simulated():
     clock = Clock(clock_type=ClockType.ROS_TIME)
-    clock.simulate(0)
+    clock.simulated = 0
     return clock
 
 
@@ -101,6 +102,13 @@ def test_exceptions_are_raised_by_the_spin_and_to_who_awaits(executor):
     with pytest.raises(KeyError):
         task.result()
     assert isinstance(task.exception(), KeyError)
+
+
+def test_a_function_that_raises_stop_iteration_has_no_result(executor):
+    task = executor.create_task(next, iter(()))
+    with pytest.raises(RuntimeError):
+        executor.spin_once()
+    assert isinstance(task.exception(), RuntimeError)
 
 
 def test_a_cancelled_coroutine_does_not_go_on(executor):
@@ -163,7 +171,7 @@ def test_callbacks_of_a_group_wait_while_one_spins(executor):
     group = MutuallyExclusiveCallbackGroup()
     timers = Timer(spin, group, 10, clock), Timer(lambda: calls.append("other"), group, 10, clock)
     executor.add_node(Timers(*timers))
-    clock.simulate(10)
+    clock.simulated = 10
     executor.spin_once(timeout_sec=0)
     executor.spin_once(timeout_sec=0)
     assert calls == ["begin", "end", "other"]
@@ -179,7 +187,7 @@ def test_a_group_goes_on_after_an_interrupt(executor):
     timer = Timer(interrupt, MutuallyExclusiveCallbackGroup(), 10, clock)
     executor.add_node(Timers(timer))
     for now in (10, 20):
-        clock.simulate(now)
+        clock.simulated = now
         with pytest.raises(KeyboardInterrupt):
             executor.spin_once(timeout_sec=0)
     assert calls == [10, 20]
@@ -216,8 +224,8 @@ def test_timers_are_called_on_time(executor, hours):
     node = Timers(*timers)
     executor.add_node(node)
     for second in range(1, hours * HOUR + 1):
-        clock.simulate(second * SECOND)
-        while any(timer.is_ready() for timer in timers):
+        clock.simulated = second * SECOND
+        while any(timer.nanoseconds_left() <= 0 for timer in timers):
             executor.spin_once(timeout_sec=0)
     assert calls == {period: hours * HOUR // period for period in calls}
     assert executor._queue.qsize() == 0
@@ -228,7 +236,7 @@ def test_late_calls_are_left_out(executor):
     timer = Timer(lambda: calls.append(clock.now().nanoseconds), None, 10, clock)
     executor.add_node(Timers(timer))
     for now in (9, 10, 35, 39, 40):
-        clock.simulate(now)
+        clock.simulated = now
         executor.spin_once(timeout_sec=0)
         executor.spin_once(timeout_sec=0)
     assert calls == [10, 35, 40]
@@ -240,16 +248,16 @@ def test_timers_stop_and_begin_again(executor):
     timer = Timer(lambda: calls.append(1), None, 10, clock)
     timer.cancel()
     executor.add_node(Timers(timer))
-    clock.simulate(100)
-    assert timer.is_canceled()
+    clock.simulated = 100
+    assert timer.nanoseconds_left() == math.inf
     executor.spin_once(timeout_sec=0)
     timer.reset()
-    clock.simulate(109)
-    assert not timer.is_ready()
-    clock.simulate(110)
+    clock.simulated = 109
+    assert timer.nanoseconds_left() == 1
+    clock.simulated = 110
     executor.spin_once(timeout_sec=0)
     assert calls == [1]
-    clock.simulate(5)  # time moved back: a period begins
+    clock.simulated = 5  # time moved back: a period begins
     assert timer.nanoseconds_left() == 10
     timer.destroy()
     timer.destroy()
@@ -267,8 +275,9 @@ def test_times_and_durations_are_numbers():
     assert Duration(nanoseconds=1) < Duration(nanoseconds=2)
     assert len({time, Time(seconds=1, nanoseconds=5), Duration(seconds=1)}) == 2
     assert Time.from_msg(time.to_msg(), ClockType.SYSTEM_TIME) == time
-    assert Duration.from_msg(Duration(nanoseconds=-1).to_msg()) == Duration(nanoseconds=-1)
-    assert repr(time) == "Time(nanoseconds=1000000005, clock_type=SYSTEM_TIME)"
+    before = Duration(nanoseconds=-1).to_msg()
+    assert (before.sec, before.nanosec) == (-1, SECOND - 1)
+    assert repr(time) == "Time(nanoseconds=1000000005)"
     assert repr(Duration(nanoseconds=1)) == "Duration(nanoseconds=1)"
     with pytest.raises(TypeError, match="are of different clocks"):
         time < Time(clock_type=ClockType.ROS_TIME)  # noqa: B015
@@ -376,22 +385,15 @@ def test_a_line_can_log_once_or_now_and_then(lines, monkeypatch):
     for now in range(5):
         seconds = now
         logger.info(f"once {now}", once=True)
-        logger.info(f"rest {now}", skip_first=now < 3)
         logger.info(f"now {now}", throttle_duration_sec=2)
     logger.info("x", throttle_duration_sec=10**9)
-    expected = ["once 0", "now 0", "rest 1", "rest 2", "now 2", "rest 3", "rest 4", "now 4", "x"]
-    assert lines() == expected
+    assert lines() == ["once 0", "now 0", "now 2", "now 4", "x"]
 
 
-def test_colours_and_format_are_those_of_ros(capsys, monkeypatch):
+def test_the_format_is_that_of_ros(capsys, monkeypatch):
     get_logger("a").error("x")
     text = capsys.readouterr().err
     assert text.startswith("[ERROR] [")
     assert text.endswith("] [a]: x\n")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    get_logger("a").error("x")
-    text = capsys.readouterr().err
-    assert text.startswith("\033[31m[ERROR] [")
-    assert text.endswith("] [a]: x\033[0m\n")
     monkeypatch.setattr(sys, "stderr", None)
     assert get_logger("a").error("x")

@@ -364,9 +364,9 @@ def test_overrides_replace_defaults(router):
         assert node.declare_parameter("more", 1).value == 1
         with pytest.raises(parameters.InvalidParameterTypeException, match="INTEGER, not DOUBLE"):
             node.declare_parameter("typed", 1)
-        assert node.get_clock().ros_time_is_active
+        assert node.get_clock().simulated is not None
         node.set_parameters([Parameter("use_sim_time", value=False)])
-        assert not node.get_clock().ros_time_is_active
+        assert node.get_clock().simulated is None
     with node_at(
         router,
         "all",

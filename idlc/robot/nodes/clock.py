@@ -43,6 +43,9 @@ class _Nanoseconds:
     def __hash__(self) -> int:
         return hash(self.nanoseconds)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(nanoseconds={self.nanoseconds})"
+
     def _number(self, other: _Nanoseconds) -> int:
         """Return the nanoseconds of the other; raise TypeError if it cannot be compared."""
         if self.clock_type is not other.clock_type:
@@ -59,14 +62,6 @@ class _Nanoseconds:
 class Duration(_Nanoseconds):
     """A number of nanoseconds, which can be negative."""
 
-    def __repr__(self) -> str:
-        return f"Duration(nanoseconds={self.nanoseconds})"
-
-    @classmethod
-    def from_msg(cls, msg: Any) -> Duration:
-        """Return the duration in a message."""
-        return cls(nanoseconds=msg.sec * _SECOND + msg.nanosec)
-
 
 class Time(_Nanoseconds):
     """A time of a clock, in nanoseconds."""
@@ -78,9 +73,6 @@ class Time(_Nanoseconds):
         self.clock_type = clock_type
         if not 0 <= self.nanoseconds < 2**63:
             raise ValueError(f"a time must be between 0 and 2**63 ns, not {self.nanoseconds}")
-
-    def __repr__(self) -> str:
-        return f"Time(nanoseconds={self.nanoseconds}, clock_type={self.clock_type.name})"
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
         """Return whole seconds, and the nanoseconds after them."""
@@ -102,30 +94,22 @@ class Time(_Nanoseconds):
 
 
 class Clock:
-    """A clock; one of ROS_TIME is the system's, or simulated after `simulate`."""
+    """A clock; one of ROS_TIME is the system's, or simulated."""
 
     def __init__(self, *, clock_type: ClockType = _SYSTEM) -> None:
         self.clock_type = clock_type
-        self._simulated: int | None = None
-
-    @property
-    def ros_time_is_active(self) -> bool:
-        """True if the time is simulated."""
-        return self._simulated is not None
+        #: The simulated time in nanoseconds, `None` for the real one.
+        self.simulated: int | None = None
 
     def now(self) -> Time:
         """Return the time now."""
-        is_system = not self.ros_time_is_active and self.clock_type is not ClockType.STEADY_TIME
+        is_system = self.simulated is None and self.clock_type is not ClockType.STEADY_TIME
         nanoseconds = time.time_ns() if is_system else self.elapsed()
         return Time(nanoseconds=nanoseconds, clock_type=self.clock_type)
 
     def elapsed(self) -> int:
         """Return nanoseconds that do not jump when the clock of the system is set, for timers."""
-        return time.monotonic_ns() if self._simulated is None else self._simulated
-
-    def simulate(self, nanoseconds: int | None) -> None:
-        """Set the simulated time, `None` for the real one."""
-        self._simulated = nanoseconds
+        return time.monotonic_ns() if self.simulated is None else self.simulated
 
 
 class Timer(Ready):
@@ -160,10 +144,6 @@ class Timer(Ready):
         if self._executor is not None:
             self._executor.wake()
 
-    def is_canceled(self) -> bool:
-        """Return whether the timer is cancelled."""
-        return self._next == math.inf
-
     def nanoseconds_left(self) -> float:
         """Return nanoseconds until the next call, infinite if cancelled, negative if it is late."""
         left = self._next - self.clock.elapsed()
@@ -172,17 +152,13 @@ class Timer(Ready):
             return self.timer_period_ns
         return left
 
-    def is_ready(self) -> bool:
-        """Return whether a call is due."""
-        return self.nanoseconds_left() <= 0
-
     def wake_if_ready(self) -> float:
         """Queue a call that is due; return seconds for which an executor can wait."""
         left = self.nanoseconds_left()
         if left <= 0:
             self.wake()
         # /clock ends the wait for simulated time
-        return math.inf if left <= 0 or self.clock.ros_time_is_active else left / 1e9
+        return math.inf if left <= 0 or self.clock.simulated is not None else left / 1e9
 
     def take(self) -> Callback | None:
         """Return the callback if it is due."""

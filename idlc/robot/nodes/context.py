@@ -37,12 +37,28 @@ class Context(AbstractContextManager["Context"]):
         #: Objects with a method `wake` to call at shutdown, also in a signal handler.
         self.sleepers: WeakSet[Any] = WeakSet()
 
-    def init(self, args: Sequence[str] | None = None, address: str = "") -> None:
-        """Begin; see the function `init`."""
+    def init(
+        self,
+        args: Sequence[str] | None = None,
+        *,
+        signal_handler_options: SignalHandlerOptions = SignalHandlerOptions.ALL,
+        address: str = "",
+    ) -> Context:
+        """Begin; the result can be used in a `with` statement, which shuts it down.
+
+        `args` are those of the program, `sys.argv` by default. `address` is a robot, such as
+        `tcp/robot:7447`; without it, the session is as rmw_zenoh's (see `open_session`). Ctrl-C
+        and SIGTERM shut the default context down. Raises RobotError.
+        """
         if self._is_valid:
             raise RobotError("the context is initialized already", "call `shutdown()` first")
         self.arguments = parse_arguments(sys.argv if args is None else args)
         self._address, self._is_valid = address, True
+        is_wanted = self is _default and signal_handler_options is not SignalHandlerOptions.NO
+        if is_wanted and threading.current_thread() is threading.main_thread():
+            for number in {signal.SIGINT, signal.SIGTERM} - _previous.keys():
+                _previous[number] = signal.signal(number, _handle)
+        return self
 
     @property
     def session(self) -> Session:
@@ -67,7 +83,10 @@ class Context(AbstractContextManager["Context"]):
             sleeper.wake()
 
     def shutdown(self) -> None:
-        """End all waits, and close the session if the context opened it. May be called again."""
+        """Shut down: nodes leave the graph, and executors stop. May be called again.
+
+        A session that was given is not closed.
+        """
         self.invalidate()
         with self._lock:
             session, self._session = self._session, None
@@ -92,28 +111,6 @@ def get_default_context() -> Context:
     return _default
 
 
-def init(
-    *,
-    args: Sequence[str] | None = None,
-    context: Context | None = None,
-    signal_handler_options: SignalHandlerOptions | None = None,
-    address: str = "",
-) -> Context:
-    """Begin; the result can be used in a `with` statement, which shuts it down.
-
-    `args` are those of the program, `sys.argv` by default. `address` is a robot, such as
-    `tcp/robot:7447`; without it, the session is as rmw_zenoh's (see `open_session`). Ctrl-C
-    and SIGTERM shut the default context down. Raises RobotError.
-    """
-    chosen = context or _default
-    chosen.init(args, address)
-    is_wanted = chosen is _default and signal_handler_options is not SignalHandlerOptions.NO
-    if is_wanted and threading.current_thread() is threading.main_thread():
-        for number in {signal.SIGINT, signal.SIGTERM} - _previous.keys():
-            _previous[number] = signal.signal(number, _handle)
-    return chosen
-
-
 def _handle(number: int, frame: Any) -> None:
     _default.invalidate()
     # of Ctrl-C, the one that raises KeyboardInterrupt
@@ -121,15 +118,6 @@ def _handle(number: int, frame: Any) -> None:
         previous(number, frame)
 
 
-def shutdown(*, context: Context | None = None) -> None:
-    """Shut a context down: nodes leave the graph, and executors stop. May be called again."""
-    (context or _default).shutdown()
-
-
+init, ok, shutdown = _default.init, _default.ok, _default.shutdown
 #: In rclpy, `shutdown` fails if it is called twice.
 try_shutdown = shutdown
-
-
-def ok(*, context: Context | None = None) -> bool:
-    """Return whether a context is initialized and not shut down."""
-    return (context or _default).ok()

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
-from idlc.robot.nodes.endpoints import Endpoint
 from idlc.runtime.typeinfo import types_of
 
 SERVICE = "type_description_interfaces/srv/GetTypeDescription"
 
 
-def describe(endpoints: Sequence[Endpoint], request: Any, response: Any) -> Any:
-    """Fill in the response to a request, from the types that a node uses."""
-    used = {each.interface.name: each.interface for each in endpoints}
+def describe(node: Any, request: Any, response: Any) -> Any:
+    """Fill in the response to a request, from the types that a Node uses."""
+    used = {each.interface.name: each.interface for each in node.endpoints}
     interface = used.get(request.type_name)
     if interface is None or request.type_hash not in ("", interface.hash):
         problem = f"uses the hash {interface.hash}" if interface else "does not use this type"

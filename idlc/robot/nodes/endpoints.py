@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import suppress
 from functools import partial
-from itertools import count, repeat
+from itertools import count
 from threading import Lock
 from time import time_ns
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
@@ -75,21 +75,26 @@ class Endpoint(Ready):
         if self.deadline is not None:
             self.node.destroy_timer(self.deadline)
 
-    def watch(self, events: EventCallbacks | None) -> None:
+    def watch(self, callback: Callable[[int], Any] | None) -> None:
         """Call back if no message came in time; the first message begins the period."""
-        callback, period = events and events.deadline, self.qos_profile.deadline
-        if callback is not None and period < FOLLOWS:
-            infos = map(DeadlineInfo, count(1), repeat(1))
-            miss, clock = (lambda: callback(next(infos))), Clock(clock_type=ClockType.STEADY_TIME)
-            self.deadline = Timer(miss, self.callback_group, period, clock)
+        seconds, misses = self.qos_profile.deadline / 1e9, count(1)
+        if callback is not None and self.qos_profile.deadline < FOLLOWS:
+            miss, clock = (lambda: callback(next(misses))), Clock(clock_type=ClockType.STEADY_TIME)
+            self.deadline = self.node.create_timer(seconds, miss, self.callback_group, clock)
             self.deadline.cancel()
-            self.node.add(self.deadline)
 
     def count_others(self, kind: Kind) -> int:
         """Return the number of endpoints with the same name, type and hash."""
         own = self.entity
         others = self.node.graph.entities(kind, own.name)
         return sum((other.type, other.hash) == (own.type, own.hash) for other in others)
+
+    def encode(self, kind: Any, message: Any) -> bytes:
+        """Return a message as CDR; raise TypeError if it is not of this class or a copy of it."""
+        if not (isinstance(message, kind) or is_copy(kind, type(message))):
+            needs = f"needs {kind.__name__}, not {type(message).__name__}"
+            raise TypeError(f"`{self.topic_name}` of {self.interface.name} {needs}")
+        return bytes(message.serialize())
 
     def decode(self, kind: Any, payload: bytes) -> Any:
         """Return a message; warn once in a while and return `None` if it is not one."""
@@ -100,11 +105,6 @@ class Endpoint(Ready):
             text = f"`{self.topic_name}`: idlc ignores data that is not {self.interface.name}: "
             self.node.get_logger().warning(text + one_line(str(error)), throttle_duration_sec=10.0)
             return None
-
-
-def is_instance(value: Any, kind: Any) -> bool:
-    """Return whether a message is of this class or of a copy of it."""
-    return isinstance(value, kind) or is_copy(kind, type(value))
 
 
 class Bounded(Generic[T]):
@@ -124,12 +124,11 @@ class Bounded(Generic[T]):
         dropped = []
         size += _OVERHEAD
         with self._lock:
-            items = self._items
-            while items and (len(items) == self._depth or self._size + size > MOST_QUEUED):
-                oldest, other = items.popleft()
+            while self and (len(self) == self._depth or self._size + size > MOST_QUEUED):
+                oldest, other = self._items.popleft()
                 self._size -= oldest
                 dropped.append(other)
-            items.append((size, item))
+            self._items.append((size, item))
             self._size += size
         return dropped
 
@@ -143,23 +142,6 @@ class Bounded(Generic[T]):
             return item
 
 
-class DeadlineInfo(NamedTuple):
-    """The argument of a deadline's callback."""
-
-    total_count: int
-    total_count_change: int
-
-
-class EventCallbacks(NamedTuple):
-    """Callbacks for events: `deadline` if no message came in the period of the profile."""
-
-    deadline: Callable[[DeadlineInfo], Any] | None = None
-
-
-PublisherEventCallbacks = EventCallbacks
-SubscriptionEventCallbacks = EventCallbacks
-
-
 class Publisher(Endpoint, Generic[M]):
     """Sends messages of a topic, from any thread."""
 
@@ -171,17 +153,15 @@ class Publisher(Endpoint, Generic[M]):
         # looked up once, as each call and attribute is a few per cent of a small message
         self._put, self._pack, self._gid = sender.put, ATTACHMENT.pack, self.entity.gid
         self._numbers = count(1)
-        self._class: Any = None
         return (sender,)
 
-    def publish(self, msg: M | bytes) -> None:
-        """Send a message, or one that is encoded already.
+    def publish(self, msg: M) -> None:
+        """Send a message.
 
         Raises TypeError for another class, ValidationError for a value that its field cannot hold,
         and RobotError after the publisher was destroyed.
         """
-        message: Any = msg  # type checkers do not see that `bytes` go the other way
-        payload = message.serialize() if msg.__class__ is self._class else self._encode(msg)
+        payload = self.encode(self.interface.kind, msg)
         attachment = self._pack(next(self._numbers), time_ns(), GID_SIZE, self._gid)
         try:
             self._put(payload, attachment=attachment)
@@ -189,15 +169,6 @@ class Publisher(Endpoint, Generic[M]):
             raise RobotError(f"`{self.topic_name}`: {one_line(str(error))}") from None
         if self.deadline is not None:
             self.deadline.begin_period()
-
-    def _encode(self, msg: Any) -> bytes:
-        if isinstance(msg, (bytes, bytearray, memoryview)):
-            return bytes(msg)
-        self._class = self.interface.kind
-        if is_instance(msg, self._class):
-            return bytes(msg.serialize())
-        expected = f"{self.interface.name}, not {type(msg).__name__}"
-        raise TypeError(f"messages of `{self.topic_name}` are {expected}")
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions that receive the messages."""

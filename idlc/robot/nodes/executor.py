@@ -12,7 +12,6 @@ from contextlib import AbstractContextManager, suppress
 from functools import partial
 from inspect import iscoroutine
 from queue import Empty, SimpleQueue
-from threading import RLock
 from typing import Any, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
@@ -65,13 +64,13 @@ class Future(futures.Future[T]):
     def add_done_callback(self, callback: Callable[[Future[T]], Any]) -> None:
         """Call `callback` with the future when it is done or cancelled, at once if it is now."""
 
-        def call(_: object) -> None:
+        def run(_: object) -> None:
             if self.executor is None:
                 callback(self)
             else:
                 self.executor.create_task(callback, self)
 
-        super().add_done_callback(call)
+        super().add_done_callback(run)
 
     def wake_at_end(self, waiter: Callback) -> None:
         """Call `waiter` on the thread that ends the future, or now."""
@@ -137,9 +136,7 @@ class Ready:
             return False
         if (waiting := group.waiting) is not None:
             waiting.append(partial(executor.schedule, self.run, executor))
-            # otherwise another thread has ended the callback meanwhile, and may not see this one
-            if group.waiting is waiting:
-                return False
+            return False
         self._is_queued = False
         callback = self.take()
         if callback is None:
@@ -155,6 +152,7 @@ class Ready:
 class Executor(AbstractContextManager["Executor"]):
     """Runs the callbacks of nodes in the thread that spins; also rclpy's SingleThreadedExecutor.
 
+    Callbacks can spin it, too, but no other thread can at the same time.
     Exceptions of callbacks are raised by the method that spins.
     """
 
@@ -164,8 +162,6 @@ class Executor(AbstractContextManager["Executor"]):
         # its `put` may be called in signal handlers
         self._queue: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._is_shutdown = False
-        # threads that spin at the same time take turns; callbacks may spin
-        self._turn = RLock()
         self.context.sleepers.add(self)
 
     def add_node(self, node: Any) -> bool:
@@ -219,13 +215,12 @@ class Executor(AbstractContextManager["Executor"]):
         """End the current wait, so that the executor looks at timers and the context again."""
         self.schedule(lambda: False)
 
-    def shutdown(self, timeout_sec: Limit = None) -> bool:  # noqa: ARG002 - as in rclpy
+    def shutdown(self) -> None:
         """Stop spinning, and give up the nodes."""
         self._is_shutdown = True
         for node in [*self._nodes]:
             self.remove_node(node)
         self.wake()
-        return True
 
     def __exit__(self, *_: object) -> None:
         self.shutdown()
@@ -263,8 +258,7 @@ class Executor(AbstractContextManager["Executor"]):
             work = self._queue.get(timeout=max(0.0, wait))
         except Empty:
             return time.monotonic() >= end
-        with self._turn:
-            return work()
+        return work()
 
 
 SingleThreadedExecutor = Executor

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -21,12 +22,10 @@ class LoggingSeverity(IntEnum):
     FATAL = 50
 
 
-#: The colours of levels, as numbers of ANSI.
-_COLOURS = {10: 32, 30: 33, 40: 31, 50: 31}
 #: Levels by the name of a logger; the empty name is that of all others.
 _levels: dict[str, LoggingSeverity] = {}
-#: The times, in seconds, of the last messages of logging statements with options.
-_logged: dict[tuple[Any, int], float] = {}
+#: The times, in seconds, until which lines with options log nothing more.
+_quiet: dict[tuple[Any, int], float] = {}
 
 
 class Logger:
@@ -55,35 +54,24 @@ class Logger:
         return severity >= _levels.get(name, LoggingSeverity.INFO)
 
     def log(
-        self,
-        message: str,
-        severity: int,
-        *,
-        once: bool = False,
-        skip_first: bool = False,
-        throttle_duration_sec: float = 0.0,
+        self, message: str, severity: int, *, once: bool = False, throttle_duration_sec: float = 0
     ) -> bool:
         """Log a message; return whether it was logged.
 
-        The options apply to the line of the program: `once`, all times but the first, or once in
-        this many seconds.
+        The options apply to the line of the program: it logs `once`, or once in this many seconds.
         """
         if not self.is_enabled_for(severity):
             return False
         frame = sys._getframe(1)  # noqa: SLF001 - as rclpy and logging do
         code, line = frame.f_code, frame.f_lineno
-        if once or skip_first or throttle_duration_sec:
-            is_first, now = (code, line) not in _logged, time.monotonic()
-            last = _logged.setdefault((code, line), float("-inf"))
-            if (skip_first if is_first else once) or now - last < throttle_duration_sec:
+        if once or throttle_duration_sec:
+            now = time.monotonic()
+            if now < _quiet.get((code, line), now):
                 return False
-            _logged[code, line] = now
+            _quiet[code, line] = math.inf if once else now + throttle_duration_sec
         level, nanoseconds, message = LoggingSeverity(severity), time.time_ns(), _text(message)
-        seconds, rest = divmod(nanoseconds, 10**9)
-        text = f"[{level.name}] [{seconds}.{rest:09}] [{self.name}]: {message}"
-        if sys.stderr and sys.stderr.isatty() and (colour := _COLOURS.get(level)):
-            text = f"\033[{colour}m{text}\033[0m"
-        print(text, file=sys.stderr, flush=True)
+        stamp = f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09}"
+        print(f"[{level.name}] [{stamp}] [{self.name}]: {message}", file=sys.stderr, flush=True)
         if self._publish is not None:
             file = _text(code.co_filename)
             self._publish(nanoseconds, level, self.name, message, file, code.co_name, line)

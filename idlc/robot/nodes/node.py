@@ -16,7 +16,7 @@ from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.clock import Clock, ClockType, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
 from idlc.robot.nodes.descriptions import SERVICE, describe
-from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Stream, Subscription
+from idlc.robot.nodes.endpoints import Endpoint, Publisher, Stream, Subscription
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger
@@ -69,7 +69,8 @@ class Node(HasParameters):
             namespace=expand_namespace(place),
             node=name,
         )
-        self._executor: Executor | None = None
+        #: The executor that runs the callbacks; its method `add_node` sets it.
+        self.executor: Executor | None = None
         self.default_callback_group: CallbackGroup = MutuallyExclusiveCallbackGroup()
         self.endpoints: list[Endpoint] = []
         self.timers: list[Timer] = []
@@ -84,8 +85,7 @@ class Node(HasParameters):
         self._parameter_events = self.create_publisher(
             event, "/parameter_events", profiles.qos_profile_parameter_events
         )
-        answer = partial(describe, self.endpoints)
-        self.create_service(standard(SERVICE), "~/get_type_description", answer)
+        self.create_service(standard(SERVICE), "~/get_type_description", partial(describe, self))
         overrides = overrides_of(self.arguments, self.get_fully_qualified_name())
         self._begin_parameters(
             {**overrides, **{each.name: each for each in parameter_overrides or ()}},
@@ -97,14 +97,9 @@ class Node(HasParameters):
 
     # the node itself
 
-    @property
-    def executor(self) -> Executor | None:
-        """The executor that runs the callbacks; its method `add_node` sets it."""
-        return self._executor
-
     def attach(self, executor: Executor | None) -> None:
         """Run callbacks in this executor; called by it."""
-        self._executor = executor
+        self.executor = executor
         for part in (*self.timers, *self.endpoints):
             # a coroutine of another executor does not go on
             part.callback_group.waiting = None
@@ -114,7 +109,7 @@ class Node(HasParameters):
         """Have the executor run the callbacks of a timer or an endpoint."""
         parts: list[Any] = self.timers if isinstance(part, Timer) else self.endpoints
         parts.append(part)
-        part.attach(self._executor)
+        part.attach(self.executor)
 
     def destroy_timer(self, part: Timer | Endpoint) -> bool:
         """Withdraw a timer or an endpoint; return whether it was of this node."""
@@ -130,8 +125,8 @@ class Node(HasParameters):
 
     def destroy_node(self) -> None:
         """Withdraw the node with its endpoints; may be called twice."""
-        if self._executor is not None:
-            self._executor.remove_node(self)
+        if self.executor is not None:
+            self.executor.remove_node(self)
         while parts := self.endpoints or self.timers:
             self.destroy_timer(parts[0])
         self._token.close()
@@ -159,18 +154,18 @@ class Node(HasParameters):
     def use_sim_time(self, is_simulated: bool) -> None:
         """Have /clock set the clock, or the system."""
         if is_simulated and self._clock_subscription is None:
-            self._clock.simulate(0)
-            self._clock_subscription = self.create_subscription(
-                standard("rosgraph_msgs/msg/Clock"), "/clock", self._set_clock, _CLOCK
-            )
+            self._clock.simulated = 0
+            kind: Any = standard("rosgraph_msgs/msg/Clock")
+            clock = self.create_subscription(kind, "/clock", self._set_clock, _CLOCK)
+            self._clock_subscription = clock
         elif not is_simulated and self._clock_subscription is not None:
             self.destroy_subscription(self._clock_subscription)
             self._clock_subscription = None
-            self._clock.simulate(None)
+            self._clock.simulated = None
 
     def _set_clock(self, message: Any) -> None:
         with suppress(ValueError):  # before 1970
-            self._clock.simulate(Time.from_msg(message.clock).nanoseconds)
+            self._clock.simulated = Time.from_msg(message.clock).nanoseconds
 
     def _log(self, nanoseconds: int, *fields: Any) -> None:
         with suppress(RobotError):
@@ -193,12 +188,14 @@ class Node(HasParameters):
         topic: str,
         qos_profile: QoSProfile | int,
         *,
-        callback_group: CallbackGroup | None = None,
-        event_callbacks: EventCallbacks | None = None,
+        deadline_callback: Callable[[int], Any] | None = None,
     ) -> Publisher[M]:
-        """Return a publisher; a number is the depth of the default profile."""
-        publisher: Publisher[M] = Publisher(self, topic, msg_type, qos_profile, callback_group)
-        publisher.watch(event_callbacks)
+        """Return a publisher; a number is the depth of the default profile.
+
+        `deadline_callback` gets the number of deadlines of the profile that were missed so far.
+        """
+        publisher = Publisher[M](self, topic, msg_type, qos_profile, None)
+        publisher.watch(deadline_callback)
         return publisher
 
     def create_subscription(
@@ -209,20 +206,21 @@ class Node(HasParameters):
         qos_profile: QoSProfile | int,
         *,
         callback_group: CallbackGroup | None = None,
-        event_callbacks: EventCallbacks | None = None,
+        deadline_callback: Callable[[int], Any] | None = None,
     ) -> Subscription[M]:
-        """Return a subscription; `callback` gets each message."""
-        subscription: Subscription[M]
-        subscription = Subscription(self, topic, msg_type, qos_profile, callback_group, callback)
-        subscription.watch(event_callbacks)
+        """Return a subscription; `callback` gets each message.
+
+        `deadline_callback` gets the number of deadlines of the profile that were missed so far.
+        """
+        subscription = Subscription[M](self, topic, msg_type, qos_profile, callback_group, callback)
+        subscription.watch(deadline_callback)
         return subscription
 
     def subscribe(
         self, msg_type: type[M], topic: str, qos_profile: QoSProfile | int = 10
     ) -> AsyncGenerator[M, None]:
         """Return the messages of a topic for `async for` in asyncio; nothing has to spin."""
-        stream: Stream[M] = Stream(self, topic, msg_type, qos_profile, None)
-        return stream.messages()
+        return Stream[M](self, topic, msg_type, qos_profile, None).messages()
 
     def create_service(
         self,
@@ -241,11 +239,10 @@ class Node(HasParameters):
         srv_type: ServiceLike[RequestT, ResponseT] | Interface,
         srv_name: str,
         *,
-        qos_profile: QoSProfile | int = 10,
         callback_group: CallbackGroup | None = None,
     ) -> Client[RequestT, ResponseT]:
         """Return a client; responses arrive while callbacks of its group run."""
-        return Client(self, srv_name, srv_type, qos_profile, callback_group)
+        return Client(self, srv_name, srv_type, 10, callback_group)
 
     def create_timer(
         self,
@@ -274,23 +271,6 @@ class Node(HasParameters):
     def count_subscribers(self, topic_name: str) -> int:
         """Return the number of subscriptions of a topic."""
         return self.graph.count(Kind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
-
-    def count_services(self, service_name: str) -> int:
-        """Return the number of services with this name."""
-        return self.graph.count(Kind.SERVICE, self.resolve_service_name(service_name))
-
-    def count_clients(self, service_name: str) -> int:
-        """Return the number of clients of a service."""
-        return self.graph.count(Kind.CLIENT, self.resolve_service_name(service_name))
-
-    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Return the topics and their types, sorted."""
-        types = self.graph.types(Kind.PUBLISHER, Kind.SUBSCRIPTION)
-        return [(name, [*of]) for name, of in types.items()]
-
-    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Return the services and their types, sorted."""
-        return [(name, [*of]) for name, of in self.graph.types(Kind.SERVICE).items()]
 
     def get_node_names(self) -> list[str]:
         """Return the names of nodes without their namespaces."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from concurrent import futures
 from functools import partial
 from itertools import count
-from threading import Event
-from typing import Any, Generic, cast
+from typing import Any, Generic
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
-from idlc.robot.nodes.endpoints import Bounded, Endpoint, is_instance
+from idlc.robot.nodes.endpoints import Bounded, Endpoint
 from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
 from idlc.robot.transport import Closeable, Request, Sample
@@ -71,12 +71,8 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
     async def _answer(self, request: Request, attachment: Attachment, message: RequestT) -> None:
         kind = self.interface.kind.Response
         try:
-            response = await call(self.callback, message, kind())
-            if not is_instance(response, kind):
-                problem = f"returned {type(response).__name__}, not its response"
-                raise TypeError(f"the callback of `{self.srv_name}` {problem}")
-            sequence, _, gid = attachment
-            request.reply(response.serialize(), pack_attachment(sequence, time.time_ns(), gid))
+            payload = self.encode(kind, await call(self.callback, message, kind()))
+            request.reply(payload, pack_attachment(*attachment._replace(time=time.time_ns())))
         except BaseException:
             request.drop()
             raise
@@ -97,7 +93,6 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
     def open(self) -> tuple[Closeable, ...]:
         """Prepare calls."""
-        self._gid = self.entity.gid
         self._numbers = count(1)
         self._pending: dict[int, Future[ResponseT]] = {}
         return ()
@@ -107,9 +102,8 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
         Unlike in rclpy, nothing has to spin. Raises RobotError if no service answered.
         """
-        future, ended = self.call_async(request), Event()
-        future.wake_at_end(ended.set)
-        if not any(map(ended.wait, self._waits(timeout_sec))):
+        future = self.call_async(request)
+        if not any(futures.wait([future], seconds).done for seconds in self._waits(timeout_sec)):
             future.cancel()
         return future.result()
 
@@ -118,12 +112,9 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
         The future raises RobotError if no service answered.
         """
-        if not is_instance(request, self.interface.kind.Request):
-            expected = f"{self.interface.name}.Request, not {type(request).__name__}"
-            raise TypeError(f"requests to `{self.srv_name}` are {expected}")
-        payload: bytes = cast("Any", request).serialize()
+        payload = self.encode(self.interface.kind.Request, request)
         number = next(self._numbers)
-        attachment = pack_attachment(number, time.time_ns(), self._gid)
+        attachment = pack_attachment(number, time.time_ns(), self.entity.gid)
         timeout = _LONG_TIMEOUT if self.srv_name.endswith("/_action/get_result") else _TIMEOUT
         receive = partial(self._receive, number)
         future: Future[ResponseT] = Future()
@@ -140,7 +131,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         """Complete the future of a request; only the first response to it counts."""
         attachment = sample and parse_attachment(sample.attachment)
         answered = attachment and (attachment.sequence, attachment.gid)
-        is_end = sample is None or answered == (number, self._gid)
+        is_end = sample is None or answered == (number, self.entity.gid)
         future = self._pending.pop(number, None) if is_end else None
         if future is None:
             self.ignored += sample is not None
