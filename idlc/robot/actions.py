@@ -300,7 +300,7 @@ class ActionClient:
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
         """Wait until a server is there; return whether it is, for at most `timeout_sec` seconds."""
-        return bool(self._node.graph.wait_for(lambda _: self.server_is_ready(), timeout_sec))
+        return self._send.wait_for(self.server_is_ready, timeout_sec)
 
     def send_goal_async(
         self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None

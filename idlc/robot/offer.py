@@ -22,6 +22,7 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.action.server": "ActionServer CancelResponse GoalResponse ServerGoalHandle",
     "rclpy.callback_groups": "CallbackGroup MutuallyExclusiveCallbackGroup ReentrantCallbackGroup",
     "rclpy.clock": "Clock ClockType",
+    "rclpy.event_handler": "PublisherEventCallbacks SubscriptionEventCallbacks",
     "rclpy.exceptions": (
         "InvalidParameterException InvalidParameterTypeException InvalidParameterValueException"
         " ParameterAlreadyDeclaredException ParameterException ParameterNotDeclaredException"

@@ -84,18 +84,30 @@ def test_signals_end_a_program_without_a_trace(router, program, number):
         assert graph.wait_for(lambda _: not talkers(graph), LONG)
 
 
+#: Clients that wait, each with the name of its last endpoint.
+WAITING = {
+    "service": ('node.create_client(load("std_srvs/srv/SetBool"), "a").wait_for_service()', "/a"),
+    "action": (
+        'ActionClient(node, load("tf2_msgs/action/LookupTransform"), "a").wait_for_server()',
+        "/a/_action/get_result",
+    ),
+}
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_blocked_call_ends_with_the_program(router, tmp_path, number):
-    """In `wait_for_service`, in a thread or not, nothing keeps a program that ends."""
+@pytest.mark.parametrize("kind", WAITING)
+def test_a_blocked_call_ends_with_the_program(router, tmp_path, kind, number):
+    wait, name = WAITING[kind]
     file = tmp_path / "waiting.py"
     file.write_text(
-        "import sys, idlc\n"
-        "from idlc.robot import Node, init\n"
+        "import sys\n"
+        "import idlc\n"
+        "from idlc.robot import ActionClient, Node, init\n"
+        "load = lambda name: getattr(idlc.load(name), name.split('/')[-1])\n"
         "try:\n"
         "    with init(address=sys.argv[1]):\n"
         '        node = Node("waiting")\n'
-        '        kind = idlc.load("std_srvs/srv/SetBool").SetBool\n'
-        '        node.create_client(kind, "set").wait_for_service()\n'
+        f"        {wait}\n"
         "except KeyboardInterrupt:\n"
         "    pass\n"
     )
@@ -103,13 +115,13 @@ def test_a_blocked_call_ends_with_the_program(router, tmp_path, number):
         command = [sys.executable, file, router]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
             try:
-                assert node.graph.wait_for(lambda graph: graph.count(Kind.CLIENT, "/set"), LONG)
+                assert node.graph.wait_for(lambda graph: graph.count(Kind.CLIENT, name), LONG)
                 process.send_signal(number)
                 _, errors = process.communicate(timeout=LONG)
                 assert (process.returncode, errors) == (0, "")
             finally:
                 process.kill()
-        assert node.graph.wait_for(lambda graph: not graph.count(Kind.CLIENT, "/set"), LONG)
+        assert node.graph.wait_for(lambda graph: not graph.count(Kind.CLIENT, name), LONG)
 
 
 def test_an_exception_of_a_callback_ends_a_program(router, tmp_path):

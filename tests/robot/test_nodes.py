@@ -12,10 +12,12 @@ from idlc.robot import (
     DurabilityPolicy,
     Executor,
     Node,
+    PublisherEventCallbacks,
     QoSProfile,
     ReentrantCallbackGroup,
     ReliabilityPolicy,
     RobotError,
+    SubscriptionEventCallbacks,
     open_session,
 )
 from idlc.robot.keys import Kind, parse_attachment
@@ -290,21 +292,23 @@ def test_missed_deadlines_are_reported_to_both_sides(pair):
     left, right = pair
     late, missed = [], []
     profile = QoSProfile(depth=10, deadline=10**7)
-    publisher = left.create_publisher(String, "chatter", profile, deadline_callback=late.append)
+    publisher = left.create_publisher(
+        String, "chatter", profile, event_callbacks=PublisherEventCallbacks(deadline=late.append)
+    )
     subscription = right.create_subscription(
         String,
         "chatter",
         lambda _: None,
         profile,
-        deadline_callback=missed.append,
+        event_callbacks=SubscriptionEventCallbacks(deadline=missed.append),
     )
     spin_until(publisher.get_subscription_count, left)
     assert (late, missed) == ([], [])
     publisher.publish(String())
     spin_until(lambda: len(missed) == 2, right)
-    assert missed == [1, 2]
+    assert missed == [(1, 1), (2, 1)]
     spin_until(lambda: len(late) == 2, left)
-    assert late == [1, 2]
+    assert late == [(1, 1), (2, 1)]
     right.destroy_subscription(subscription)
     left.destroy_publisher(publisher)
     assert (left.timers, right.timers) == ([], [])
@@ -319,10 +323,15 @@ def test_the_graph_is_listed_as_in_rclpy(pair):
     right.create_subscription(String, "chatter", lambda _: None, 10)
     left.create_client(SetBool, "set")
     right.create_service(SetBool, "set", answer)
-    counts = (left.count_publishers, left.count_subscribers)
+    counts = (
+        left.count_publishers,
+        left.count_subscribers,
+        lambda _: left.count_services("set"),
+        lambda _: left.count_clients("set"),
+    )
     spin_until(lambda: all(count("chatter") == 1 for count in counts), left)
-    spin_until(lambda: left.graph.count(Kind.SERVICE, "/set"), left)
-    assert left.graph.types(Kind.SERVICE)["/set"] == ("std_srvs/srv/SetBool",)
+    assert ("/chatter", ["std_msgs/msg/String"]) in left.get_topic_names_and_types()
+    assert ("/set", ["std_srvs/srv/SetBool"]) in left.get_service_names_and_types()
     assert {*left.get_node_names()} == {"left", "right"}
     spin_until(lambda: right.count_publishers("chatter"), right)
     (entity,) = right.graph.entities(Kind.PUBLISHER, name="/chatter")

@@ -144,6 +144,10 @@ class Timer(Ready):
         if self._executor is not None:
             self._executor.wake()
 
+    def is_canceled(self) -> bool:
+        """Return whether the timer is cancelled."""
+        return self._next == math.inf
+
     def nanoseconds_left(self) -> float:
         """Return nanoseconds until the next call, infinite if cancelled, negative if it is late."""
         left = self._next - self.clock.elapsed()

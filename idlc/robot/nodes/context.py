@@ -40,8 +40,7 @@ class Context(AbstractContextManager["Context"]):
     def init(
         self,
         args: Sequence[str] | None = None,
-        *,
-        signal_handler_options: SignalHandlerOptions = SignalHandlerOptions.ALL,
+        signal_handler_options: SignalHandlerOptions | None = None,
         address: str = "",
     ) -> Context:
         """Begin; the result can be used in a `with` statement, which shuts it down.
@@ -118,6 +117,26 @@ def _handle(number: int, frame: Any) -> None:
         previous(number, frame)
 
 
-init, ok, shutdown = _default.init, _default.ok, _default.shutdown
+def init(
+    *,
+    args: Sequence[str] | None = None,
+    context: Context | None = None,
+    signal_handler_options: SignalHandlerOptions | None = None,
+    address: str = "",
+) -> Context:
+    """Begin in a context, or in the default context; see `Context.init`."""
+    return (context or _default).init(args, signal_handler_options, address)
+
+
+def ok(*, context: Context | None = None) -> bool:
+    """Return whether a context is initialized and not shut down."""
+    return (context or _default).ok()
+
+
+def shutdown(*, context: Context | None = None) -> None:
+    """Shut a context down: nodes leave the graph, and executors stop. May be called again."""
+    (context or _default).shutdown()
+
+
 #: In rclpy, `shutdown` fails if it is called twice.
 try_shutdown = shutdown

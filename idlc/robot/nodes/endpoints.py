@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import suppress
 from functools import partial
-from itertools import count
+from itertools import count, repeat
 from threading import Lock
 from time import time_ns
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
@@ -75,11 +75,12 @@ class Endpoint(Ready):
         if self.deadline is not None:
             self.node.destroy_timer(self.deadline)
 
-    def watch(self, callback: Callable[[int], Any] | None) -> None:
+    def watch(self, events: EventCallbacks | None) -> None:
         """Call back if no message came in time; the first message begins the period."""
-        seconds, misses = self.qos_profile.deadline / 1e9, count(1)
+        callback, seconds = events and events.deadline, self.qos_profile.deadline / 1e9
         if callback is not None and self.qos_profile.deadline < FOLLOWS:
-            miss, clock = (lambda: callback(next(misses))), Clock(clock_type=ClockType.STEADY_TIME)
+            infos = map(DeadlineInfo, count(1), repeat(1))
+            miss, clock = (lambda: callback(next(infos))), Clock(clock_type=ClockType.STEADY_TIME)
             self.deadline = self.node.create_timer(seconds, miss, self.callback_group, clock)
             self.deadline.cancel()
 
@@ -140,6 +141,22 @@ class Bounded(Generic[T]):
             size, item = self._items.popleft()
             self._size -= size
             return item
+
+
+class DeadlineInfo(NamedTuple):
+    """The argument of a deadline's callback."""
+
+    total_count: int
+    total_count_change: int
+
+
+class EventCallbacks(NamedTuple):
+    """Callbacks for events: `deadline` if no message came in the period of the profile."""
+
+    deadline: Callable[[DeadlineInfo], Any] | None = None
+
+
+PublisherEventCallbacks = SubscriptionEventCallbacks = EventCallbacks
 
 
 class Publisher(Endpoint, Generic[M]):

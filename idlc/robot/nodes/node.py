@@ -16,7 +16,7 @@ from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.clock import Clock, ClockType, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
 from idlc.robot.nodes.descriptions import SERVICE, describe
-from idlc.robot.nodes.endpoints import Endpoint, Publisher, Stream, Subscription
+from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Stream, Subscription
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger
@@ -188,14 +188,12 @@ class Node(HasParameters):
         topic: str,
         qos_profile: QoSProfile | int,
         *,
-        deadline_callback: Callable[[int], Any] | None = None,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: EventCallbacks | None = None,
     ) -> Publisher[M]:
-        """Return a publisher; a number is the depth of the default profile.
-
-        `deadline_callback` gets the number of deadlines of the profile that were missed so far.
-        """
-        publisher = Publisher[M](self, topic, msg_type, qos_profile, None)
-        publisher.watch(deadline_callback)
+        """Return a publisher; a number is the depth of the default profile."""
+        publisher = Publisher[M](self, topic, msg_type, qos_profile, callback_group)
+        publisher.watch(event_callbacks)
         return publisher
 
     def create_subscription(
@@ -206,14 +204,11 @@ class Node(HasParameters):
         qos_profile: QoSProfile | int,
         *,
         callback_group: CallbackGroup | None = None,
-        deadline_callback: Callable[[int], Any] | None = None,
+        event_callbacks: EventCallbacks | None = None,
     ) -> Subscription[M]:
-        """Return a subscription; `callback` gets each message.
-
-        `deadline_callback` gets the number of deadlines of the profile that were missed so far.
-        """
+        """Return a subscription; `callback` gets each message."""
         subscription = Subscription[M](self, topic, msg_type, qos_profile, callback_group, callback)
-        subscription.watch(deadline_callback)
+        subscription.watch(event_callbacks)
         return subscription
 
     def subscribe(
@@ -239,10 +234,11 @@ class Node(HasParameters):
         srv_type: ServiceLike[RequestT, ResponseT] | Interface,
         srv_name: str,
         *,
+        qos_profile: QoSProfile | int = 10,
         callback_group: CallbackGroup | None = None,
     ) -> Client[RequestT, ResponseT]:
         """Return a client; responses arrive while callbacks of its group run."""
-        return Client(self, srv_name, srv_type, 10, callback_group)
+        return Client(self, srv_name, srv_type, qos_profile, callback_group)
 
     def create_timer(
         self,
@@ -271,6 +267,23 @@ class Node(HasParameters):
     def count_subscribers(self, topic_name: str) -> int:
         """Return the number of subscriptions of a topic."""
         return self.graph.count(Kind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
+
+    def count_services(self, service_name: str) -> int:
+        """Return the number of services with this name."""
+        return self.graph.count(Kind.SERVICE, self.resolve_service_name(service_name))
+
+    def count_clients(self, service_name: str) -> int:
+        """Return the number of clients of a service."""
+        return self.graph.count(Kind.CLIENT, self.resolve_service_name(service_name))
+
+    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Return the topics and their types, sorted."""
+        types = self.graph.types(Kind.PUBLISHER, Kind.SUBSCRIPTION)
+        return [(name, [*of]) for name, of in types.items()]
+
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Return the services and their types, sorted."""
+        return [(name, [*of]) for name, of in self.graph.types(Kind.SERVICE).items()]
 
     def get_node_names(self) -> list[str]:
         """Return the names of nodes without their namespaces."""

@@ -154,8 +154,12 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until there is a service; return whether there is one now."""
-        wait = partial(self.node.graph.wait_for, lambda _: self.service_is_ready())
-        return any(map(wait, self._waits(timeout_sec))) or self.service_is_ready()
+        return self.wait_for(self.service_is_ready, timeout_sec)
+
+    def wait_for(self, is_ready: Callable[[], bool], timeout: float | None) -> bool:
+        """Wait until the graph makes something true; return whether it is true now."""
+        wait = partial(self.node.graph.wait_for, lambda _: is_ready())
+        return any(map(wait, self._waits(timeout))) or is_ready()
 
     def _waits(self, timeout: float | None) -> Iterator[float]:
         """Yield the seconds of short waits, until the time is over or the context is shut down."""
