@@ -11,6 +11,7 @@ from enum import Enum
 from functools import partial
 from typing import Any
 
+from idlc.robot.errors import RobotError
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.qos import qos_profile_parameters
 
@@ -155,9 +156,11 @@ class HasParameters:
         self._on_set_callbacks: list[Callable[[list[Parameter]], Any]] = []
         # declared without an event or a descriptor, so that a node that uses no parameters starts
         # without the messages about them
-        simulated = overrides.pop(_SIM_TIME, Parameter(_SIM_TIME, value=False)).value
-        self._parameters = {_SIM_TIME: Parameter(_SIM_TIME, ParameterType.BOOL, simulated)}
-        self.use_sim_time(simulated)
+        simulated = overrides.pop(_SIM_TIME, Parameter(_SIM_TIME, value=False))
+        if simulated.type_ is not ParameterType.BOOL:
+            raise RobotError(f"`{_SIM_TIME}` is not a bool", f"write `-p {_SIM_TIME}:=true`")
+        self._parameters = {_SIM_TIME: simulated}
+        self.use_sim_time(simulated.value)
         if declare_overrides:
             self.declare_parameters("", [(name, each.value) for name, each in overrides.items()])
 

@@ -470,6 +470,14 @@ def test_clock_simulates_the_time(pair):
     assert right.get_clock().now().seconds_nanoseconds()[0] > 10**9
 
 
+def test_use_sim_time_is_a_bool(router):
+    with (
+        pytest.raises(RobotError, match=r"not a bool \(write `-p use_sim_time:=true`\)"),
+        node_at(router, "a", cli_args=["-p", "use_sim_time:=1"]),
+    ):
+        pass
+
+
 def test_use_sim_time_is_an_argument(router):
     with node_at(router, "a", cli_args=["-p", "use_sim_time:=true"]) as node:
         assert node.get_clock().simulated == 0

@@ -32,6 +32,13 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc] # PyYAML is not typed
 
     yaml_implicit_resolvers = {"": [("nothing", re.compile(""))], None: [(_PLAIN, re.compile(""))]}  # noqa: RUF012 - PyYAML's
 
+    def compose_node(self, *above: object) -> yaml.Node:
+        """Return the next node."""
+        if self.check_event(yaml.AliasEvent):
+            place = self.peek_event().start_mark
+            raise yaml.MarkedYAMLError(None, None, "ROS 2 refuses aliases", place)
+        return super().compose_node(*above)
+
 
 def overrides_of(arguments: Arguments, node: str) -> dict[str, Parameter]:
     """Return the parameters that the command line sets for a node; `-p` replaces files.
@@ -53,9 +60,6 @@ def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[
     mark = None
     try:
         text = Path(source).read_text(encoding="utf-8") if text is None else text
-        for event in yaml.parse(text, _Loader):
-            if isinstance(event, yaml.AliasEvent):
-                raise yaml.MarkedYAMLError(None, None, "ROS 2 refuses aliases", event.start_mark)
         tree = yaml.compose(text, _Loader) or yaml.ScalarNode("nothing", "")
         for path, value in [(names, tree)] if names else _entries(tree):
             mark = value.start_mark
@@ -68,7 +72,7 @@ def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[
     except (OSError, yaml.YAMLError, RecursionError, TypeError, ValueError) as error:
         mark = getattr(error, "problem_mark", None) or mark
         place = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error)
+        problem = getattr(error, "problem", None) or getattr(error, "strerror", None) or str(error)
         raise RobotError(f"{one_line(source)}{place}: {one_line(problem)}") from None
     return parameters
 
