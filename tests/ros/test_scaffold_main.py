@@ -122,7 +122,9 @@ def test_a_signal_while_it_starts_ends_it(moment, package, tmp_path, ros_environ
             time.sleep(moment)
             node.process.send_signal(how)
             status = node.ends()
-            assert status == 0, (how, status, node.output)
+            # after Ctrl-C in `exec` of a text, which some imports use, Python ends by the signal
+            statuses = (0, -signal.SIGINT) if how is signal.SIGINT else (0,)
+            assert status in statuses, (how, status, node.output)
             assert not node.fails, node.output
 
 
