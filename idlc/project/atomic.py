@@ -226,7 +226,7 @@ def ended_by_errors() -> Iterator[None]:
 def without_ctrl_c() -> Iterator[None]:
     """Defer Ctrl-C, also if other threads exist; only the main thread receives it.
 
-    To block the signal is not enough there, as the system gives it to any thread.
+    A blocked signal would not be enough: the system can deliver it to any thread.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -93,6 +93,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
     def open(self) -> tuple[Closeable, ...]:
         """Prepare calls."""
+        self._gid = self.entity.gid  # computed once, as it is a hash
         self._numbers = count(1)
         self._pending: dict[int, Future[ResponseT]] = {}
         return ()
@@ -114,7 +115,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         """
         payload = self.encode(self.interface.kind.Request, request)
         number = next(self._numbers)
-        attachment = pack_attachment(number, time.time_ns(), self.entity.gid)
+        attachment = pack_attachment(number, time.time_ns(), self._gid)
         timeout = _LONG_TIMEOUT if self.srv_name.endswith("/_action/get_result") else _TIMEOUT
         receive = partial(self._receive, number)
         future: Future[ResponseT] = Future()
@@ -131,7 +132,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         """Complete the future of a request; only the first response to it counts."""
         attachment = sample and parse_attachment(sample.attachment)
         answered = attachment and (attachment.sequence, attachment.gid)
-        is_end = sample is None or answered == (number, self.entity.gid)
+        is_end = sample is None or answered == (number, self._gid)
         future = self._pending.pop(number, None) if is_end else None
         if future is None:
             self.ignored += sample is not None
