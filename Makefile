@@ -10,6 +10,7 @@
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
 #   LOCKED=yes          install what maintenance/requirements/ names and no other, as CI does on Linux x86-64
+#   JOBS=3              how many tests run at a time
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind, with
 #                       twenty times as many recordings
@@ -20,6 +21,7 @@ BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/de
 EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
+JOBS ?= 3
 ARGS ?=
 FUZZ ?= 5000
 SEED ?= 2
@@ -45,6 +47,7 @@ BROWSER_TESTS := tests/documents/test_docs_browser.py tests/website/test_website
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
+PARALLEL = -n $(JOBS) --dist worksteal
 NOT_ROS := $(if $(filter no,$(ROS)), and not ros)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
@@ -83,16 +86,16 @@ endif
 ifeq ($(EDITORS),no)
 	@echo 'without Neovim and Emacs of Debian: tests/editors/test_debian.py is left out'
 endif
-	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not long$(NOT_ROS)' $(SELECTION) $(ARGS)
+	$(TEST_ENV)/bin/python -m pytest $(PARALLEL) -m 'not long$(NOT_ROS)' $(SELECTION) $(ARGS)
 
 test-long: $(TEST_ENV)/installed ## run the tests that take long: they build, install and break packages
-	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'long$(NOT_ROS)' $(SELECTION) $(ARGS)
+	$(TEST_ENV)/bin/python -m pytest $(PARALLEL) -m 'long$(NOT_ROS)' $(SELECTION) $(ARGS)
 
 test-bare: ## run the commands of the README on a bare Debian: as root and a user, with gcc and without
 	sh tests/repository/bare.sh $(WAYS)
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
-	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
+	$(KILTED_ENV)/bin/python -m pytest $(PARALLEL) -m 'not jazzy' tests/ros $(ARGS)
 
 test-robot: $(ROBOT_ENV)/installed ## run idlc.robot with pyzeros and zenoh-ros2-sdk (needs a C compiler)
 	IDLC_PEERS=1 CYDR_CACHE_DIR=$(CURDIR)/build/cydr $(ROBOT_ENV)/bin/python -m pytest tests/robot/test_peers.py $(ARGS)
@@ -102,7 +105,7 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not long and not ros' $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
+	$(LOWEST_ENV)/bin/python -m pytest $(PARALLEL) -m 'not long and not ros' $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
 	    $(WITHOUT_EDITORS) $(ARGS)
 
 vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)
@@ -118,7 +121,7 @@ test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
-	    $(TEST_ENV)/bin/python -m pytest --timeout 0 -n 2 $(SELECTION) tests/hardening/test_fuzz.py \
+	    $(TEST_ENV)/bin/python -m pytest --timeout 0 -n $(JOBS) $(SELECTION) tests/hardening/test_fuzz.py \
 	    tests/hardening/test_fuzz_recordings.py tests/recordings/test_hostile_containers.py \
 	    tests/hardening/test_limits.py tests/runtime/test_hostile.py tests/robot/test_hostile.py \
 	    tests/robot/test_node_hostile.py \
