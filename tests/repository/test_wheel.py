@@ -13,6 +13,7 @@ import pytest
 
 from tests.support import programs
 from tests.support.paths import EXAMPLE, ROOT
+from tests.support.shared import shared_folder
 
 pytestmark = pytest.mark.long
 
@@ -56,15 +57,17 @@ def run(*command: object, cwd: Path) -> str:
 def distributions(tmp_path_factory) -> Path:
     """Build the sdist, and the wheel from the sdist, from a copy of the sources."""
     tree = tmp_path_factory.mktemp("tree")
+
+    def build(out):
+        run(sys.executable, "-m", "build", "--outdir", out, tree, cwd=tree)
+
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
     for name in ("idlc", "templates"):
         shutil.copytree(
             ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__", ".*")
         )
-    out = tmp_path_factory.mktemp("dist")
-    run(sys.executable, "-m", "build", "--outdir", out, tree, cwd=out)
-    return out
+    return shared_folder(tmp_path_factory, "distributions", build)
 
 
 class Environment:

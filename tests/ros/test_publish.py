@@ -27,15 +27,25 @@ ARCHIVES, SHOWN = (text for info, text in FENCES if not info)
 HATCHLING = FILES["pyproject.toml"].partition("\n[project]")[0]
 
 
-@pytest.fixture(scope="module", params=["hatchling", "setuptools"])
-def place(request, distributions, tmp_path_factory):
-    """The folder of the library, built as the page says, and the environment of its author."""
-    folder = write(tmp_path_factory.mktemp(request.param), FILES)
-    if request.param == "setuptools":
+@pytest.mark.parametrize("backend", ["hatchling", "setuptools"])
+def test_the_page_can_be_followed(backend, distributions, tmp_path, lonely_environment):
+    """One test, as building takes longest."""
+    folder, variables = build(backend, distributions, tmp_path)
+    archives_are_as_shown(folder)
+    works_without_ros(folder, variables)
+    works_with_ros(folder, tmp_path / "prefix", lonely_environment)
+    is_found_if_editable(folder, tmp_path, variables)
+
+
+def build(backend, distributions, tmp_path):
+    """Return the folder of the library, built as the page says, and its author's environment."""
+    folder = write(tmp_path / backend, FILES)
+    if backend == "setuptools":
         text = FILES["pyproject.toml"].replace(HATCHLING, SETUPTOOLS)
         text = text.replace("[tool.hatch.build.hooks.idlc]\n\n", "")
         (folder / "pyproject.toml").write_text(text)
-    environment = Environment(tmp_path_factory.mktemp("author"))
+    (tmp_path / "author").mkdir()
+    environment = Environment(tmp_path / "author")
     variables = {
         **programs.clean_environment(),
         "PATH": f"{environment.bin}:{os.environ['PATH']}",
@@ -48,8 +58,7 @@ def place(request, distributions, tmp_path_factory):
     return folder, variables
 
 
-def test_the_archives_are_as_shown(place):
-    folder, _ = place
+def archives_are_as_shown(folder):
     assert {f"dist/{path.name}" for path in (folder / "dist").iterdir()} == {*ARCHIVES.split()}
     (sdist,) = folder.glob("dist/*.tar.gz")
     with tarfile.open(sdist) as archive:
@@ -58,23 +67,20 @@ def test_the_archives_are_as_shown(place):
     assert not [name for name in names if "trackkit/ros" in name]
 
 
-def test_it_works_in_an_environment_without_ros(place):
-    folder, variables = place
+def works_without_ros(folder, variables):
     assert programs.run("bash", "-ec", TRY, cwd=folder, environment=variables).endswith(SHOWN)
 
 
-def test_nodes_publish_it_in_an_environment_with_ros(place, tmp_path, lonely_environment):
-    folder, _ = place
+def works_with_ros(folder, prefix, environment):
     pip = [sys.executable, "-m", "pip", "install", "--no-index", "--find-links", "dist"]
-    programs.run(*pip, "--no-deps", "--prefix", tmp_path, "trackkit", cwd=folder)
-    environment = {**lonely_environment, "PYTHONPATH": str(site(tmp_path))}
+    programs.run(*pip, "--no-deps", "--prefix", prefix, "trackkit", cwd=folder)
+    environment = {**environment, "PYTHONPATH": str(site(prefix))}
     said = programs.run(sys.executable, "show.py", cwd=folder, environment=environment)
     assert said == SHOWN.replace("trackkit.ros.vendor.", "")
     assert programs.run(sys.executable, "node.py", cwd=folder, environment=environment) == "2.0\n"
 
 
-def test_an_editable_installation_finds_the_classes(place, tmp_path):
-    folder, variables = place
+def is_found_if_editable(folder, tmp_path, variables):
     environment = Environment(tmp_path)
     variables = {**variables, "PATH": f"{environment.bin}:{variables['PATH']}"}
 

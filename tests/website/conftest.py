@@ -1,26 +1,12 @@
 """The site, built once."""
 
-import os
-
 import pytest
 
-from idlc.project.atomic import exclusive
 from maintenance.website.build import build
+from tests.support.shared import shared_folder
 
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    """Return the folder of the site; building it is strict: a warning fails.
-
-    Workers share it, as building takes long.
-    """
-    base = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        base = base.parent
-    folder = base / "website" / "site"
-    with exclusive(folder):
-        if not folder.exists():
-            draft = base / "website" / "draft"
-            build(draft)
-            draft.rename(folder)
-    return folder
+    """Return the folder of the site; building it is strict: a warning fails."""
+    return shared_folder(tmp_path_factory, "website", build)
