@@ -19,13 +19,13 @@ from tests.support.oddities import Oddities
 from tests.support.paths import PROGRAMS, VERDICTS
 
 SEED = int(os.environ.get("IDLC_LIVE_SEED", "1"))
-FILES = int(os.environ.get("IDLC_LIVE_FILES", "1000"))  # rosidl takes about 0.1 s for each
+FILES = int(os.environ.get("IDLC_LIVE_FILES", "500"))  # rosidl takes about 0.1 s for each
 FAMILIES = {
     "inventions": lambda: Inventor(SEED, known_texts()).cases(FILES * 7 // 10),
     "oddities": lambda: Oddities(SEED).cases(FILES * 3 // 10),
 }
 #: Each is made in parts, so that several processes can share the work; the files are the same.
-PARTS = 10
+PARTS = 5
 
 
 def known_texts() -> dict[str, list[str]]:
