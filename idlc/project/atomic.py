@@ -180,17 +180,17 @@ def _lock(folder: Path, created: list[Path]) -> int | None:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Defer signals that would end the process."""
-    if sys.platform == "win32":
-        with without_ctrl_c():
+    """Defer signals that would end the process; if other threads exist, only Ctrl-C."""
+    with without_ctrl_c():
+        if sys.platform == "win32":
             yield
-        return
-    ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            return
+        ending = (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _EndedError(BaseException):

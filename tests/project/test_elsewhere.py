@@ -196,6 +196,24 @@ def test_ctrl_c_waits_until_files_are_in_place():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_ctrl_c_waits_also_where_other_threads_can_receive_it():
+    done, begun = [], threading.Event()
+    other = threading.Thread(
+        target=lambda: (begun.wait(), signal.raise_signal(signal.SIGINT)), daemon=True
+    )
+    other.start()  # before it could inherit blocked signals
+
+    def moves():
+        with atomic.uninterrupted():
+            begun.set()
+            other.join()
+            done.append("moved")
+
+    with pytest.raises(KeyboardInterrupt):
+        moves()
+    assert done == ["moved"]
+
+
 # what is printed
 
 
