@@ -47,7 +47,7 @@ def project(here, monkeypatch):
 
 @pytest.fixture
 def unproved(monkeypatch):
-    """Skip the proof, which takes seconds, where only the written files are tested."""
+    """Skip the proof, which takes seconds, where it has nothing to do with the tested files."""
     monkeypatch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
 
 
@@ -212,7 +212,6 @@ def test_a_workspace_is_a_table_of_packages(project, capsys):
     assert tree(project) == after
 
 
-@pytest.mark.usefixtures("unproved")
 def test_another_folder_is_named(project, monkeypatch, capsys):
     write_all({f"a b/{path}": text for path, text in ament().items()})
     assert main(["init", "a b", "--yes"]) == 0
@@ -376,7 +375,6 @@ def test_a_package_outside_of_a_workspace_is_left_alone(project, capsys):
     assert tree(outside) == before
 
 
-@pytest.mark.usefixtures("unproved")
 def test_a_folder_may_have_the_name_of_an_option(project, capsys):
     write_all({f"-x/{path}": text for path, text in ament().items()})
     assert main(["init", "--yes", "--", "-x"]) == 0
@@ -394,7 +392,6 @@ def test_a_folder_may_have_the_name_of_an_option(project, capsys):
     ],
     ids=["empty", "another table", "named"],
 )
-@pytest.mark.usefixtures("unproved")
 def test_a_setup_py_that_is_missing_names_the_package(settings, is_named, project):
     files = {**ament(), "pyproject.toml": settings}
     del files["setup.py"]
@@ -460,7 +457,6 @@ def test_a_computed_value_is_named_and_not_run(new, shown, project, capsys):
 @pytest.mark.parametrize(
     ("old", "new"), [("    ", "\t"), ("\n", "\r\n"), ("from setuptools", "\ufefffrom setuptools")]
 )
-@pytest.mark.usefixtures("unproved")
 def test_the_layout_of_files_stays(old, new, project, capsys):
     write_all(ament(TUTORIAL))
     for name in ("setup.py", "package.xml"):
@@ -476,7 +472,6 @@ def test_the_layout_of_files_stays(old, new, project, capsys):
     assert "nothing to do" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("unproved")
 def test_a_setting_that_exists_stays(project):
     write_all(library(f'{SETUPTOOLS}\n[tool.idlc]\npaths = ["a b"]\npackage = "mine"\n'))
     assert main(["init", "--yes"]) == 0
@@ -486,7 +481,6 @@ def test_a_setting_that_exists_stays(project):
     assert text.endswith(f'{table}package = "mine"\n')
 
 
-@pytest.mark.usefixtures("unproved")
 def test_a_package_that_is_excluded_is_not_the_librarys(project, capsys):
     write_all({f"ros/{path}": text for path, text in INTERFACES.items()})
     write_all(library(f'{SETUPTOOLS}\n[tool.idlc]\nexclude = ["ros"]\n'))
@@ -496,7 +490,6 @@ def test_a_package_that_is_excluded_is_not_the_librarys(project, capsys):
     assert not [*Path("src").rglob("*field*")]
 
 
-@pytest.mark.usefixtures("unproved")
 def test_settings_of_a_folder_above_are_not_the_librarys(project, monkeypatch):
     write("pyproject.toml", '[tool.idlc]\npaths = ["x"]\nout = "y"\n')
     write_all({f"lib/{path}": text for path, text in SAMPLES["setuptools: setup.py"].files.items()})
@@ -505,7 +498,6 @@ def test_settings_of_a_folder_above_are_not_the_librarys(project, monkeypatch):
     assert Path("track_kit/ros/msg/__init__.py").is_file()
 
 
-@pytest.mark.usefixtures("unproved")
 def test_a_library_without_an_init_py_says_where_its_classes_are(project):
     table = '\n[tool.idlc]\nout = "src/ada/kit/ros"\n'
     write_all({"pyproject.toml": SETUPTOOLS + table, "src/ada/kit/track.py": ""})
@@ -514,7 +506,6 @@ def test_a_library_without_an_init_py_says_where_its_classes_are(project):
     assert Path("src/ada/kit/ros/msg/_example.py").is_file()
 
 
-@pytest.mark.usefixtures("unproved")
 def test_a_package_for_both_versions_of_ros_is_one_of_ros_2(project, capsys):
     old = "<build_type>ament_python"
     new = f'<build_type condition="$ROS_VERSION == 1">catkin</build_type>\n    {old}'
@@ -524,7 +515,6 @@ def test_a_package_for_both_versions_of_ros_is_one_of_ros_2(project, capsys):
     assert "bot is an ament_python package" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("unproved")
 def test_settings_join_the_table_that_exists(project, capsys):
     text = f"{SETUPTOOLS}\n[tool.idlc]  # ours\ndistro = 'jazzy'\n\n[tool.ruff]\nline-length = 99"
     write_all(library(text))
@@ -699,7 +689,6 @@ def test_colcon_builds_what_was_set_up(name, project, tmp_path):
         ('dynamic = ["dependencies"]\n', None),
     ],
 )
-@pytest.mark.usefixtures("unproved")
 def test_a_library_with_arrays_depends_on_numpy(old, new, project, capsys):
     text = SETUPTOOLS.replace("requires-python", f"{old}requires-python")
     write_all(library(text) | {"interfaces/msg/Box.msg": "float64[3] size  # [m]\n"})
