@@ -56,17 +56,17 @@ def run(*command: object, cwd: Path) -> str:
 @pytest.fixture(scope="session")
 def distributions(tmp_path_factory) -> Path:
     """Build the sdist, and the wheel from the sdist, from a copy of the sources."""
-    tree = tmp_path_factory.mktemp("tree")
 
-    def build(out):
-        run(sys.executable, "-m", "build", "--outdir", out, tree, cwd=tree)
+    def build(out: Path) -> None:
+        tree = tmp_path_factory.mktemp("tree")
+        for name in ("pyproject.toml", "README.md", "LICENSE"):
+            shutil.copy(ROOT / name, tree)
+        for name in ("idlc", "templates"):
+            shutil.copytree(
+                ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__", ".*")
+            )
+        run(sys.executable, "-m", "build", "--outdir", out, tree, cwd=out.parent)
 
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, tree)
-    for name in ("idlc", "templates"):
-        shutil.copytree(
-            ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__", ".*")
-        )
     return shared_folder(tmp_path_factory, "distributions", build)
 
 
