@@ -10,10 +10,11 @@
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
 #   LOCKED=yes          install what maintenance/requirements/ names and no other, as CI does on Linux x86-64
-#   JOBS=3              how many tests run at a time
+#   JOBS=4              how many tests run at a time
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
-#   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind, with
-#                       twenty times as many recordings
+#   SEED=2              where `make fuzz` searches, and which mistakes `make mutants` makes
+#   FUZZ=30             how many times as many inputs as `make test-long` does `make fuzz` try
+#   N=80                how many mistakes `make mutants` makes
 
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
@@ -21,10 +22,11 @@ BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/de
 EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
-JOBS ?= 3
+JOBS ?= 4
 ARGS ?=
-FUZZ ?= 5000
+FUZZ ?= 30
 SEED ?= 2
+N ?= 80
 
 TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 KIND := $(TAG)$(if $(filter yes,$(LOCKED)),-locked)
@@ -41,17 +43,17 @@ LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 VSCODE := build/vscode
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
-WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website
+WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website -m 'not ros'
 BROWSER_TESTS := tests/documents/test_docs_browser.py tests/website/test_website_browser.py \
     tests/website/test_playground_browser.py tests/website/test_accessibility.py
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
 PARALLEL = -n $(JOBS) --dist worksteal
-NOT_ROS := $(if $(filter no,$(ROS)), and not ros)
+PYTEST = $(TEST_ENV)/bin/python -m pytest $(PARALLEL)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
-# One file of versions and hashes per environment, and first the one that builds packages.
+# One file of versions and hashes per environment, and first the one that builds and installs packages.
 LOCKS := build release test-ros test-kilted test-robot test-lowest
 UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
     --generate-hashes --no-annotate --custom-compile-command 'make lock'
@@ -61,7 +63,7 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test test-long test-bare test-kilted test-robot test-all test-lowest vscode test-vscode fuzz soak lint example bench \
+.PHONY: help install environment demo quick test test-long costs mutants test-bare test-kilted test-robot test-all test-lowest vscode test-vscode fuzz soak lint example bench \
     lock site playground release-check runtime-wheel clean
 
 help: ## show this list
@@ -70,11 +72,16 @@ help: ## show this list
 
 install: $(DEMO_ENV)/installed $(TEST_ENV)/installed ## prepare what demo and test need; neither needs a network then
 
+environment: $(TEST_ENV)/installed ## prepare what the tests need
+
 demo: $(DEMO_ENV)/installed ## compile the example; publish, call and act with it in the real rclpy
 	@echo '$$ idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller'
 	@$(DEMO_ENV)/bin/idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller
 	@$(DEMO_ENV)/bin/idlc gen $(DEMO_ENV)/share/std_msgs --package std_msgs_by_idlc -o $(DEMO_OUT)/std_msgs_by_idlc
 	@PYTHONPATH=$(DEMO_OUT) $(DEMO_ENV)/bin/python examples/demo.py
+
+quick: $(TEST_ENV)/installed ## run the tests that take at most 0.3 CPU-seconds each, while you edit
+	$(PYTEST) --tier quick $(SELECTION) $(ARGS)
 
 test: $(TEST_ENV)/installed ## run the tests
 ifeq ($(ROS),no)
@@ -86,10 +93,21 @@ endif
 ifeq ($(EDITORS),no)
 	@echo 'without Neovim and Emacs of Debian: tests/editors/test_debian.py is left out'
 endif
-	$(TEST_ENV)/bin/python -m pytest $(PARALLEL) -m 'not long$(NOT_ROS)' $(SELECTION) $(ARGS)
+	$(PYTEST) --tier test $(SELECTION) $(ARGS)
 
-test-long: $(TEST_ENV)/installed ## run the tests that take long: they build, install and break packages
-	$(TEST_ENV)/bin/python -m pytest $(PARALLEL) -m 'long$(NOT_ROS)' $(SELECTION) $(ARGS)
+test-long: $(TEST_ENV)/installed ## run the tests that take long, and random ones with more inputs
+	$(PYTEST) --tier long $(SELECTION) $(ARGS)
+
+costs: $(TEST_ENV)/installed ## measure all tests, and write those that are not quick into tests/costs.tsv
+	rm -rf build/costs
+	-$(PYTEST) --costs build/costs/first $(ARGS)
+	$(TEST_ENV)/bin/python -m tests.support.costs build/costs/first --repeat build/costs/again.json
+	-$(PYTEST) --costs build/costs/second --only build/costs/again.json $(ARGS)
+	$(TEST_ENV)/bin/python -m tests.support.costs build/costs/first build/costs/second
+
+mutants: $(TEST_ENV)/installed ## make N small mistakes in idlc, chosen by SEED, and see which tests notice them
+	$(TEST_ENV)/bin/python $(PIP_INSTALL) coverage
+	$(TEST_ENV)/bin/python -m maintenance.mutants --number $(N) --seed $(SEED) $(ARGS)
 
 test-bare: ## run the commands of the README on a bare Debian: as root and a user, with gcc and without
 	sh tests/repository/bare.sh $(WAYS)
@@ -105,7 +123,7 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest $(PARALLEL) -m 'not long and not ros' $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
+	$(LOWEST_ENV)/bin/python -m pytest $(PARALLEL) --tier test $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
 	    $(WITHOUT_EDITORS) $(ARGS)
 
 vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)
@@ -120,7 +138,7 @@ test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code
 	$(TEST_ENV)/bin/python -m pytest tests/editors/vscode_check.py $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
-	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
+	IDLC_ROUNDS=$(FUZZ) IDLC_SEED=$(SEED) \
 	    $(TEST_ENV)/bin/python -m pytest --timeout 0 -n $(JOBS) $(SELECTION) tests/hardening/test_fuzz.py \
 	    tests/hardening/test_fuzz_recordings.py tests/recordings/test_hostile_containers.py \
 	    tests/hardening/test_limits.py tests/runtime/test_hostile.py tests/robot/test_hostile.py \
@@ -134,7 +152,7 @@ fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or
 	else echo 'atheris has no build for this Python: its part is left out'; fi
 
 soak: $(TEST_ENV)/installed ## send a million messages through rclpy
-	IDLC_LONG=1 $(TEST_ENV)/bin/python -m pytest --timeout 0 tests/ros/test_load.py $(ARGS)
+	IDLC_ROUNDS=100 $(TEST_ENV)/bin/python -m pytest --timeout 0 tests/ros/test_load.py $(ARGS)
 
 lint: $(TEST_ENV)/installed ## check style and types
 	$(TEST_ENV)/bin/ruff check .
@@ -167,7 +185,7 @@ lock: ## choose the versions for CI again, and write down their hashes
 	$(UV_COMPILE) pyproject.toml --extra test-robot --output-file maintenance/requirements/test-robot.txt
 	$(UV_COMPILE) pyproject.toml --extra test --resolution lowest-direct \
 	    --output-file maintenance/requirements/test-lowest.txt
-	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints maintenance/requirements/test-ros.txt \
+	printf 'setuptools>=77\nuv>=0.8\n' | $(UV_COMPILE) - --constraints maintenance/requirements/test-ros.txt \
 	    --output-file maintenance/requirements/build.txt
 	$(UV_COMPILE) pyproject.toml --extra release --constraints maintenance/requirements/build.txt \
 	    --output-file maintenance/requirements/release.txt
@@ -193,8 +211,8 @@ $(RELEASE_ENV)/installed: EXTRA := release
 	@$(PYTHON) -m venv .venv/$*
 ifeq ($(LOCKED),yes)
 	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --requirement maintenance/requirements/build.txt
-	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --no-build-isolation --no-deps \
-	    --requirement maintenance/requirements/$(EXTRA).txt
+	@.venv/$*/bin/uv pip install --quiet --python .venv/$*/bin/python --require-hashes --no-build-isolation \
+	    --no-deps --requirement maintenance/requirements/$(EXTRA).txt
 	@.venv/$*/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation --editable .
 else
 	@.venv/$*/bin/python $(PIP_INSTALL) --editable '.[$(EXTRA)]' || { \

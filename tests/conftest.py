@@ -1,12 +1,15 @@
+import gc
+import json
 import os
 import signal
 import sys
 import tempfile
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.support import generated
+from tests.support import costs, generated
 from tests.support.windows import NOT_THERE
 
 # Who starts tests in the background may ignore these, and what tests start would, too.
@@ -30,27 +33,56 @@ settings.load_profile("idlc")
 
 
 def pytest_addoption(parser):
+    parser.addoption("--tier", choices=costs.TIERS, help="which tests to run, by what they cost")
     parser.addoption(
         "--left-out",
         action="store_true",
-        help="run what has not passed in earlier runs",
+        help="run what has not passed in earlier runs, besides what takes long with --tier long",
     )
+    parser.addoption("--only", type=Path, help="run what this JSON file names, in its order")
+    parser.addoption("--costs", type=Path, help="measure what tests cost, in files of this folder")
 
 
+def pytest_configure(config):
+    if config.getoption("tier") == "long":
+        os.environ.setdefault("IDLC_ROUNDS", "1")
+    runs_tests = hasattr(config, "workerinput") or not config.getoption("numprocesses", None)
+    if config.getoption("costs") and runs_tests:
+        config.pluginmanager.register(costs.Meter(config.getoption("costs")))
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Leave out on Windows, and name, what cannot be there; with --left-out, what has passed."""
+    """Leave out on Windows, and name, what cannot be there; select what the options name."""
+    config.stash[costs.COLLECTED] = {item.nodeid for item in items}
     for item in items if sys.platform == "win32" else ():
         for name, reason in NOT_THERE.items():
             if name in item.nodeid:
                 item.add_marker(pytest.mark.skip(reason=reason))
+    tier = config.getoption("tier")
+    selected = items if tier is None else [item for item in items if tier in costs.tiers(item)]
     if config.getoption("left_out"):
         passed = set(config.cache.get(PASSED, []))
-        config.hook.pytest_deselected(items=[item for item in items if item.nodeid in passed])
-        items[:] = [item for item in items if item.nodeid not in passed]
+        left_out = {item for item in items if item.nodeid not in passed}
+        wanted = left_out.union(selected) if tier == "long" else left_out.intersection(selected)
+        selected = [item for item in items if item in wanted]
+    if config.getoption("only"):
+        order = json.loads(config.getoption("only").read_text(encoding="ascii"))
+        by_name = {item.nodeid: item for item in selected}
+        selected = [by_name[name] for name in order if name in by_name]
+    if selected is not items:
+        config.hook.pytest_deselected(items=list(set(items).difference(selected)))
+        items[:] = selected
+
+
+def pytest_collection_finish():
+    """Keep the collector of garbage from looking at all tests again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_sessionfinish(session):
-    """Accept that --left-out has nothing to run."""
+    """Accept that nothing is left to run."""
     if (
         session.config.getoption("left_out")
         and session.exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED

@@ -1,7 +1,6 @@
 """The verdict `wire` is what really happens to old bytes, and `hash` what happens to RIHS01."""
 
 import importlib
-import os
 from collections import Counter
 
 import pytest
@@ -10,15 +9,16 @@ from idlc.compare.packages import compare
 from idlc.generate.python.render import render_package
 from tests.support import evolution, reference_cdr
 from tests.support.evolution import Evolution, compile_texts, old_bytes_are_misread
+from tests.support.rounds import FUZZING, rounds
 
-EDITS = int(os.environ.get("IDLC_EVOLUTION_EDITS", "20000"))
-PARTS = 8
+EDITS = rounds(20_000) if FUZZING else 20_000
+PARTS = 16
 STEPS = 25
 
 
 @pytest.mark.parametrize(
     "part",
-    [part if part < 2 else pytest.param(part, marks=pytest.mark.long) for part in range(PARTS)],
+    [part if part < 1 else pytest.param(part, marks=pytest.mark.long) for part in range(PARTS)],
 )
 def test_the_verdict_is_what_happens(part):
     disagreements = []

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests.support.generated import catalog_files, write_package
+from tests.support.rounds import ALL
 
 MORE = ("int8 a\n", "int8 a\nint16 x\n")
 #: A message before and after a change.
@@ -75,6 +76,7 @@ for folder in sys.argv[2:]:
 """
 
 
+@pytest.mark.rounds
 @pytest.mark.parametrize("change", CHANGES)
 def test_no_mixed_package_loses_a_value(change, tmp_path):
     for version, text in zip(("old", "new"), CHANGES[change], strict=True):
@@ -93,7 +95,7 @@ def test_no_mixed_package_loses_a_value(change, tmp_path):
     ]
     assert len(changed) == 5
     mixtures = {}
-    for number in range(len(changed) + 1):
+    for number in range(len(changed) + 1) if ALL else (0, 1, 4, 5):
         for paths in itertools.combinations(changed, number):
             folder = str(tmp_path / f"{len(mixtures)}")
             mixtures[folder] = paths

@@ -9,6 +9,7 @@ import pytest
 
 from idlc.generate.python.render import render_package
 from tests.support import generated, values
+from tests.support.rounds import ALL
 
 PARTS = {
     "msg/Number.msg": "int32 value\n",
@@ -32,7 +33,7 @@ DEFAULTS = (
     "float64 number 0.5\nfloat64[] numbers [1.0]\nuint8[1] one [7]\n"
     'string[1] text ["a"]\nstring[] texts ["a", "b c", "d"]\n'
 )
-LENGTHS = range(1, 121)
+LENGTHS = range(1, 121, 1 if ALL else 4)
 
 
 def named(number, length):
@@ -62,6 +63,7 @@ def lengths(tmp_path_factory):
         yield folder
 
 
+@pytest.mark.rounds
 @pytest.mark.parametrize("stem", ["All", "Only", "Nested", "Long"])
 def test_names_of_every_length_hold_what_they_were_given(lengths, stem):
     rng = random.Random(stem)

@@ -1,11 +1,8 @@
 """Everything that idlc reads may come from anybody: any bytes end in an answer, none in a crash.
 
-`make fuzz` raises the number of inputs (IDLC_FUZZ for each target), takes another seed
-(IDLC_FUZZ_SEED), and saves what it finds in tests/hardening/corpus/, which is tried here for
-ever after.
+`make fuzz` saves what it finds in tests/hardening/corpus/, which is tried here for ever after.
 """
 
-import os
 import shutil
 from pathlib import Path
 
@@ -14,9 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support import fuzzing
-
-COUNT = int(os.environ.get("IDLC_FUZZ", "60"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
+from tests.support.rounds import FUZZING, SEED, rounds
 
 
 @pytest.fixture
@@ -32,7 +27,7 @@ def attempt(target, data, folder):
     try:
         fuzzing.TARGETS[target](data, place)
     except BaseException as error:
-        if "IDLC_FUZZ" in os.environ:
+        if FUZZING:
             raise AssertionError(f"saved as {fuzzing.keep(target, data)}") from error
         raise
     finally:
@@ -47,15 +42,17 @@ def test_what_once_found_a_bug(target, folder):
         attempt(target, data, folder)
 
 
+@pytest.mark.rounds
 @pytest.mark.parametrize("target", fuzzing.TARGETS)
 def test_mutated_files(target, folder):
-    for data in fuzzing.inputs(target, SEED, COUNT):
+    for data in fuzzing.inputs(target, SEED, rounds(60)):
         attempt(target, data, folder)
 
 
+@pytest.mark.rounds
 @pytest.mark.parametrize("target", fuzzing.TARGETS)
 def test_arbitrary_bytes(target, folder):
-    @settings(max_examples=max(COUNT // 4, 10), deadline=None, database=None)
+    @settings(max_examples=rounds(15), deadline=None, database=None)
     @given(st.binary(max_size=200) | st.text(max_size=100).map(lambda text: text.encode("utf-8")))
     def any_bytes(data):
         attempt(target, data, folder)

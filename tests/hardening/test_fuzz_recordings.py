@@ -1,10 +1,9 @@
 """Recordings may come from anybody: mutations that know what they change, in great number.
 
-`make fuzz` tries 100,000 (twenty times IDLC_FUZZ) with another seed (IDLC_FUZZ_SEED). A failure
-says the number of its input, which this seed always has, and keeps the input where it says.
+A failure says the number of its input, which this seed always has, and keeps the input where it
+says.
 """
 
-import os
 import random
 import resource
 import shutil
@@ -30,13 +29,14 @@ from idlc.recordings.types import LocalTypes, recorded_types, versions
 from tests.support import db3_mutations, definition_mutations, mcap_mutations
 from tests.support import recordings as made
 from tests.support.paths import ROOT
+from tests.support.rounds import SEED, rounds
 
-ALL = 20 * int(os.environ.get("IDLC_FUZZ", "20"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
 #: Seconds of processor time that any of these small inputs may take.
 MOST_TIME = 20
 #: Bytes that a process may have more than it has at the beginning; the largest chunk is a third.
 MOST_MEMORY = 3 << 29
+pytestmark = pytest.mark.rounds
+
 SMALL = [one for one in made.messages(24) if one.topic != "/camera/image"]
 
 
@@ -150,13 +150,13 @@ def test_mcap_files(tmp_path, kinds):
         for name, compression, more in containers()
     ]
     path, fine = tmp_path / "mutated.mcap", 0
-    for number in range(ALL // 2):
+    for number in range(rounds(200)):
         data = mcap_mutations.mutated(sound[number % len(sound)], rng)
         path.write_bytes(data)
         walked = partial(walk, path, kinds, index=number % 3 > 0, check=number % 2 > 0)
         with attempt(number, path.name, data):
             fine += outcome(walked)
-    assert ALL // 20 < fine < ALL // 2
+    assert 0.1 < fine / rounds(200) < 1
 
 
 def test_db3_files(tmp_path, kinds):
@@ -165,12 +165,12 @@ def test_db3_files(tmp_path, kinds):
     other = made.by_rosbags(tmp_path / "compressed", SMALL, "db3", "message")
     sound = [next(one.glob("*.db3")).read_bytes() for one in (bag, other)]
     path, fine = tmp_path / "mutated.db3", 0
-    for number in range(ALL * 3 // 20):
+    for number in range(rounds(60)):
         data = db3_mutations.mutated(sound[number % 2], rng, tmp_path / "work.db3")
         path.write_bytes(data)
         with attempt(number, path.name, data):
             fine += outcome(lambda: walk(path, kinds))
-    assert ALL // 100 < fine < ALL * 3 // 20
+    assert 0.05 < fine / rounds(60) < 1
 
 
 #: Names that lead out of a folder, or are none.
@@ -186,7 +186,7 @@ def test_bags(tmp_path, kinds):
     text = (sound / "metadata.yaml").read_text(encoding="utf-8")
     path = tmp_path / "bag" / "metadata.yaml"
     made.by_mcap(tmp_path / "outside.mcap", SMALL[:1], "")
-    for number in range(ALL // 20):
+    for number in range(rounds(20)):
         lines = text.splitlines(keepends=True)
         for _ in range(rng.choice([1, 2, 5])):
             at = rng.randrange(len(lines))
@@ -231,7 +231,7 @@ def test_definitions(style, tmp_path):
     around = LocalTypes(Scope(Root.here()), Report())
     sound = definitions(style)
     whole = 0
-    for number in range(ALL * 3 // 20):
+    for number in range(rounds(60)):
         name, text = sound[number % len(sound)]
         text = definition_mutations.mutated(text, rng, idl=style == "ros2idl")
         with attempt(number, f"definition.{style}", text.encode("utf-8", "surrogatepass")):
@@ -239,7 +239,7 @@ def test_definitions(style, tmp_path):
             types = typed(around, name, style, text, "RIHS01_0" if number % 2 else None)
             for one in types.topics:
                 whole += types.hash(one) is not None
-    assert ALL // 100 < whole < ALL * 3 // 20
+    assert 0.05 < whole / rounds(60) < 1
 
 
 def test_what_is_written_stays_in_its_folder(tmp_path, monkeypatch, capsys):
@@ -247,7 +247,7 @@ def test_what_is_written_stays_in_its_folder(tmp_path, monkeypatch, capsys):
     rng = random.Random(SEED)
     monkeypatch.chdir(tmp_path)
     whole = made.by_mcap(tmp_path / "sound", SMALL, "").read_bytes()
-    for number in range(ALL // 200):
+    for number in range(rounds(2)):
         data = mcap_mutations.mutated(whole, rng)
         (tmp_path / "rec.mcap").write_bytes(data)
         with attempt(number, "rec.mcap", data):

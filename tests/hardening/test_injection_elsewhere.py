@@ -15,6 +15,7 @@ from tests.documents.test_docs import Page
 from tests.hardening.test_injection import FILE_NAMES, PLACES, colourful
 from tests.support.hostile import PAYLOADS, assert_harmless, assert_untouched, on_a_terminal, run
 from tests.support.paths import ROOT
+from tests.support.rounds import FUZZING
 
 __all__ = ["colourful"]  # a fixture
 SHELL = shutil.which("sh") or "sh"
@@ -149,7 +150,7 @@ def test_the_actions_script_obeys_no_name(tmp_path):
         "PYTHONPATH": str(ROOT),
         "PYTHONUTF8": "1",
     }
-    for number in list(range(len(FILE_NAMES)))[:: 1 if os.environ.get("IDLC_LONG") else 6]:
+    for number in list(range(len(FILE_NAMES)))[:: 1 if FUZZING else 6]:
         here = tmp_path / "here" / str(number)
         name = list(FILE_NAMES.values())[number]
         for paths in (".", "$(touch CANARY) ; touch CANARY"):

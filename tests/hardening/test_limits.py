@@ -21,9 +21,10 @@ import idlc.project.inputs
 from idlc.cli.main import main
 from idlc.wire.layout import MAX_DEPTH
 from tests.support.files import write
+from tests.support.rounds import FUZZING, some
 
 #: How much larger input is when there is time, as in `make fuzz`.
-SCALE = 5 if os.environ.get("IDLC_LONG") else 1
+SCALE = 5 if FUZZING else 1
 A = "msg/A.msg"
 
 
@@ -136,7 +137,7 @@ def assert_linear(files_of, words_of, start=100):
     assert four - two <= 2.5 * (two - one) + 500, counts[1:]
 
 
-@pytest.mark.parametrize("what", [*MANY, *MANY_PROBLEMS])
+@pytest.mark.parametrize("what", some([*MANY, *MANY_PROBLEMS]))
 def test_checking_is_linear(what):
     assert_linear({**MANY, **MANY_PROBLEMS}[what], lambda folder: ["check", folder])
 
@@ -369,8 +370,8 @@ def test_a_package_xml_of_many_tags_is_read_soon(text, here):
 
 
 def test_a_cmake_file_of_many_lists_is_read_soon(here):
-    lists = numbered("set(v@ std_msgs)\nlist(APPEND w@ std_msgs)", 60_000)
-    words = numbered("${v@}", 60_000)
+    lists = numbered("set(v@ std_msgs)\nlist(APPEND w@ std_msgs)", 12_000)
+    words = numbered("${v@}", 12_000)
     text = f"{lists}rosidl_generate_interfaces(p {A} DEPENDENCIES {words})"
     make(here / "pkg", {**xml(1, ""), A: "int8 x\n", "CMakeLists.txt": text})
     limited([["check", "pkg"]])

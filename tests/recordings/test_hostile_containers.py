@@ -1,9 +1,5 @@
-"""Containers from anybody: each ends in messages or in an error, in bounded time and memory.
+"""Containers from anybody: each ends in messages or in an error, in bounded time and memory."""
 
-`make fuzz` raises the number of inputs (IDLC_FUZZ) and takes another seed (IDLC_FUZZ_SEED).
-"""
-
-import os
 import random
 import re
 import subprocess
@@ -20,9 +16,9 @@ from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.records import CHUNK_OP, HEAD, MAGIC
 from idlc.recordings.containers.source import RecordingError
 from tests.support import recordings as made
+from tests.support.rounds import SEED, rounds
 
-COUNT = int(os.environ.get("IDLC_FUZZ", "150"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
+COUNT = rounds(150)
 SMALL = [one for one in made.messages(24) if one.topic != "/camera/image"]
 #: Where readers that trust numbers go wrong.
 NUMBERS = [
@@ -74,6 +70,7 @@ def read(path, index):
         return sum(len(view) for one in found for view in one.views())
 
 
+@pytest.mark.rounds
 def test_mutated_containers_end_in_messages_or_in_an_error(tmp_path):
     rng = random.Random(SEED)
     sound = sources(tmp_path)
@@ -89,10 +86,11 @@ def test_mutated_containers_end_in_messages_or_in_an_error(tmp_path):
     assert 0 < errors < 2 * COUNT
 
 
+@pytest.mark.rounds
 def test_mutated_messages_end_in_values_or_in_an_error(tmp_path):
     rng = random.Random(SEED)
     path = tmp_path / "mutated.mcap"
-    for _ in range(max(COUNT // 5, 10)):
+    for _ in range(rounds(30)):
         found = [one._replace(data=mutated(one.data, rng)) for one in SMALL]
         made.by_mcap(path, found, "")
         with idlc.Recording(path) as recording:

@@ -22,9 +22,8 @@ from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.messages import Window
 from idlc.recordings.containers.source import RecordingError
 from tests.support.mcap_mutations import COMPRESS, MAGIC
+from tests.support.rounds import SEED, rounds
 
-COUNT = int(os.environ.get("IDLC_FUZZ", "150"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
 TOPICS = {1: "/a", 2: "/b", 3: "/a"}
 
 
@@ -171,9 +170,10 @@ def outcome(path, window):
         return None
 
 
+@pytest.mark.rounds
 def test_no_window_loses_a_message(tmp_path):
     rng, path, lies = random.Random(SEED), tmp_path / "a.mcap", 0
-    for number in range(4 * COUNT):
+    for number in range(rounds(600)):
         file = File(rng)
         path.write_bytes(file.finished())
         every = sorted(sequential(path), key=lambda one: one[0])

@@ -1,6 +1,5 @@
 """MCAP files with topics of other types: the mcap library finds all else as it was."""
 
-import os
 import random
 from dataclasses import replace
 from functools import partial
@@ -21,9 +20,8 @@ from tests.recordings.test_mixed_mcap import DEFINED, SCHEMA, File, record, text
 from tests.support import recordings as made
 from tests.support.mcap_content import check_indexes, content
 from tests.support.mcap_mutations import MAGIC
+from tests.support.rounds import SEED, rounds
 
-COUNT = int(os.environ.get("IDLC_FUZZ", "150"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
 NEW = Conversion("new_msgs/msg/New", "ros2msg", "int8 a\nint8 b\n", "RIHS01_new")
 
 
@@ -112,7 +110,8 @@ def written(path, rng, topics, compression, options, count):
 TOPICS = [("/a", "x/msg/A"), ("/b", "x/msg/A"), ("/c", "x/msg/C"), ("/d", "x/msg/D")]
 
 
-@settings(max_examples=COUNT, deadline=None)
+@pytest.mark.rounds
+@settings(max_examples=rounds(150), deadline=None)
 @given(
     seed=st.integers(0, 1 << 32),
     compression=st.sampled_from(CompressionType),
@@ -142,11 +141,12 @@ def test_all_that_is_not_of_a_changed_topic_stays(
     assert sorted(path.name for path in folder.iterdir()) == ["source.mcap", "target.mcap"]
 
 
+@pytest.mark.rounds
 def test_files_that_are_put_together_in_any_way(tmp_path):
     """With records outside of chunks, repeated definitions, without indexes, and cut off."""
     rng = random.Random(SEED)
     source, target = tmp_path / "source.mcap", tmp_path / "target.mcap"
-    for _ in range(2 * COUNT):
+    for _ in range(rounds(300)):
         file = File(rng)
         source.write_bytes(file.finished())
         conversions = rng.choice([{}, {"/a": NEW}, {"/a": CONVERTED}, {"/b": CONVERTED}])

@@ -1,10 +1,8 @@
 """Tokens and attachments from anybody are read or ignored, and take up bounded memory.
 
-`make fuzz` raises the number of inputs (twenty times IDLC_FUZZ of each kind) and takes another
-seed (IDLC_FUZZ_SEED). test_node_hostile.py does the same with the messages of a node.
+test_node_hostile.py does the same with the messages of a node.
 """
 
-import os
 import random
 import re
 import tracemalloc
@@ -18,9 +16,9 @@ from idlc.robot.keys import Kind, pack_attachment, parse_attachment, parse_token
 from idlc.robot.names import is_absolute, is_namespace, is_node_name
 from tests.robot.test_graph import Tokens, entity
 from tests.robot.test_keys import TOKENS
+from tests.support.rounds import SEED, rounds
 
-COUNT = 20 * int(os.environ.get("IDLC_FUZZ", "3000"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
+COUNT = rounds(60_000)
 STRANGE = "/%:,;*$#?@~.\0\n\\\"' a9_\u202e\U0001f916\u0663\uff11\u00b2\u0430"
 #: The parts of a token that contain names: enclave, namespace, node, name, type and hash.
 NAMES = {
@@ -63,6 +61,7 @@ def is_sound(end):
     return names and is_absolute(end.name) and key.isascii() and not set("*$?# \n") & set(key)
 
 
+@pytest.mark.rounds
 def test_mutated_tokens_are_ignored_or_contain_valid_names():
     rng = random.Random(SEED)
     tokens, expected, bad = Tokens(), set(), 0
@@ -101,6 +100,7 @@ def test_every_byte_and_odd_digits_in_each_name(place):
                 assert (end is not None) == bool(NAMES[place].fullmatch(text)), parts
 
 
+@pytest.mark.rounds
 def test_mutated_attachments_are_refused_or_read():
     rng = random.Random(SEED)
     numbers = [0, 1, -1, 2**31, 2**63 - 1, -(2**63)]

@@ -1,7 +1,4 @@
-"""A hundred nodes that nobody asked for: random endpoints, types, names and options.
-
-`IDLC_SEED` chooses others.
-"""
+"""A hundred nodes that nobody asked for: random endpoints, types, names and options."""
 
 import os
 import random
@@ -14,13 +11,13 @@ import pytest
 
 from idlc.cli.main import main
 from tests.support.nodes import nodes
+from tests.support.rounds import FUZZING, SEED
 
 pytestmark = pytest.mark.long
 
-SEED = int(os.environ.get("IDLC_SEED", "4"))
 COUNT = 100
-#: Of these, every third is started in `make test`, all by IDLC_LONG.
-EVERY = 1 if os.environ.get("IDLC_LONG") else 3
+#: Of these, every third is started, all by `make fuzz`.
+EVERY = 1 if FUZZING else 3
 AT_ONCE = 5
 TYPES = {
     "msg": (
@@ -101,7 +98,7 @@ def options(chance: random.Random) -> list[str]:
 @pytest.fixture(scope="module")
 def package(tmp_path_factory) -> Path:
     """Return a package with all the nodes, compiled."""
-    chance = random.Random(SEED)
+    chance = random.Random(SEED + 3)
     folder = tmp_path_factory.mktemp("combinations")
     here = Path.cwd()
     try:

@@ -1,7 +1,7 @@
 """The generated test of a node notices what a person, or a changed interface, breaks in the node.
 
 Each mutant is a generated node with one thing broken. Its test must fail, and show what the node
-printed. `make test` takes every sixth mutant, `IDLC_LONG=1` all of them.
+printed. `make test-long` takes every sixth mutant, `make fuzz` all of them.
 """
 
 import os
@@ -14,10 +14,11 @@ import pytest
 
 from idlc.cli.main import main
 from tests.support import programs
+from tests.support.rounds import FUZZING
 
 pytestmark = pytest.mark.long
 
-EVERY = 1 if os.environ.get("IDLC_LONG") else 6
+EVERY = 1 if FUZZING else 6
 AT_ONCE = 4
 MARK = "this is the mutant"
 #: How long a mutant's test waits for what never happens.

@@ -1,11 +1,9 @@
 """idlc and the installed rosidl agree on interface files that nobody wrote.
 
-The seed is fixed, so a disagreement stays until it is fixed. To search further:
-IDLC_LIVE_SEED=2 IDLC_LIVE_FILES=5000 make test ARGS='-k live'
+The seed is fixed, so a disagreement stays until it is fixed. `make fuzz` searches further.
 """
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -17,15 +15,16 @@ from tests.support import idl_view, rosidl_view
 from tests.support.inventions import Inventor
 from tests.support.oddities import Oddities
 from tests.support.paths import PROGRAMS, VERDICTS
+from tests.support.rounds import FUZZING, SEED, rounds
 
-SEED = int(os.environ.get("IDLC_LIVE_SEED", "1"))
-FILES = int(os.environ.get("IDLC_LIVE_FILES", "500"))  # rosidl takes about 0.1 s for each
+#: rosidl takes about 0.1 s for each.
+FILES = rounds(500) if FUZZING else 500
 FAMILIES = {
     "inventions": lambda: Inventor(SEED, known_texts()).cases(FILES * 7 // 10),
     "oddities": lambda: Oddities(SEED).cases(FILES * 3 // 10),
 }
 #: Each is made in parts, so that several processes can share the work; the files are the same.
-PARTS = 5
+PARTS = 20
 
 
 def known_texts() -> dict[str, list[str]]:

@@ -1,6 +1,5 @@
 """Columns of any messages hold what the messages hold, and refuse what these refuse."""
 
-import os
 import random
 import struct
 from contextlib import suppress
@@ -23,6 +22,7 @@ from tests.support.columns import (
     selected,
 )
 from tests.support.layouts import random_package
+from tests.support.rounds import rounds
 
 FILES = {
     "msg/Point.msg": "float64 x\nfloat64 y\nfloat64 z\n",
@@ -380,11 +380,12 @@ def mutated(raw, rng):
     return bytes(raw)
 
 
+@pytest.mark.rounds
 @pytest.mark.parametrize("name", NAMES)
 def test_the_verdict_is_that_of_deserialize(folder, error, name):
     rng = random.Random(name)
     cls = class_of(name)
-    for _ in range(max(60, int(os.environ.get("IDLC_FUZZ", "0")) // 10)):
+    for _ in range(rounds(60)):
         count = rng.choice([1, 2, 15])
         raws = buffers_of(messages_of(cls, rng, count, rng.choice([3, 6])), rng)
         wrong = rng.randrange(count)

@@ -1,6 +1,5 @@
 """Buffers that somebody else made: a value or DecodeError, in memory bounded by the buffer."""
 
-import os
 import random
 import tracemalloc
 from contextlib import suppress
@@ -9,12 +8,11 @@ import pytest
 
 from idlc.model import catalog
 from tests.support import generated, values
+from tests.support.rounds import rounds
 
 pytestmark = pytest.mark.usefixtures("standard")
 
 INTERFACES = catalog.interfaces()
-#: Mutations of each structure; raise it for a longer search.
-BUDGET = max(40, int(os.environ.get("IDLC_FUZZ", "0")) // 10)
 HUGE = [b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\xff\xff\0\0", b"\0\0\0\1"]
 #: Bytes of memory that one byte of a buffer may cost: an object for each byte.
 PER_BYTE = 400
@@ -44,6 +42,7 @@ def mutated(raw, rng):
     return bytes(raw)
 
 
+@pytest.mark.rounds
 @pytest.mark.parametrize("name", INTERFACES, ids=str)
 def test_mutated_buffers_end_in_a_value_or_in_decode_error(name):
     rng = random.Random(str(name))
@@ -53,7 +52,7 @@ def test_mutated_buffers_end_in_a_value_or_in_decode_error(name):
         error = __import__(f"{name.package}._idlc")._idlc.DecodeError
         for order in ("little", "big"):
             raw = message.serialize(byteorder=order)
-            for _ in range(BUDGET // 2):
+            for _ in range(rounds(20)):
                 buffer = mutated(raw, rng)
                 try:
                     found, offset = cls.deserialize(buffer), 0

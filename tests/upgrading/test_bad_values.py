@@ -14,10 +14,9 @@ from idlc.cli.main import main
 from tests.recordings.test_hostile_containers import mutated, sources
 from tests.support import db3_mutations, mcap_mutations
 from tests.support.paths import ROOT
+from tests.support.rounds import SEED, rounds
 from tests.upgrading.test_command import PAIR, key_of, write_package, write_recording
 
-COUNT = int(os.environ.get("IDLC_FUZZ", "150"))
-SEED = int(os.environ.get("IDLC_FUZZ_SEED", "1"))
 OLD = {"Drive": "Wheel wheel\nWheel[] wheels\n", "Wheel": "int8 size\n"}
 NEW = {
     "Drive": "Wheel wheel\nWheel[] wheels\nfloat32[] numbers\nint8[] few\nWheel hub\nWheel[] all\n",
@@ -147,6 +146,7 @@ def test_a_run_that_ends_early_leaves_the_source(types, tmp_path, name):
         assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.rounds
 def test_hostile_recordings_end_in_an_error(tmp_path, monkeypatch, capsys):
     """The new type of /imu has another field, so that messages are converted."""
     monkeypatch.chdir(tmp_path)
@@ -159,7 +159,7 @@ def test_hostile_recordings_end_in_an_error(tmp_path, monkeypatch, capsys):
     sound = sources(tmp_path / "sound")
     sound += 4 * sound[-1:]
     source, out = tmp_path / "hostile", tmp_path / "out"
-    for number in range(COUNT):
+    for number in range(rounds(150)):
         data = sound[number % len(sound)]
         if number % 2:
             source.write_bytes(mutated(data, rng))

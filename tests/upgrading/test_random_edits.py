@@ -3,15 +3,18 @@
 import pickle
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import idlc
 from idlc.recordings.columns.values import Columns
 from tests.support import upgrades
+from tests.support.rounds import rounds
 
 
-@settings(max_examples=100)
+@pytest.mark.rounds
+@settings(max_examples=rounds(100))
 @given(st.data())
 def test_it_is_what_a_reader_of_json_makes_of_it(tmp_path_factory, data):
     pair = data.draw(upgrades.pairs())
@@ -37,7 +40,8 @@ def test_it_is_what_a_reader_of_json_makes_of_it(tmp_path_factory, data):
         assert upgrade.many(payloads) == payloads
 
 
-@settings(max_examples=60)
+@pytest.mark.rounds
+@settings(max_examples=rounds(60))
 @given(st.data())
 def test_columns_are_those_of_the_new_bytes(tmp_path_factory, data):
     pair = data.draw(upgrades.pairs())

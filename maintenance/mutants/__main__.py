@@ -1,0 +1,190 @@
+"""`python -m maintenance.mutants`: make mistakes in idlc, and see which tests notice them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import SimpleQueue
+from typing import NamedTuple
+
+from maintenance.mutants.lines import Lines, key
+from maintenance.mutants.mutations import Mutation, choose
+from tests.support.costs import TABLE, Costs
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "build/mutants"
+#: Tests that cost more CPU-seconds than the last number run after those that cost less.
+STEPS = (0.05, 0.3, 1.0, 3.0, float("inf"))
+#: A test that takes longer, in seconds, hangs because of the mistake, which is thereby noticed.
+HANG = 120
+
+
+class Outcome(NamedTuple):
+    """What the tests made of a mistake: the test that failed, or None, and how many ran."""
+
+    mutation: Mutation
+    test: str | None
+    ran: int
+    seconds: float
+
+
+def main() -> int:
+    """Run what the command line asks for."""
+    parser = argparse.ArgumentParser(prog="make mutants", description=__doc__)
+    parser.add_argument("--number", type=int, default=80, help="how many mistakes to make")
+    parser.add_argument("--seed", type=int, default=1, help="which mistakes to make")
+    parser.add_argument("--jobs", type=int, default=2, help="how many to try at a time")
+    parser.add_argument("--record", action="store_true", help="record again which lines tests run")
+    options = parser.parse_args()
+    lines = FOLDER / "lines"
+    clones = [clone(number) for number in range(options.jobs)]
+    if options.record or not (lines / "tests.json").exists():
+        record(clones[0], lines, options.jobs)
+    recorded = Lines(lines, clones[0])
+    tests = json.loads((lines / "tests.json").read_text(encoding="ascii"))
+    chosen = choose(ROOT, recorded.executed, options.number, options.seed)
+    outcomes = list(run(chosen, recorded, tests, clones))
+    print(report(outcomes, Costs.read(TABLE)))
+    return 0
+
+
+def clone(number: int) -> Path:
+    """Return a clone of the last commit with an environment, in which mistakes are made."""
+    folder = FOLDER / f"clone-{number}"
+    shutil.rmtree(folder / "idlc", ignore_errors=True)
+    if not folder.exists():
+        git("clone", "--quiet", "--shared", str(ROOT), str(folder))
+    commit = git("rev-parse", "HEAD").strip()
+    git("-C", str(folder), "fetch", "--quiet", "origin")
+    git("-C", str(folder), "checkout", "--quiet", "--force", "--detach", commit)
+    make = ["make", "-C", str(folder), "--no-print-directory", "environment"]
+    subprocess.run(make, check=True)
+    return folder
+
+
+def git(*words: str) -> str:
+    """Run git in this repository, and return what it prints."""
+    done = subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True)
+    return done.stdout
+
+
+def python(folder: Path) -> str:
+    """Return the interpreter of a clone's environment."""
+    return str(next(folder.glob(".venv/test-*/bin/python")))
+
+
+def record(folder: Path, lines: Path, jobs: int) -> None:
+    """Run all tests of a clone, and record which lines of idlc they execute."""
+    shutil.rmtree(lines, ignore_errors=True)
+    words = ["-p", "maintenance.mutants.plugin", "--lines", str(lines), "-n", str(jobs)]
+    pytest = [python(folder), "-m", "pytest", "-q", "--timeout", "900", *words]
+    done = subprocess.run(pytest, cwd=folder, check=False)
+    if done.returncode > 1:
+        sys.exit("the tests cannot be recorded")
+
+
+def run(
+    chosen: list[Mutation], recorded: Lines, tests: list[str], clones: list[Path]
+) -> Iterator[Outcome]:
+    """Try each mistake in a clone, as many at a time as there are clones."""
+    costs = Costs.read(TABLE)
+    free: SimpleQueue[Path] = SimpleQueue()
+    for folder in clones:
+        free.put(folder)
+
+    def attempt(mutation: Mutation) -> Outcome:
+        keys = recorded.tests_of(mutation.file, mutation.line)
+        candidates = [test for test in tests if key(test) in keys]
+        folder = free.get()
+        try:
+            outcome = try_mutation(folder, mutation, candidates, costs)
+        finally:
+            free.put(folder)
+        print(row(outcome, costs), flush=True)
+        return outcome
+
+    with ThreadPoolExecutor(len(clones)) as pool:
+        yield from pool.map(attempt, chosen)
+
+
+def try_mutation(folder: Path, mutation: Mutation, tests: list[str], costs: Costs) -> Outcome:
+    """Run the tests of a line with the mistake in it, cheapest first, until one fails."""
+    path = folder / mutation.file
+    source = path.read_text(encoding="utf-8")
+    started, ran, failed = time.monotonic(), 0, None
+    write(path, mutation.applied(source))
+    try:
+        low = -1.0
+        for high in STEPS:
+            step = [test for test in tests if low < costs.of(test) <= high]
+            # the tests of the same room first: they ask what the line is for
+            room = f"tests/{Path(mutation.file).parts[1]}/"
+            step.sort(key=lambda test: not test.startswith(room))
+            failed = first_failure(folder, step) if step else None
+            ran += len(step)
+            low = high
+            if failed:
+                break
+    finally:
+        write(path, source)
+    return Outcome(mutation, failed, ran, time.monotonic() - started)
+
+
+def write(path: Path, text: str) -> None:
+    """Write a module so that Python compiles it again, however soon after the last time."""
+    before = path.stat().st_mtime
+    path.write_text(text, encoding="utf-8")
+    os.utime(path, (before + 2, before + 2))
+
+
+def first_failure(folder: Path, tests: list[str]) -> str | None:
+    """Return the first of the tests that fails, or None."""
+    names = folder / "build/mutant-tests.json"
+    names.parent.mkdir(exist_ok=True)
+    names.write_text(json.dumps(tests), encoding="ascii")
+    files = dict.fromkeys(test.partition("::")[0] for test in tests)
+    words = ["--only", str(names), "-x", "-q"]
+    words += ["--timeout", str(HANG), "-p", "no:cacheprovider"]
+    done = subprocess.run(
+        [python(folder), "-m", "pytest", *words, *files],
+        cwd=folder,
+        check=False,
+        capture_output=True,
+        text=True,
+        errors="replace",
+    )
+    if done.returncode in (0, 5):
+        return None
+    lines = done.stdout.splitlines()
+    failed = [line for line in lines if line.startswith(("FAILED ", "ERROR "))]
+    return failed[0].split(" - ")[0].partition(" ")[2] if failed else "(pytest ended)"
+
+
+def row(outcome: Outcome, costs: Costs) -> str:
+    """Return a line of the table."""
+    mutation = outcome.mutation
+    noticed = "not noticed" if outcome.test is None else costs.tier(outcome.test)
+    place = f"{mutation.file}:{mutation.line}"
+    effort = f"{outcome.ran:6} {outcome.seconds:7.1f}"
+    return f"{noticed:12} {place:50} {mutation.kind:18} {effort}  {outcome.test or ''}"
+
+
+def report(outcomes: list[Outcome], costs: Costs) -> str:
+    """Return how many mistakes each tier noticed."""
+    tiers = Counter("" if o.test is None else costs.tier(o.test) for o in outcomes)
+    missed = tiers.pop("", 0)
+    parts = ", ".join(f"{tier} {number}" for tier, number in sorted(tiers.items()))
+    return f"noticed {len(outcomes) - missed} of {len(outcomes)}: {parts}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
