@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+import tests.support.shell  # noqa: F401 - first, see there
 from tests.support import costs, generated
 from tests.support.windows import NOT_THERE
 
@@ -105,9 +106,8 @@ def pytest_terminal_summary(terminalreporter, config):
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    """The working folder: empty, and with no ROS but what is built in."""
+    """The working folder, which is empty."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     return tmp_path
 
 

@@ -96,7 +96,6 @@ def tried(tmp_path, monkeypatch, capsys):
         )
         return done.stdout + done.stderr
 
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     monkeypatch.setattr("idlc.project.prefixes.runs_nodes", lambda: True)
     return run
 

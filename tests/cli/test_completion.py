@@ -21,7 +21,6 @@ def package(tmp_path, monkeypatch):
     """The working folder is a package with a message and a service."""
     (tmp_path / "greenhouse").mkdir()
     monkeypatch.chdir(tmp_path / "greenhouse")
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     for path, text in {
         "package.xml": MANIFEST,
         "msg/SensorReading.msg": "int8 a\n",

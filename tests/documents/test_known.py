@@ -15,7 +15,6 @@ MANIFEST = '<package format="3"><name>{}</name></package>'
 def workspace(tmp_path, monkeypatch):
     """A workspace with one package, and no ROS but what is built in."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     monkeypatch.setattr("sys.prefix", str(tmp_path / "no_prefix"))
     write("src/greenhouse/package.xml", MANIFEST.format("greenhouse_msgs"))
     write("src/greenhouse/msg/SensorReading.msg", "std_msgs/Header header\n")

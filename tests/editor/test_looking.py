@@ -228,7 +228,6 @@ MANIFEST = """\
 
 
 def test_package_xml_leads_to_packages_and_to_their_users(editor, package, monkeypatch):
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     other = MANIFEST.replace("two", "three").replace("<name>one", "<name>two")
     files = {"one/package.xml": MANIFEST, "two/package.xml": other, "two/msg/B.msg": "int8 x\n"}
     folder = package({**files, "one/msg/A.msg": "two/B b\nshape_msgs/Plane plane\n"})

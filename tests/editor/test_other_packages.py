@@ -49,7 +49,6 @@ class Client:
 @pytest.fixture
 def start(tmp_path, monkeypatch):
     """Return a function that starts a server in folders of the workspace."""
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     for name, text in FILES.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)

@@ -254,7 +254,6 @@ def test_two_runs_at_once(scene):
         subprocess.Popen(
             [sys.executable, "-c", code, *scene.command.words],
             cwd=before,
-            env={**os.environ, "AMENT_PREFIX_PATH": ""},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

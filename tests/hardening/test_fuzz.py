@@ -16,7 +16,6 @@ from tests.support.rounds import FUZZING, SEED, rounds
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     (tmp_path / ".git").mkdir()
     return tmp_path
 

@@ -29,7 +29,6 @@ def colourful():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FORCE_COLOR", "1")
         patch.delenv("NO_COLOR", raising=False)
-        patch.delenv("AMENT_PREFIX_PATH", raising=False)
         yield
 
 

@@ -34,9 +34,8 @@ def folder(tmp_path_factory):
 def test_an_example(command, expected, folder):
     python = f"'{sys.executable}'"
     functions = f'idlc() {{ {python} -m idlc "$@"; }}\npython() {{ {python} "$@"; }}\n'
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    environment = {**os.environ, "PYTHONPATH": path, "AMENT_PREFIX_PATH": ""}
-    command = command.replace("PYTHONPATH=", f"PYTHONPATH={path}:")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = command.replace("PYTHONPATH=", f"PYTHONPATH={ROOT}:")
     done = subprocess.run(
         ["/bin/sh", "-c", functions + command],
         capture_output=True,

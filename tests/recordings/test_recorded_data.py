@@ -33,9 +33,8 @@ def folder(tmp_path_factory):
 
 
 def run(folder, *words):
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    env = {**os.environ, "PYTHONPATH": path, "DO_NOT_TRACK": "1", "DAFT_ANALYTICS_ENABLED": "0"}
-    env |= {"MPLBACKEND": "agg", "COLUMNS": "88"}
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "DO_NOT_TRACK": "1"}
+    env |= {"DAFT_ANALYTICS_ENABLED": "0", "MPLBACKEND": "agg", "COLUMNS": "88"}
     command = [sys.executable, *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, env=env)
     assert done.returncode == 0, done.stderr
@@ -163,8 +162,7 @@ def test_ray_finds_what_one_process_finds_though_a_worker_dies(tmp_path):
     python = str(tmp_path / "env/bin/python")
     pip = ("-m", "pip", "--python", python, "install", "-q", "--disable-pip-version-check")
     run(tmp_path, *pip, "ray[data]>=2.60")
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    env = {**os.environ, "PYTHONPATH": path, "RAY_USAGE_STATS_ENABLED": "0"}
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "RAY_USAGE_STATS_ENABLED": "0"}
     command = [python, "-c", ON_RAY]
     done = subprocess.run(
         command, capture_output=True, text=True, check=False, cwd=tmp_path, env=env

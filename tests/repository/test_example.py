@@ -42,7 +42,6 @@ def replayed(tmp_path_factory) -> Path:
         "PYTHON": sys.executable,
         "PYTHONPATH": str(ROOT),
         "PYTHONDONTWRITEBYTECODE": "1",
-        "AMENT_PREFIX_PATH": "",
     }
     done = subprocess.run(
         ["/bin/sh", "-c", story()],
@@ -78,7 +77,7 @@ def run(*words: str, cwd: Path = EXAMPLE) -> str:
     done = subprocess.run(
         [sys.executable, "-m", *words],
         cwd=cwd,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "AMENT_PREFIX_PATH": ""},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
         check=False,

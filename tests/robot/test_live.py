@@ -22,8 +22,6 @@ LATCHED = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 @pytest.fixture(autouse=True)
 def _in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
 
 
 @pytest.fixture

@@ -92,7 +92,6 @@ def describers(number):
 @pytest.fixture(params=[topics, similar, types, versions, profiles, actions, describers])
 def robot(request, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     common = {"kind": Kind.PUBLISHER, "type": STRING, "hash": STRING_HASH}
     ids = {"domain": 0, "session": "f1", "node_id": 0}
     tokens = [

@@ -36,10 +36,9 @@ def run_with(*command: object, cwd: Path, **variables: str) -> str:
 
 
 def clean_environment() -> dict[str, str]:
-    """Return this process's environment without what points to other installations."""
-    pointers = {"PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH"}
+    """Return this process's environment without what the ROS 2 wheels set."""
     return {
         name: value
         for name, value in os.environ.items()
-        if name not in pointers and not name.startswith("_ROS_WHEELS")
+        if name != "LD_LIBRARY_PATH" and not name.startswith("_ROS_WHEELS")
     }

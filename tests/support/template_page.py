@@ -117,7 +117,6 @@ def _outputs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[in
 
     _record(note, monkeypatch)
     # the page is one, whether ROS 2 with its comments is installed or not
-    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
     monkeypatch.setattr("sys.prefix", str(folder / "nowhere"))
     for path, text in FILES.items():
         write(folder / path, text)
