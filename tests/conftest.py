@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import tests.support.shell  # noqa: F401 - first, see there
-from tests.support import costs, generated
+from tests.support import costs, generated, waiting
 from tests.support.windows import NOT_THERE
 
 # Who starts tests in the background may ignore these, and what tests start would, too.
@@ -18,6 +18,8 @@ for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.
     number = getattr(signal, name, None)  # Windows has only the first
     if number is not None and signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
+
+waiting.limit_programs()
 
 # What tests load is kept for this run alone, in all its processes.
 CACHE = tempfile.TemporaryDirectory(prefix="idlc-cache-")

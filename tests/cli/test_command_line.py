@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -21,6 +20,7 @@ from idlc.version import __version__
 from tests.support import recordings
 from tests.support.files import write
 from tests.support.paths import ROOT
+from tests.support.waiting import read_line, wait_for
 
 MSG = "float64 speed\n"
 
@@ -306,9 +306,6 @@ def test_what_ci_systems_read_of_generated_code(style):
     assert idlc(*words, "--watch").returncode == 2
 
 
-COLOURS = ("NO_COLOR", "FORCE_COLOR", "CLICOLOR_FORCE")
-
-
 @pytest.mark.parametrize(
     ("variables", "colour"),
     [
@@ -339,8 +336,7 @@ COLOURS = ("NO_COLOR", "FORCE_COLOR", "CLICOLOR_FORCE")
 def test_piped_output_is_plain_unless_colour_is_requested(words, variables, colour):
     make("demo/msg/A.msg", "flot64 a\n")
     make("demo/msg/B.msg", "float64 a 0.5  # [m]\n")
-    plain = {name: value for name, value in os.environ.items() if name not in COLOURS}
-    done = idlc(*words, env={**plain, "PYTHONUTF8": "1", **variables})
+    done = idlc(*words, env={**os.environ, "PYTHONUTF8": "1", **variables})
     assert ("\x1b[" in done.stdout + done.stderr) is colour
 
 
@@ -517,13 +513,6 @@ def test_a_working_folder_whose_path_is_too_long_to_be_opened(here, monkeypatch)
     assert idlc("check", "A.msg").returncode == 0
 
 
-def wait_for(condition) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.05)
-
-
 def test_watching_compiles_after_each_change_and_ctrl_c_ends_it():
     make("demo/msg/A.msg")
     both = ["-o", "out/demo", "--ament", "prefix"]
@@ -537,21 +526,21 @@ def test_watching_compiles_after_each_change_and_ctrl_c_ends_it():
     ) as process:
         try:
             for _ in both[::2]:
-                assert "demo: 1 interface" in process.stdout.readline()
-            assert "watching demo" in process.stderr.readline()
+                assert "demo: 1 interface" in read_line(process.stdout)
+            assert "watching demo" in read_line(process.stderr)
             make("demo/msg/B.msg")
             wait_for(Path("out/demo/msg/_b.py").is_file)
             for _ in both[::2]:
-                assert "demo: 2 interfaces" in process.stdout.readline()
+                assert "demo: 2 interfaces" in read_line(process.stdout)
             assert b"__demo__msg__B\0" in library.read_bytes()
             make("demo/msg/B.msg", "flot64 broken\n")
-            assert "IDL201" in process.stderr.readline()
+            assert "IDL201" in read_line(process.stderr)
             Path("demo/msg/B.msg").unlink()
             wait_for(lambda: not Path("out/demo/msg/_b.py").exists())
             wait_for(lambda: b"__demo__msg__B\0" not in library.read_bytes())
         finally:
             process.send_signal(signal.SIGINT)
-            _, err = process.communicate(timeout=30)
+            _, err = process.communicate()
     assert process.returncode == 0
     assert "Traceback" not in err
 

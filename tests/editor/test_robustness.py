@@ -13,8 +13,7 @@ import pytest
 
 from idlc.editor.server import FILE_METHODS, METHODS, Server
 from tests.editor.test_golden_replay import notification, request
-
-PATIENCE = 30
+from tests.support.waiting import LIMIT, read_line
 
 
 def frame(message):
@@ -29,7 +28,6 @@ def run(*parts, status=0):
         [sys.executable, "-m", "idlc", "lsp"],
         input=data,
         capture_output=True,
-        timeout=PATIENCE,
         check=False,
     )
     assert done.stderr == b""
@@ -240,12 +238,12 @@ def test_it_ends_with_a_client_that_reads_no_more(unbuffered, workspace):
     with start(PYTHONUNBUFFERED=unbuffered) as server:
         server.stdin.write(frame(beginning(rootUri=workspace.as_uri())))
         server.stdin.flush()
-        assert server.stdout.readline()
+        assert read_line(server.stdout)
         server.stdout.close()
         _, first = opened(workspace, "flot64 x\n")
         server.stdin.write(frame(first))
         server.stdin.flush()
-        assert server.wait(PATIENCE) == 1
+        assert server.wait(LIMIT) == 1
         assert server.stderr.read() == b""
 
 
@@ -257,16 +255,16 @@ def test_it_ends_when_the_client_is_gone_although_the_stream_is_open():
     with start("-c", f"{impatient}; raise SystemExit(main(['lsp']))") as server:
         server.stdin.write(frame(beginning(processId=client.pid)))
         server.stdin.flush()
-        assert server.wait(PATIENCE) == 1
+        assert server.wait(LIMIT) == 1
 
 
 def test_an_interrupt_ends_it_quietly():
     with start() as server:
         server.stdin.write(frame(beginning()))
         server.stdin.flush()
-        assert server.stdout.readline()
+        assert read_line(server.stdout)
         server.send_signal(signal.SIGINT)
-        server.wait(PATIENCE)
+        server.wait(LIMIT)
         assert b"Traceback" not in server.stderr.read()
 
 
@@ -302,7 +300,6 @@ def test_words_that_clients_add_cost_no_time(words):
         [sys.executable, "-c", code, "lsp", *words],
         input=b"".join(map(frame, (beginning(), *END))),
         capture_output=True,
-        timeout=PATIENCE,
         check=True,
     )
     assert len(list(messages_in(done.stdout))) == 2

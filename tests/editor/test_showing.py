@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import time
 
 import pytest
 from lsprotocol import types as lsp
@@ -12,8 +11,9 @@ from idlc.editor.parts import DocumentParams, VersionedUri
 from idlc.editor.problems import rest
 from idlc.editor.protocol import TYPES
 from idlc.editor.state import ServerState
-from tests.support.editor import PATIENCE, at, between
+from tests.support.editor import at, between
 from tests.support.tools import tool
+from tests.support.waiting import wait_for
 
 STOP = """\
 # Stops the robot.
@@ -227,10 +227,7 @@ def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
     assert lenses(one, uri)[2] == "breaks: wire, hash, source for 0 users against git:HEAD"
     (folder / "msg/New.msg").write_text("int16 x\n")
     git(folder, "commit", "-aqm", "second")
-    until = time.monotonic() + PATIENCE
-    while lsp.WORKSPACE_CODE_LENS_REFRESH not in [method for method, _ in asked]:
-        assert time.monotonic() < until
-        time.sleep(0.1)
+    wait_for(lambda: lsp.WORKSPACE_CODE_LENS_REFRESH in [method for method, _ in asked])
     assert lenses(one, uri)[2] == "no breaking changes against git:HEAD"
 
 

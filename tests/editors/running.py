@@ -9,10 +9,9 @@ from typing import Any
 
 from tests.editors.scenario import SETTINGS
 from tests.support.paths import ROOT
+from tests.support.waiting import WORK
 
 HERE = Path(__file__).parent
-#: Seconds that an editor may take on a busy machine.
-PATIENCE = 200
 #: Where editors keep what is theirs.
 HOMES = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME")
 
@@ -21,12 +20,10 @@ def environment(folder: Path, **variables: str) -> dict[str, str]:
     """Return the environment of an editor: no ROS, an empty home, and `rosidlc` on PATH."""
     found = {**os.environ, **dict.fromkeys(HOMES, str(folder / "home")), **variables}
     found["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    return found | {"AMENT_PREFIX_PATH": ""}
+    return found
 
 
-def see(
-    package: Path, *command: object, patience: int = PATIENCE, **variables: str
-) -> dict[str, Any]:
+def see(package: Path, *command: object, patience: int = WORK, **variables: str) -> dict[str, Any]:
     """Return what an editor that runs a script wrote into the file that $SEEN names."""
     folder = package.parent
     seen = folder / "seen.json"

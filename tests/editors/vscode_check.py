@@ -7,15 +7,17 @@ import os
 import shutil
 import sys
 
+import pytest
+
 from tests.editors import running, scenario
 from tests.support import browser
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "build" / "vscode"
-#: Seconds for all of it on a busy machine.
-PATIENCE = 1500
+PATIENCE = 1500  # VS Code starts several times
 
 
+@pytest.mark.timeout(PATIENCE)
 def test_vscode(package):
     # VS Code asks a login shell for PATH, which knows nothing of the tests
     workspace = scenario.write(package.parent / "renaming", scenario.RENAMING)

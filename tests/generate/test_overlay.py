@@ -13,6 +13,7 @@ from idlc.cli.main import main
 from idlc.diagnostics.codes import CANNOT_WRITE
 from idlc.project.prefixes import Distribution
 from tests.support.machine import running, tree
+from tests.support.waiting import LIMIT
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n"}
 NEW = {"msg/A.msg": "int16 a\n", "msg/B.msg": "A a\nbuiltin_interfaces/Time time\n"}
@@ -247,7 +248,7 @@ def test_runs_at_the_same_time(tmp_path):
         write(tmp_path / name, Reach="float64 metres\n")
     command = [sys.executable, "-m", "idlc", "gen", "--ament", "out"]
     runs = [subprocess.Popen([*command, name], cwd=tmp_path, env=os.environ) for name in names]
-    assert [run.wait() for run in runs] == [0] * len(names)
+    assert [run.wait(LIMIT) for run in runs] == [0] * len(names)
     found = tree(tmp_path / "out")
     for name in names:
         assert LIBRARY.format(name) in found

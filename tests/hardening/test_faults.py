@@ -19,6 +19,7 @@ from idlc.diagnostics.report import Report
 from idlc.project.lock import load_lock
 from tests.support.machine import GEN, another_user, running, tree
 from tests.support.rounds import ALL
+from tests.support.waiting import read_line
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n", "msg/B.msg": "int8 b\n"}
 NEWEST = {"msg/A.msg": "int32 a\n", "msg/C.msg": "A a\n", "srv/Gone.srv": "int8 a\n---\n"}
@@ -346,11 +347,11 @@ def test_a_run_waits_for_one_that_is_making_the_folders(options, tmp_path):
             )
         )
         if name == "first":
-            assert runs[0].stdout.readline() == "made\n"
+            assert read_line(runs[0].stdout) == "made\n"
     with pytest.raises(subprocess.TimeoutExpired):
         runs[1].wait(1)
     for run in runs:
-        said, _ = run.communicate("\n", timeout=60)
+        said, _ = run.communicate("\n")
         assert run.returncode == 0, said
     assert "int16" in (tmp_path / "out/demo/msg/_a.py").read_text(encoding="utf-8")
 

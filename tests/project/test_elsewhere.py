@@ -26,6 +26,7 @@ from idlc.project import atomic, lock
 from tests.support import programs
 from tests.support.files import write
 from tests.support.paths import ROOT
+from tests.support.waiting import LIMIT, join, read_line
 
 WINDOWS = sys.platform == "win32"
 
@@ -42,14 +43,14 @@ def test_a_run_waits_for_another_one(tmp_path):
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "cwd": tmp_path}
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     first = subprocess.Popen(words, env=environment, **pipes)
-    assert first.stdout.readline() == "in\n"
+    assert read_line(first.stdout) == "in\n"
     second = subprocess.Popen(words, env=environment, **pipes)
     with pytest.raises(subprocess.TimeoutExpired):
         second.wait(1)
-    first.communicate("\n", timeout=60)
-    assert second.stdout.readline() == "in\n"
+    first.communicate("\n")
+    assert read_line(second.stdout) == "in\n"
     second.kill()
-    assert second.communicate(timeout=60)[0] == ""
+    assert second.communicate()[0] == ""
 
 
 class Kernel:
@@ -199,14 +200,14 @@ def test_ctrl_c_waits_until_files_are_in_place():
 def test_ctrl_c_waits_also_where_other_threads_can_receive_it():
     done, begun = [], threading.Event()
     other = threading.Thread(
-        target=lambda: (begun.wait(), signal.raise_signal(signal.SIGINT)), daemon=True
+        target=lambda: (begun.wait(LIMIT), signal.raise_signal(signal.SIGINT)), daemon=True
     )
     other.start()  # before it could inherit blocked signals
 
     def moves():
         with atomic.uninterrupted():
             begun.set()
-            other.join()
+            join(other)
             done.append("moved")
 
     with pytest.raises(KeyboardInterrupt):

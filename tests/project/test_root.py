@@ -10,6 +10,7 @@ from idlc.check.run import CheckOptions, check
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
+from tests.support.waiting import LIMIT, join
 
 COUNT = 20
 
@@ -40,14 +41,13 @@ def test_two_threads_check_two_folders_with_the_same_paths_in_them(tmp_path):
     results = []
 
     def run(folder):
-        together.wait()
+        together.wait(LIMIT)
         results.append((folder, problems(folder)))
 
     threads = [threading.Thread(target=run, args=[folder]) for folder in folders]
     for thread in threads:
         thread.start()
-    for thread in threads:
-        thread.join()
+    join(*threads)
     assert len(results) == len(folders)
     assert all(result == expected[folder] for folder, result in results)
 

@@ -1,14 +1,13 @@
 """Two nodes in sessions of their own, and what tests await."""
 
 import contextlib
-import time
 from queue import Empty, SimpleQueue
 
 import idlc
 from idlc.robot import Executor, Node, QoSProfile, open_session
+from tests.support.waiting import LIMIT as LONG
+from tests.support.waiting import wait_for
 
-#: Seconds after which a test gives up; it never takes that long.
-LONG = 60
 String = idlc.load("std_msgs/msg/String").String
 SetBool = idlc.load("std_srvs/srv/SetBool").SetBool
 
@@ -26,11 +25,7 @@ def node_at(endpoint, name, **options):
 
 def spin_until(condition, *nodes):
     """Run callbacks of nodes until a condition holds."""
-    end = time.monotonic() + LONG
-    while not condition():
-        assert time.monotonic() < end, "the condition never held"
-        for node in nodes:
-            node.executor.spin_once(timeout_sec=0.01)
+    wait_for(condition, between=lambda: [n.executor.spin_once(timeout_sec=0.01) for n in nodes])
 
 
 def pass_on(left, right):
@@ -38,7 +33,11 @@ def pass_on(left, right):
     passed = SimpleQueue()
     right.transport.subscriber("0/last", QoSProfile(depth=1), passed.put)
     last = left.transport.publisher("0/last", QoSProfile(depth=1))
-    while passed.empty():  # the declaration of a subscriber takes a moment to arrive
+
+    def send():
         last.put(b"", attachment=b"")
         with contextlib.suppress(Empty):
             passed.put(passed.get(timeout=0.1))
+
+    # the declaration of a subscriber takes a moment to arrive
+    wait_for(lambda: not passed.empty(), between=send)

@@ -9,6 +9,7 @@ from idlc.robot.graph import Graph
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.live.overview import mismatches
 from idlc.robot.qos import QoSProfile, qos_profile_sensor_data
+from tests.support.waiting import LIMIT, join
 
 HASH = "RIHS01_" + "0" * 64
 
@@ -178,9 +179,9 @@ def test_waiting_ends_with_a_change_or_with_time():
     results = []
     thread = threading.Thread(target=lambda: results.append(graph.wait_for(condition, None)))
     thread.start()
-    assert started.wait(60)
+    assert started.wait(LIMIT)
     tokens.update(publisher.token, True)
-    thread.join(60)
+    join(thread)
     assert results == [(publisher,)]
 
 

@@ -6,7 +6,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,9 +15,9 @@ from mcap_ros2.reader import read_ros2_messages
 from idlc.cli.main import main
 from idlc.robot.qos import DurabilityPolicy, QoSProfile
 from tests.robot.fake import Robot, demo_classes, standard
+from tests.support.waiting import LIMIT as LONG
+from tests.support.waiting import read_line, wait_for
 
-#: Seconds after which a test gives up; it never takes that long.
-LONG = 60
 LATCHED = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 
@@ -26,8 +25,6 @@ SIGNALS = [signal.SIGINT, signal.SIGTERM]
 @pytest.fixture(autouse=True)
 def _in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
 
 
 @pytest.fixture
@@ -61,16 +58,18 @@ def publish_drives(robot):
 def recorded(router, number=signal.SIGINT, path="drive.mcap"):
     """Record /drive until three messages are in the file; return what was written to stderr."""
     with started("record", router, "-o", path, "/drive") as process:
-        assert process.stderr.readline().startswith("recording to ")
-        sizes = set()
-        while len(sizes - {0}) < 2:  # the definitions, and then the messages
+        assert read_line(process.stderr).startswith("recording to ")
+        sizes = {0}
+
+        def has_grown():
             assert process.poll() is None
             sizes.add(Path(path).stat().st_size)
-            time.sleep(0.01)
+            return len(sizes) == 3  # the definitions, and then the messages
+
+        wait_for(has_grown)
         process.send_signal(number)
-        errors = process.stderr.read()
-        assert process.wait(LONG) == 0, errors
-    return errors
+        assert process.wait(LONG) == 0
+        return process.stderr.read()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
@@ -87,7 +86,7 @@ def test_echo_ends_at_once_with_whole_lines(robot, router, number):
     publish = robot.publisher("/words", "std_msgs/msg/String", LATCHED)
     publish(standard("std_msgs/msg/String")(data="one"))
     with started("echo", router, "/words", "--format", "json") as process:
-        assert json.loads(process.stdout.readline()) == {"data": "one"}
+        assert json.loads(read_line(process.stdout)) == {"data": "one"}
         process.send_signal(number)
         # without a handler, SIGTERM ends a filter as it ends `cat`
         assert process.wait(LONG) == (0 if number == signal.SIGINT else -number)

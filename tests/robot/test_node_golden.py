@@ -126,7 +126,7 @@ def test_replies_are_those_of_rclpy(router, types):
             key, request, pack_attachment(sequence, 0, gid), replies.put, timeout=LONG
         )
         spin_until(lambda: not replies.empty(), node)
-        reply = replies.get()
+        reply = replies.get(timeout=LONG)
         assert reply.payload.hex() == payload
         assert same_but_time(reply.attachment, attachment)
 

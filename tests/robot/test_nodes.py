@@ -29,6 +29,7 @@ from idlc.runtime.typeinfo import types_of
 from tests.robot.conftest import start_router
 from tests.robot.nodes import LONG, SetBool, String, node_at, pass_on, spin_until
 from tests.support.generated import importable, write_package
+from tests.support.waiting import join
 
 LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -111,8 +112,7 @@ def test_any_thread_may_publish(pair):
     threads = [threading.Thread(target=publish) for _ in range(4)]
     for thread in threads:
         thread.start()
-    for thread in threads:
-        thread.join()
+    join(*threads)
     spin_until(lambda: len(samples) == 800, right)
     numbers = [parse_attachment(sample.attachment).sequence for sample in samples]
     assert sorted(numbers) == [*range(1, 801)]
@@ -194,7 +194,7 @@ def test_call_waits_without_spinning(pair):
         assert client.call(SetBool.Request(data=True), LONG).message == "done"
     finally:
         right.executor.shutdown()
-        spinning.join()
+        join(spinning)
 
 
 def test_a_call_that_nobody_answers_ends(pair):

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from idlc.robot.offer import OFFERED
 from tests.robot.nodes import LONG, node_at, spin_until
 from tests.support.files import write
 from tests.support.paths import EXAMPLE, GOLDEN, ROOT
+from tests.support.waiting import wait_for
 
 #: The installed packages that idlc uses here; the environment may have ROS 2's as well.
 USED = "_yaml click jinja2 lark markupsafe msgspec numpy typing_extensions xxhash yaml zenoh"
@@ -66,11 +66,12 @@ class Program:
 
     def until(self, text, times=1):
         """Wait until the program has printed a text this many times."""
-        end = time.monotonic() + LONG
-        while self.output.count(text) < times:
-            assert time.monotonic() < end, self.output
+
+        def is_printed():
             assert self.process.poll() is None, self.output
-            time.sleep(0.02)  # between two looks at the file
+            return self.output.count(text) >= times
+
+        wait_for(is_printed, lambda: f"`{text}` in:\n{self.output}")
 
     def ends(self):
         return self.process.wait(LONG)
@@ -94,7 +95,7 @@ def start(site, router, tmp_path):
     yield started
     for program in programs:
         program.process.kill()
-        program.process.wait()
+        program.process.wait(LONG)
 
 
 def file(name):

@@ -19,7 +19,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from contextlib import ExitStack
 from importlib.util import find_spec
 
@@ -34,6 +33,7 @@ from tests.robot.conftest import free_endpoint
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
 from tests.support.generated import catalog_files
 from tests.support.paths import ROOT
+from tests.support.waiting import WORK, join, wait_for
 
 #: `make test-robot` sets it: whatever is missing fails.
 IS_COMPLETE = "IDLC_PEERS" in os.environ
@@ -44,8 +44,6 @@ PROGRAMS = {
     "pyzeros": "of_pyzeros.py",
     "zenoh_ros2_sdk": "of_zenoh_ros2_sdk.py",
 }
-#: Seconds in which the programs start; pyzeros compiles.
-LONGEST = 300
 JointState = idlc.load("sensor_msgs/msg/JointState").JointState
 STATE = {
     "header": {"stamp": {"sec": 3, "nanosec": 5}, "frame_id": "Gehäuse"},
@@ -79,14 +77,9 @@ def each(*names):
 
 def environment(folder):
     """Return the variables of programs, which may use neither this machine's ROS nor a network."""
-    kept = {
-        name: value
-        for name, value in os.environ.items()
-        if name != "ROS_DOMAIN_ID" and not name.startswith("ZENOH_")
-    }
     return {
         "CYDR_CACHE_DIR": str(folder / "cydr"),  # where pyzeros compiles, if nobody says where
-        **kept,
+        **os.environ,
         "PYTHONPATH": str(ROOT),
         "ZENOH_ROS2_SDK_CACHE": str(folder / "cloned"),
         "GIT_ALLOW_PROTOCOL": "none",
@@ -113,14 +106,17 @@ def network(tmp_path_factory):
             process = subprocess.Popen(
                 [sys.executable, *words], env=variables | more, stdout=output, stderr=output
             )
-            stack.callback(process.wait)
+            stack.callback(process.wait, LONG)
             stack.callback(process.kill)
             return process
 
         router = start("router", "-m", "idlc", "robot", "router", "--listen", endpoint)
-        while "listening" not in logs["router"].read_text():
+
+        def listens():
             assert router.poll() is None, logs["router"].read_text()
-            time.sleep(0.05)
+            return "listening" in logs["router"].read_text()
+
+        wait_for(listens)
         # a client of the router and, as every node of rmw_zenoh is, a peer
         overrides = {"right": 'mode="peer";listen/endpoints=["tcp/127.0.0.1:0"]'}
         processes = {}
@@ -130,12 +126,14 @@ def network(tmp_path_factory):
             processes[name] = start(name, program, endpoint, name, folder, **more)
         node = stack.enter_context(node_at(endpoint, "tester"))
         node.create_service(SetBool, "~/set", answer)
-        end = time.monotonic() + LONGEST
         for name, process in processes.items():
-            place = f"/{name}/set"
-            while not node.graph.wait_for(lambda graph, p=place: graph.count(Kind.SERVICE, p), 1):
+
+            def is_there(name=name, process=process):
                 assert process.poll() is None, logs[name].read_text()
-                assert time.monotonic() < end, logs[name].read_text()
+                return node.graph.count(Kind.SERVICE, f"/{name}/set")
+
+            # pyzeros compiles
+            wait_for(is_there, logs[name].read_text, limit=WORK)
         yield endpoint, node
         for name, process in processes.items():
             assert process.poll() is None, logs[name].read_text()
@@ -149,13 +147,13 @@ def answer(request, response):
 def repeat(node, kind, topic, message, condition):
     """Publish until a condition holds: a declaration takes a moment to arrive everywhere."""
     publisher = node.create_publisher(kind, topic, 10)
-    end = time.monotonic() + LONG
-    while not condition():
-        assert time.monotonic() < end, "the condition never held"
+
+    def publish():
         publisher.publish(message)
-        pause = time.monotonic() + 0.5
-        while time.monotonic() < pause and not condition():
+        for _ in range(10):
             node.executor.spin_once(timeout_sec=0.05)
+
+    wait_for(condition, between=publish)
     node.destroy_publisher(publisher)
 
 
@@ -250,7 +248,6 @@ def test_late_subscriptions_receive_what_was_published(network, name):
 
 def test_show_lists_what_all_of_them_have(network, capsys, monkeypatch):
     endpoint, _ = network
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     assert main(["show", endpoint, "--format", "json"]) == 0
     facts = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     by_name = {(fact["type"], fact["name"]): fact for fact in facts}
@@ -275,7 +272,6 @@ def test_show_lists_what_all_of_them_have(network, capsys, monkeypatch):
 @each(*PROGRAMS)
 def test_echo_prints_the_messages_of_each(network, name, capsys, monkeypatch):
     endpoint, node = network
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     publisher = node.create_publisher(JointState, f"/{name}/say", 10)
     is_over = threading.Event()
 
@@ -289,5 +285,5 @@ def test_echo_prints_the_messages_of_each(network, name, capsys, monkeypatch):
         assert main(["echo", endpoint, f"/{name}/seen", "--count", "1", "--format", "json"]) == 0
     finally:
         is_over.set()
-        speaker.join()
+        join(speaker)
     assert json.loads(capsys.readouterr().out) == STATE

@@ -19,10 +19,10 @@ from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from idlc.robot.session import open_router, open_session
 from tests.robot.conftest import free_endpoint, start_router
 from tests.robot.nodes import pass_on
+from tests.support.waiting import LIMIT as LONG
+from tests.support.waiting import read_line, wait_for
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh has no wheel for this platform")
-#: Seconds after which a test gives up; it never takes that long.
-LONG = 60
 LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -73,10 +73,9 @@ def test_a_session_that_knows_many_tokens_answers_its_own_question(sessions):
     for _ in range(600):
         left.transport.announce(entity(left).token)
     assert right.graph.wait_for(lambda graph: len(graph.entities()) == 600, LONG)
-    answer, end = set(), time.monotonic() + LONG
-    while len(answer) < 600 and time.monotonic() < end:  # for a moment, Zenoh answers with nothing
-        answer = {*right.transport.tokens(all_tokens(right.domain), LONG)}
-    assert answer == {each.token for each in right.graph.entities()}
+    tokens = {each.token for each in right.graph.entities()}
+    # for a moment, Zenoh answers with nothing
+    wait_for(lambda: {*right.transport.tokens(all_tokens(right.domain), LONG)} == tokens)
 
 
 @pytest.mark.parametrize("method", ["announce", "close", "watch", "call"])
@@ -351,7 +350,7 @@ def test_the_router_command_runs_until_it_is_stopped(number):
     command = [sys.executable, "-m", "idlc", "robot", "router", "--listen", endpoint]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
-            assert process.stdout.readline() == f"listening on {endpoint}; press Ctrl-C to stop\n"
+            assert read_line(process.stdout) == f"listening on {endpoint}; press Ctrl-C to stop\n"
             opened(endpoint).close()
             process.send_signal(number)
             assert process.wait(LONG) == 0

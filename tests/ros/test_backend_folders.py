@@ -18,6 +18,7 @@ from tests.support.installed import SHARE, interfaces, names_in
 from tests.support.native import FAR, both_ways
 from tests.support.paths import PROGRAMS
 from tests.support.sides import Side
+from tests.support.waiting import LIMIT
 
 INDEX = "share/ament_index/resource_index/rosidl_interfaces"
 
@@ -65,7 +66,7 @@ def sides():
     for side in started:
         if side.process.poll() is None:
             side.process.kill()
-            side.process.wait()
+            side.process.wait(LIMIT)
 
 
 def test_nodes_with_either_build_talk(ros_environment, shapes, sides, tmp_path, monkeypatch):

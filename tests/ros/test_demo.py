@@ -22,7 +22,6 @@ def test_the_demo(ros_environment, tmp_path):
         env=ros_environment | {"PYTHONPATH": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=120,
         check=False,
     )
     assert done.returncode == 0, done.stderr

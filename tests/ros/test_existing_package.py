@@ -15,6 +15,7 @@ import pytest
 from idlc.cli.main import main
 from tests.support.paths import DOCS
 from tests.support.programs import run_with
+from tests.support.waiting import LIMIT
 
 pytestmark = pytest.mark.long
 
@@ -131,11 +132,11 @@ def works(program: Path, tmp_path: Path, environment: dict[str, str]) -> None:
         said = run_with(sys.executable, "-c", code, cwd=tmp_path, **environment)
         assert "True" in said, said + log.read_text()
         node.send_signal(signal.SIGINT)
-        assert node.wait(20) == 0, log.read_text()
+        assert node.wait(LIMIT) == 0, log.read_text()
         assert "Traceback" not in log.read_text()
     finally:
         node.kill()
-        node.wait()
+        node.wait(LIMIT)
 
 
 def test_colcon_builds_it_whatever_was_built_before(workspace, tmp_path, ros_environment):

@@ -4,12 +4,12 @@ import re
 import subprocess
 import sys
 from html import unescape
-from threading import Timer
 
 import pytest
 
 from tests.support import programs
 from tests.support.paths import DOCS, ROOT
+from tests.support.waiting import read_line
 
 PAGE = (DOCS / "first-message.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -36,12 +36,9 @@ def test_the_nodes_of_the_page_talk(page, tmp_path, lonely_environment):
         )
         for name in ("listener.py", "talker.py")
     ]
-    late = Timer(60, nodes[0].kill)
-    late.start()
     try:
-        assert nodes[0].stdout.readline().rstrip() == shown
+        assert read_line(nodes[0].stdout).rstrip() == shown
     finally:
-        late.cancel()
         for node in nodes:
             node.kill()
             node.communicate()

@@ -9,6 +9,7 @@ import pytest
 
 from tests.support import generated
 from tests.support.paths import PROGRAMS
+from tests.support.waiting import read_line
 
 #: Versions of one package.
 FILES = {
@@ -85,7 +86,7 @@ def look(lonely_environment, tmp_path, nodes):
         command = [sys.executable, "-m", "idlc", "breaking", "--against", "graph"]
         for process in nodes:
             if process not in ready:
-                assert process.stdout.readline() == "ready\n"
+                assert read_line(process.stdout) == "ready\n"
                 ready.append(process)
         for _ in range(ATTEMPTS):
             done = subprocess.run(

@@ -13,10 +13,12 @@ from idlc.project.prefixes import distribution
 from tests.support.installed import generate
 from tests.support.paths import EVERY_KIND
 from tests.support.rounds import FUZZING
+from tests.support.waiting import LIMIT, WORK, read_line
 
 #: Each is delivered eight times.
 MESSAGES = 125_000 if FUZZING else 1_200
-TIMEOUT = 3600 if FUZZING else 120
+#: Seconds for all messages.
+TIMEOUT = 3600 if FUZZING else WORK
 THING = "string name\nint32[] numbers\nstring[] words\nEverything[] rest\n"
 EVERYTHING = (
     "Scalars scalars\nArrays arrays\nBoundedSequences bounded\nSequences sequences\n"
@@ -62,8 +64,8 @@ def test_eight_publishers_and_eight_subscribers_that_die(start):
     chance = random.Random(1)
     for _ in range(3 + MESSAGES // 10_000):
         doomed = start("doomed")
-        assert doomed.stdout.readline() == "ready\n", doomed.stderr.read()
-        received, _, _ = select.select([doomed.stdout], [], [], TIMEOUT)
+        assert read_line(doomed.stdout) == "ready\n", doomed.stderr.read()
+        received, _, _ = select.select([doomed.stdout], [], [], LIMIT)
         assert received, "nothing is sent"
         time.sleep(chance.random() / 2)
         doomed.kill()
@@ -79,31 +81,31 @@ def test_eight_publishers_and_eight_subscribers_that_die(start):
 @pytest.mark.parametrize("how", ["exit", "shutdown", "raise", "end"])
 def test_the_interpreter_ends_within_a_callback(how, start):
     process = start("ends_within_a_callback", how)
-    _, complaints = process.communicate(timeout=TIMEOUT)
+    _, complaints = process.communicate()
     assert process.returncode == 0, complaints
     assert "Fatal" not in complaints
 
 
 def test_hostile_peers(start):
     victim = start("victim")
-    assert victim.stdout.readline() == "ready\n"
+    assert read_line(victim.stdout) == "ready\n"
     count = 400
     liar, stranger = (start("attacker", count, side=side) for side in ("sound", "other"))
     friend = start("friend", count // 4)
     for process in (liar, stranger, friend):
-        done, _, connected = process.stdout.readline().partition(" ")
+        done, _, connected = read_line(process.stdout).partition(" ")
         assert done == "done", process.stderr.read()
         # from Kilted on, the middleware looks at types itself, and connects no strangers
         assert int(connected) == 1 or (process is stranger and not JAZZY)
     received = 0
-    for _ in range(TIMEOUT * 20):
+    for _ in range(LIMIT * 20):
         time.sleep(0.05)
         victim.stdin.write("?\n")
         victim.stdin.flush()
-        received = int(victim.stdout.readline())
+        received = int(read_line(victim.stdout))
         if received == count // 4:
             break
     assert received > count // 8
     for process in (liar, stranger, friend, victim):
-        _, complaints = process.communicate(timeout=TIMEOUT)
+        _, complaints = process.communicate()
         assert process.returncode == 0, complaints

@@ -17,6 +17,7 @@ import pytest
 from tests.support import generated
 from tests.support.installed import SHARE, generate
 from tests.support.paths import ROOT
+from tests.support.waiting import WORK, read_line
 
 QUIET = [
     "nothing_is_loaded_before_rclpy_asks",
@@ -30,7 +31,6 @@ QUIET = [
     "arrays_that_another_thread_changes",
     "ends_with_messages_pending",
 ]
-TIMEOUT = 120
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def start(classes, program):
 
 def finish(process):
     """Return what a behaviour printed; fail with what it complained about."""
-    out, complaints = process.communicate(timeout=TIMEOUT)
+    out, complaints = process.communicate(timeout=WORK)  # some send many messages
     assert process.returncode == 0, f"{process.returncode}: {complaints}"
     return out, complaints
 
@@ -104,7 +104,7 @@ def test_memory_stays_flat_in_services(start):
 
 def test_one_interrupt_ends_a_busy_node(start):
     process = start("spins_until_interrupted")
-    assert process.stdout.readline() == "ready\n"
+    assert read_line(process.stdout) == "ready\n"
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
     assert finish(process)[0] == "ended\n"
@@ -112,7 +112,7 @@ def test_one_interrupt_ends_a_busy_node(start):
 
 def test_a_flood_of_interrupts_is_survived_and_seen(start):
     process = start("survives_a_flood_of_interrupts", "6")
-    assert process.stdout.readline() == "ready\n"
+    assert read_line(process.stdout) == "ready\n"
     time.sleep(0.5)
     end = time.monotonic() + 5
     while time.monotonic() < end:

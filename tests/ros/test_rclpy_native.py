@@ -14,6 +14,7 @@ from tests.support.native import FAR, both_ways, install, model_of
 from tests.support.paths import PROGRAMS
 from tests.support.sides import OURS, PACKAGES, STANDARD, Side
 from tests.support.tools import run
+from tests.support.waiting import LIMIT
 
 #: What services and actions tell of themselves: end of the topic, of the type, and how.
 EVENTS = ("_service_event", "Event", "kept")
@@ -59,7 +60,7 @@ def talk(environment, tmp_path, path_of, shapes):
     for side in sides:
         if side.process.poll() is None:
             side.process.kill()
-            side.process.wait()
+            side.process.wait(LIMIT)
 
 
 def remapped(*rules):

@@ -10,6 +10,7 @@ import pytest
 from tests.support.installed import interfaces, interfaces_in, names_in
 from tests.support.paths import PROGRAMS
 from tests.support.sides import OURS, PACKAGES, STANDARD, Side
+from tests.support.waiting import LIMIT
 
 PEER = PROGRAMS / "peer.py"
 
@@ -33,7 +34,7 @@ def talk(ros_environment, tmp_path, path_of):
     for side in sides:
         if side.process.poll() is None:
             side.process.kill()
-            side.process.wait()
+            side.process.wait(LIMIT)
 
 
 @pytest.mark.parametrize("packages", [PACKAGES, ("nav_msgs", "test_msgs")], ids=["all", "mixed"])

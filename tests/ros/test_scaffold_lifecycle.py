@@ -22,7 +22,8 @@ from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
 
 from idlc.cli.main import main
-from tests.support.nodes import PATIENCE, nodes
+from tests.support.nodes import nodes
+from tests.support.waiting import wait_for
 
 WORDS = (
     *("--publisher", "std_msgs/Empty:out@20", "--subscriber", "std_msgs/Empty:in"),
@@ -104,10 +105,7 @@ class Peer:
             self.executor.spin_once(timeout_sec=0.05)
 
     def until(self, condition):
-        deadline = time.monotonic() + PATIENCE
-        while not condition():
-            assert time.monotonic() < deadline
-            self.executor.spin_once(timeout_sec=0.05)
+        wait_for(condition, between=lambda: self.executor.spin_once(timeout_sec=0.05))
 
     def result(self, future):
         self.until(future.done)

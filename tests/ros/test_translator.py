@@ -8,6 +8,7 @@ from idlc.cli.main import main
 from tests.support import programs
 from tests.support.files import write
 from tests.support.nodes import nodes
+from tests.support.waiting import read_line
 
 WHEEL = "float32 radius\nstring name\n"
 OLD = {
@@ -44,11 +45,11 @@ def test_nodes_of_both_versions_understand_each_other(folder, ros_environment, p
     # the package of the new version is there, too, and is not mistaken for the old one
     environment = {**ros_environment, "PYTHONPATH": str(folder / "path/new")}
     new = program("versions_side.py", "new", path=folder / "path/new")
-    assert new.stdout.readline() == "ready\n", new.communicate()
+    assert read_line(new.stdout) == "ready\n", new.communicate()
     with nodes(folder / "demo", tmp_path, environment) as start:
         translator = start("demo.translator")
         old = program("versions_side.py", "old", path=folder / "path/old")
-        out, complaints = old.communicate(timeout=60)
+        out, complaints = old.communicate()
         assert old.returncode == 0, (complaints, translator.output)
         new.kill()  # rclpy can miss SIGTERM just before it waits
         received, _ = new.communicate()

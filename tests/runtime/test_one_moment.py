@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import pytest
 
 from tests.support import generated
+from tests.support.waiting import join
 
 FILES = {
     "msg/Number.msg": "int32 value\n",
@@ -194,4 +195,4 @@ def test_threads_that_change_what_is_serialized(package):
                 assert_whole(message.serialize(byteorder=order), cls)
         finally:
             stop.set()
-            thread.join()
+            join(thread)

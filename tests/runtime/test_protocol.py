@@ -9,6 +9,7 @@ import pytest
 from tests.support import generated, values
 from tests.support.layouts import random_package
 from tests.support.rounds import some
+from tests.support.waiting import LIMIT, join
 
 SEEDS = range(24)
 UUID = "unique_identifier_msgs/UUID goal_id\n"
@@ -195,13 +196,12 @@ def test_threads_that_ask_at_the_same_time_get_the_same_classes(tmp_path):
             start = threading.Barrier(4)
 
             def ask(action=action, kinds=kinds, start=start):
-                start.wait()
+                start.wait(LIMIT)
                 kinds.append(action.Impl.FeedbackMessage)
 
             threads = [threading.Thread(target=ask) for _ in range(4)]
             for thread in threads:
                 thread.start()
-            for thread in threads:
-                thread.join()
+            join(*threads)
             assert len(kinds) == 4
             assert set(kinds) == {action.Impl.FeedbackMessage}

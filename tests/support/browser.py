@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+from tests.support.waiting import WORK
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
     "--headless=new",
@@ -104,7 +106,7 @@ def measured(
         address = f"http://127.0.0.1:{server.server_port}/"
         with _started(*([DARK] if dark else []), address) as process:
             try:
-                answer = json.loads(found.get(timeout=120))
+                answer = json.loads(found.get(timeout=WORK))
             finally:
                 process.terminate()
                 with contextlib.suppress(subprocess.TimeoutExpired):
@@ -120,7 +122,7 @@ def dumped(page: Path) -> str:
     words = ("--virtual-time-budget=5000", "--dump-dom", page.as_uri())
     with _started(*words, stdout=subprocess.PIPE) as process:
         try:
-            return process.communicate(timeout=120)[0].decode("utf-8")
+            return process.communicate(timeout=WORK)[0].decode("utf-8")
         finally:
             process.kill()
 

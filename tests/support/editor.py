@@ -6,7 +6,6 @@ It refuses what is not of the protocol's types, and is used without coroutines.
 from __future__ import annotations
 
 import asyncio
-import os
 import sys
 import threading
 from pathlib import Path
@@ -15,8 +14,7 @@ from typing import Any
 from lsprotocol import types as lsp
 from pygls.lsp.client import BaseLanguageClient
 
-#: Seconds that anything may take on a busy machine.
-PATIENCE = 60
+from tests.support.waiting import LIMIT, join
 
 
 class Editor:
@@ -44,8 +42,7 @@ class Editor:
             lsp.Command | lsp.CodeAction,
             lambda given, _: converter.structure(given, lsp.CodeAction),
         )
-        environment = {**os.environ, "AMENT_PREFIX_PATH": ""}
-        self._wait(self._client.start_io(*command, env=environment))
+        self._wait(self._client.start_io(*command))
         self.process = self._client._server
         self.answer = self.ask(
             lsp.INITIALIZE,
@@ -73,7 +70,7 @@ class Editor:
             self.told.append(params.message)
 
     def _wait(self, coroutine: Any) -> Any:
-        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(PATIENCE)
+        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(LIMIT)
 
     def ask(self, method: str, params: Any = None) -> Any:
         """Return the answer to a request; raises pygls' JsonRpcException."""
@@ -149,7 +146,7 @@ class Editor:
         with self._news:
             came = self._news.wait_for(
                 lambda: uri in self.problems and version in (None, self.versions[uri]),
-                PATIENCE,
+                LIMIT,
             )
         assert came, f"nothing was told of {uri}; {self.told}"
         return self.problems[uri]
@@ -168,7 +165,7 @@ class Editor:
         self.tell(lsp.EXIT)
         self._wait(self._client.stop())
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(PATIENCE)
+        join(self._thread)
         self._loop.close()
 
 

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 import idlc
+from tests.support.waiting import LIMIT, read_line
 
 HERE = Path(__file__).parent
 GEN = ["gen", "pkg", "-o", "out/demo"]
@@ -23,19 +24,18 @@ class Machine:
 
     def __init__(self, folder, code):
         self.folder = folder
-        path = os.pathsep.join(filter(None, (code, os.environ.get("PYTHONPATH"))))
         self.process = subprocess.Popen(
             [sys.executable, str(HERE / "faults.py"), str(folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": path, "AMENT_PREFIX_PATH": ""},
+            env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": code},
             text=True,
         )
 
     def run(self, words=GEN, **fault):
         self.process.stdin.write(json.dumps({"words": list(words), **fault}) + "\n")
         self.process.stdin.flush()
-        return json.loads(self.process.stdout.readline())
+        return json.loads(read_line(self.process.stdout))
 
     def write(self, files):
         shutil.rmtree(self.folder / "pkg", ignore_errors=True)
@@ -71,7 +71,7 @@ def running():
         found = Machine(folder, code)
         yield found
         found.process.stdin.close()
-        found.process.wait()
+        found.process.wait(LIMIT)
 
 
 def another_user(folder):

@@ -4,12 +4,12 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PATIENCE = 40.0
+from tests.support.waiting import LIMIT, wait_for
+
 #: Python's report of an exception in a destructor or in a callback of its own. A signal that
 #: interrupts a constructor of rclpy leaves an object that its `__del__` cannot handle. No node can
 #: prevent that.
@@ -47,10 +47,7 @@ class Running:
         return [line.partition("]: ")[2] for line in self.output.splitlines() if "]: " in line]
 
     def until(self, condition: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while not condition():
-            assert time.monotonic() < deadline, f"in vain; it said:\n{self.output}"
-            time.sleep(0.05)
+        wait_for(condition, lambda: f"a node, which printed:\n{self.output}")
 
     def says(self, text: str) -> None:
         self.until(lambda: text in self.output)
@@ -61,7 +58,7 @@ class Running:
 
     def end(self, how: signal.Signals = signal.SIGINT) -> int:
         self.process.send_signal(how)
-        return self.process.wait(PATIENCE)
+        return self.ends()
 
 
 @contextmanager
@@ -81,4 +78,4 @@ def nodes(
     finally:
         for node in started:
             node.process.kill()
-            node.process.wait()
+            node.process.wait(LIMIT)

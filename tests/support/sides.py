@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 from tests.support.paths import EVERY_KIND, EXAMPLE, GOLDEN
+from tests.support.waiting import LIMIT, WORK, read_line
 
 STANDARD = ("diagnostic_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs")
 PACKAGES = (*STANDARD, "test_msgs")
@@ -30,13 +31,13 @@ class Side:
     def ready(self) -> list[str]:
         """Return the complaints up to the line that says how much was looked at."""
         lines = []
-        for line in self.process.stdout:
+        while line := read_line(self.process.stdout, WORK):
             lines.append(line.rstrip())
             if line.startswith("looked at"):
                 return lines
-        return [*lines, f"ended with {self.process.wait()}"]
+        return [*lines, f"ended with {self.process.wait(LIMIT)}"]
 
     def finish(self) -> list[str]:
         """End the process; return what it said since it was ready."""
-        rest, _ = self.process.communicate(timeout=60)
+        rest, _ = self.process.communicate()
         return [*rest.splitlines(), *([] if self.process.returncode == 0 else ["failed"])]

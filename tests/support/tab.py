@@ -7,9 +7,9 @@ import os
 import select
 import subprocess
 import tempfile
-import time
 
 from tests.support.browser import FLAGS, command
+from tests.support.waiting import LIMIT, WORK, wait_for
 
 
 class Tab:
@@ -44,9 +44,9 @@ class Tab:
             if "method" in answer:
                 self.events.append(answer)
 
-    def _next(self, timeout=120):
+    def _next(self):
         while b"\0" not in self._rest:
-            assert select.select([self._reader], [], [], timeout)[0], "Chromium does not answer"
+            assert select.select([self._reader], [], [], WORK)[0], "Chromium does not answer"
             data = os.read(self._reader, 1 << 16)
             assert data, "Chromium ended"
             self._rest += data
@@ -60,15 +60,14 @@ class Tab:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
-    def until(self, script, timeout=90):
+    def until(self, script, limit=LIMIT):
         """Return the value of an expression as soon as it is true."""
-        end = time.monotonic() + timeout
-        while time.monotonic() < end:
+
+        def value():
             with contextlib.suppress(AssertionError):  # the page is being replaced
-                if value := self.run(script):
-                    return value
-            time.sleep(0.02)
-        raise AssertionError(f"never true: {script}")
+                return self.run(script)
+
+        return wait_for(value, script, limit=limit)
 
     def open(self, address):
         """Open a page; it may still be loading."""
@@ -119,6 +118,6 @@ def tab():
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(timeout=20)
             process.kill()
-            process.wait()
+            process.wait(LIMIT)
             os.close(from_browser)
             os.close(to_browser)

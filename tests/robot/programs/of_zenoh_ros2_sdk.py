@@ -38,7 +38,7 @@ def answer(request):
 
 
 def ask(message):
-    client = ROS2ServiceClient(message.data, SET_BOOL, timeout=60, **own)
+    client = ROS2ServiceClient(message.data, SET_BOOL, timeout=25, **own)
     response = client.call(data=True)
     heard.publish(data=f"{response.success} {response.message}")
     client.close()
@@ -61,5 +61,5 @@ subscriptions = [
 ]
 server = ROS2ServiceServer(f"/{name}/set", SET_BOOL, answer, **own)
 while True:
-    handle, message = queue.get()
+    handle, message = queue.get()  # until the test ends this program
     handle(message)

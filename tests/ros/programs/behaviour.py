@@ -31,8 +31,8 @@ from std_msgs.msg import (
     String,
     UInt8MultiArray,
 )
+from waiting import PATIENCE, eventually, join
 
-PATIENCE = 60.0
 NUMBERS = ["Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64",
            "UInt64"]  # fmt: skip
 LATCHED = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -45,16 +45,6 @@ def raises(kind, function, *arguments):
     except kind as error:
         return error
     raise AssertionError(f"{function} raised no {kind}")
-
-
-def eventually(condition, node=None):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, "not in time"
-        if node:
-            rclpy.spin_once(node, timeout_sec=0.1)
-        else:
-            time.sleep(0.01)
 
 
 def resident():
@@ -233,7 +223,7 @@ def arrays_that_another_thread_changes():
             assert abs(len(found.data) - size) <= 2
             assert found.serialize() == data
         stop.set()
-        thread.join()
+        join(thread)
 
 
 def memory_stays_flat(count):
@@ -327,8 +317,7 @@ def many_threads():
     eventually(lambda: all(len(numbers) == count for numbers in received.values()))
     assert all(sorted(numbers) == list(range(count)) for numbers in received.values())
     executor.shutdown()
-    for thread in threads:
-        thread.join()
+    join(*threads)
 
 
 def ends_with_messages_pending():

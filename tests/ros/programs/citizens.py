@@ -7,7 +7,6 @@ of Python's constants. Fails by raising.
 import importlib
 import inspect
 import pydoc
-import time
 import unittest.mock
 
 import rclpy
@@ -18,8 +17,8 @@ from hiding_msgs.msg import Hiding, None_, Part, True_
 from hiding_msgs.srv import None_ as NoneService
 from rclpy.serialization import deserialize_message, serialize_message
 from structs_side import Memory
+from waiting import eventually
 
-PATIENCE = 60.0
 HIDING = Hiding(1, 2, [3.5], "4", [5, 6, 7], True, [False], [Part(1, 2)], Part(6), 8, 9)
 TRUE = True_(None_(1), [None_(2)], [None_(3), None_(4)])
 
@@ -58,30 +57,23 @@ def check_structs():
         memory.destroy(place)
 
 
-def spin(node, condition):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, "not in time"
-        rclpy.spin_once(node, timeout_sec=0.1)
-
-
 def check_communication(node):
     received = []
     publishers = [node.create_publisher(type(m), f"t{i}", 1) for i, m in enumerate((HIDING, TRUE))]
     for index, message in enumerate((HIDING, TRUE)):
         node.create_subscription(type(message), f"t{index}", received.append, 1)
-    spin(node, lambda: all(publisher.get_subscription_count() for publisher in publishers))
+    eventually(lambda: all(publisher.get_subscription_count() for publisher in publishers), node)
     for publisher, message in zip(publishers, (HIDING, TRUE), strict=True):
         publisher.publish(message)
-    spin(node, lambda: len(received) == 2)
+    eventually(lambda: len(received) == 2, node)
     assert HIDING in received
     assert TRUE in received
 
     node.create_service(NoneService, "s", lambda _request, _response: NoneService.Response(b=TRUE))
     client = node.create_client(NoneService, "s")
-    spin(node, client.service_is_ready)
+    eventually(client.service_is_ready, node)
     answer = client.call_async(NoneService.Request(a=None_(5)))
-    spin(node, answer.done)
+    eventually(answer.done, node)
     assert answer.result().b == TRUE
 
     def execute(goal):
@@ -90,11 +82,11 @@ def check_communication(node):
 
     server = rclpy.action.ActionServer(node, False_, "a", execute)
     client = rclpy.action.ActionClient(node, False_, "a")
-    spin(node, client.server_is_ready)
+    eventually(client.server_is_ready, node)
     sent = client.send_goal_async(False_.Goal(a=None_(7)))
-    spin(node, sent.done)
+    eventually(sent.done, node)
     result = sent.result().get_result_async()
-    spin(node, result.done)
+    eventually(result.done, node)
     assert result.result().result.b == 7
     server.destroy()
 

@@ -25,21 +25,14 @@ from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, Si
 from rclpy.qos import QoSProfile
 from same.msg import Thing
 from trees import Values, class_of, shape_of
+from waiting import PATIENCE, eventually, join
 
-PATIENCE = 60.0
 SIDES = 8
 QOS = QoSProfile(depth=400)
 #: Messages on their way at once, so that none is dropped where nobody dies.
 WINDOW = 200
 #: A message of the type that is called like the victim's and means something else.
 OTHER = b"\0\1\0\0" + struct.pack("<dI8II6s", -1.5, 2**32 - 1, *range(8), 6, b"other")
-
-
-def eventually(condition):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, "not in time"
-        time.sleep(0.002)
 
 
 def resident():
@@ -149,7 +142,7 @@ def eight_by_eight(count):
     eventually(lambda: all(one.received == sum(published) for one in steady))
     assert not any(one.problems for one in listeners)
     over.set()
-    spinning.join()
+    join(spinning)
     executor.shutdown()
     deaths = sum(one.deaths for one in listeners)
     print(sum(published), deaths, memory[1], resident(), flush=True)
@@ -229,7 +222,7 @@ def victim():
         print(sound[""], flush=True)
     rclpy.shutdown()
     # an interpreter that ends while rclpy's C++ waits for its lock ends with std::terminate
-    spinning.join()
+    join(spinning)
     executor.shutdown()
 
 

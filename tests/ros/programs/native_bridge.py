@@ -20,6 +20,7 @@ import rclpy
 from peer import EVENTS
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
+from waiting import join
 
 INDEX = "share/ament_index/resource_index/packages"
 DISPATCH = "rosidl_typesupport_cpp"
@@ -108,7 +109,7 @@ def main(file):
     sys.stdin.read()
     bridge.complain()
     executor.shutdown()
-    thread.join()
+    join(thread)
     rclpy.shutdown()
 
 

@@ -1,16 +1,14 @@
 """Type support from the library, used and given back a hundred times: native_cycles.py"""
 
 import os
-import sys
-import time
 from itertools import cycle, islice
 
 import rclpy
 from my_robot_controller.msg import RobotCommand
 from native_bridge import raw_type
 from rclpy.executors import SingleThreadedExecutor
+from waiting import eventually
 
-PATIENCE = 60.0
 COUNT = 100
 #: The ways to open a library, each in turn.
 MODES = (
@@ -19,14 +17,6 @@ MODES = (
     os.RTLD_LAZY | os.RTLD_GLOBAL,
     os.RTLD_NOW | os.RTLD_GLOBAL,
 )
-
-
-def wait(executor, done, what):
-    end = time.monotonic() + PATIENCE
-    while not done():
-        if time.monotonic() > end:
-            sys.exit(f"not in time: {what}")
-        executor.spin_once(timeout_sec=0.1)
 
 
 def main():
@@ -41,9 +31,9 @@ def main():
         topic = f"cycle_{number}"
         publisher = node.create_publisher(kind, topic, 10)
         subscription = node.create_subscription(kind, topic, received.append, 10, raw=True)
-        wait(executor, lambda own=publisher: own.get_subscription_count() == 1, "a subscription")
+        eventually(lambda own=publisher: own.get_subscription_count() == 1, executor)
         publisher.publish(sent.serialize())
-        wait(executor, lambda own=number: len(received) == own + 1, "a message")
+        eventually(lambda own=number: len(received) == own + 1, executor)
         node.destroy_subscription(subscription)
         node.destroy_publisher(publisher)
     print("cycles", sum(RobotCommand.deserialize(data) == sent for data in received))

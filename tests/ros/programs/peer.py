@@ -24,11 +24,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.utilities import remove_ros_args
 from trees import Values, class_of
+from waiting import eventually, join
 
 COUNT = 4
 LATCHED = QoSProfile(depth=COUNT, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EVENTS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PATIENCE = 90.0
+PATIENCE = 90.0  # messages of some hundred types arrive at once
 RESULT_STATUS = {"succeeded": 4, "canceled": 5}
 
 
@@ -65,12 +66,10 @@ class Peer:
         print(f"{name}: {what}"[:500], flush=True)
 
     def wait(self, executor, done, what):
-        end = time.monotonic() + PATIENCE
-        while not done():
-            if time.monotonic() > end:
-                self.complain(what, "not in time")
-                return
-            executor.spin_once(timeout_sec=0.1)
+        try:
+            eventually(done, executor, limit=PATIENCE)
+        except AssertionError:
+            self.complain(what, "not in time")
 
 
 def messages(peer):
@@ -125,7 +124,7 @@ def serve(peer):
 
     def end():
         executor.shutdown()
-        thread.join()
+        join(thread)
 
     return end
 
@@ -153,14 +152,13 @@ def serve_action(peer, name):
     def execute(handle, last):
         peer.compare(f"{name}_Goal", "goal", handle.request, next(goals))
         # rclpy knows the client as soon as its services match; feedback may be sent too early
-        while not peer.node.count_subscribers(f"/{peer.me}/{name}/_action/feedback"):
-            time.sleep(0.01)
+        feedback = f"/{peer.me}/{name}/_action/feedback"
+        eventually(lambda: peer.node.count_subscribers(feedback))
         time.sleep(0.1)
         for tree in peer.trees(f"{name}_Feedback", peer.me):
             handle.publish_feedback(peer.build(f"{name}_Feedback", tree))
         if last:
-            while not handle.is_cancel_requested:
-                time.sleep(0.01)
+            eventually(lambda: handle.is_cancel_requested)
             handle.canceled()
         else:
             handle.succeed()
