@@ -6,6 +6,7 @@ import sys
 import tarfile
 import time
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -391,6 +392,23 @@ def test_builds_of_others_are_as_without_idlc(case, tmp_path, monkeypatch):
     assert not [*tmp_path.rglob("_track.py")]
     if case in ("without [tool.idlc]", "no table", "no pyproject.toml"):
         assert "msgspec" not in said, "idlc is not imported"
+
+
+ENTRY_POINTS = """
+from importlib.metadata import distribution
+from setuptools import setup
+
+for entry_point in distribution("idlc").entry_points:
+    entry_point.load()
+setup(name="other")
+"""
+
+
+def test_builds_of_others_work_where_pth_files_are_not_run(tmp_path):
+    """An editable idlc on PYTHONPATH is found by its entry points alone."""
+    folder = str(metadata.distribution("idlc").locate_file(""))
+    words = ["-S", "-c", ENTRY_POINTS, "--name"]
+    assert programs.run_with(sys.executable, *words, cwd=tmp_path, PYTHONPATH=folder) == "other\n"
 
 
 @pytest.mark.parametrize("text", ["[tool.idlc]\n[", "\xff", "tool.idlc" * 10**5, "[tool.idlc]\n"])
