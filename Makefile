@@ -60,6 +60,8 @@ UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version
 # Nothing that we run leaves this machine, or this folder: rclpy stops where it cannot write its logs.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export ROS_LOG_DIR := $(CURDIR)/build/log
+# What it names would come before the packages of each environment.
+unexport PYTHONPATH
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
