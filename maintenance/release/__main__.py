@@ -6,7 +6,6 @@ RELEASING.md says when to do what.
 from __future__ import annotations
 
 import argparse
-import datetime
 import shutil
 import sys
 import tempfile
@@ -73,7 +72,7 @@ def main() -> int:
     placing.add_argument("url", metavar="https://github.com/OWNER/NAME")
     dating = commands.add_parser("version", help="give a version and its day to all files")
     dating.add_argument("version")
-    dating.add_argument("--day", default=datetime.datetime.now(datetime.timezone.utc).date())
+    dating.add_argument("--day", help="of the release; without it, the version is in development")
     given = parser.parse_args()
     try:
         if given.command == "check":
@@ -84,7 +83,7 @@ def main() -> int:
         elif given.command == "repository":
             prepare.publish_at(HERE, given.url)
         else:
-            prepare.version_is(HERE, given.version, str(given.day))
+            prepare.version_is(HERE, given.version, given.day)
     except FailedError as error:
         print(error, file=sys.stderr)
         return 1

@@ -115,18 +115,20 @@ def publish_at(project: Project, repository: str) -> None:
     edits.save()
 
 
-def version_is(project: Project, version: str, day: str) -> None:
+def version_is(project: Project, version: str, day: str | None) -> None:
     """Give the version and its day to everything that names them.
 
-    That is both packages, the extension of VS Code, the changelog, documents and the citation.
+    That is both packages, the extension of VS Code, the changelog, documents and the citation. A
+    version in development has no day, and documents keep the release that people can install.
     """
     if not re.fullmatch(r"\d+\.\d+\.\d+", version):
         raise FailedError(f"{version} is not like 1.2.3")
-    if not re.fullmatch(r"\d{4}-\d\d-\d\d", day):
+    if day is not None and not re.fullmatch(r"\d{4}-\d\d-\d\d", day):
         raise FailedError(f"{day} is not like 2026-12-31")
     edits = _Edits(project, {})
+    head = f"## {version} ({day or 'not released yet'})"
     for path, pattern, new, missing in (
-        ("CHANGELOG.md", rf"## {re.escape(version)} \(.*\)", f"## {version} ({day})", _NO_CHANGES),
+        ("CHANGELOG.md", rf"## {re.escape(version)} \(.*\)", head, _NO_CHANGES),
         ("idlc/version.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
         ("CITATION.cff", "version: .*", f"version: {version}", _NO_VERSION),
         (f"{RUNTIME}/pyproject.toml", 'version = ".*"', f'version = "{version}"', _NO_VERSION),
@@ -138,7 +140,8 @@ def version_is(project: Project, version: str, day: str) -> None:
     for path, content in zip(EXTENSION_FILES, (manifest, lock), strict=True):
         edits.write_json(path, content)
     text = re.sub(r"(?m)^date-released: .*\n", "", edits.text("CITATION.cff"))
-    edits.write("CITATION.cff", f"{text}date-released: {day}\n")
+    edits.write("CITATION.cff", f"{text}date-released: {day}\n" if day else text)
     for path in PASTED:
-        edits.write(path, _EARLIER.sub(rf"\g<1>{version}", edits.text(path)))
+        if day or path.startswith("editors/"):
+            edits.write(path, _EARLIER.sub(rf"\g<1>{version}", edits.text(path)))
     edits.save()

@@ -130,6 +130,22 @@ def test_the_next_release_is_named_in_the_same_places(published, tmp_path):
     assert manifest["repository"]["url"] == f"{REPOSITORY}.git"
 
 
+def test_after_a_release_the_next_version_is_in_development(published, tmp_path):
+    project = Project(tmp_path / "idlc")
+    shutil.copytree(published.root, project.root)
+    changelog = project.text("CHANGELOG.md").replace("## ", "## 0.10.1 (to come)\n\n## ", 1)
+    write(project.root / "CHANGELOG.md", changelog)
+    prepare.version_is(project, "0.10.1", None)
+    agreement.of_versions(project)
+    assert "\n## 0.10.1 (not released yet)\n" in project.text("CHANGELOG.md")
+    assert "date-released" not in project.text("CITATION.cff")
+    assert "pkg:pypi/idlc@0.10.1\n" in project.text("editors/mason/package.yaml")
+    with pytest.raises(FailedError, match="for the day"):
+        agreement.for_the_public(project, "v0.10.1")
+    for path in ("README.md", "docs/ci.md", "templates/ci/github.yml.jinja"):
+        assert project.text(path) == published.text(path), "people can install what it names"
+
+
 @pytest.mark.parametrize(
     ("path", "change", "version", "day", "says"),
     [
@@ -277,15 +293,6 @@ def test_archives_that_differ_are_noticed(tmp_path):
     archives.are_equal(one, one)
     with pytest.raises(FailedError, match="not the same when it is built again"):
         archives.are_equal(one, made_by_hand(tmp_path / "again", ["a"], ["b"]))
-
-
-def test_each_make_target_of_the_workflows_exists():
-    makefile = HERE.text("Makefile")
-    for path in (ROOT / ".github/workflows").glob("*.yml"):
-        text = path.read_text(encoding="utf-8")
-        targets = re.findall(r"run: make ([a-z-]+)|target: \[?([a-z-]+)", text)
-        for target in filter(None, (one for pair in targets for one in pair)):
-            assert re.search(rf"(?m)^{target}:", makefile), (path.name, target)
 
 
 @pytest.mark.long
