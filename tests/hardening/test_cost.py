@@ -282,20 +282,30 @@ def test_each_of_many_topics_is_read_without_a_look_at_the_others(topics, tmp_pa
     assert max(every[1:]) <= 1.5 * np.median(every)
 
 
-def bombs():
-    """Yield small files that hold much, by what it is."""
+def zeros():
+    """Return a recording with a chunk of zeros."""
     zeros = zstandard.ZstdCompressor(19).compress(bytes(ANY_GROWTH))
     head = pack("<QQQI", 0, 10, ANY_GROWTH, 0) + text(b"zstd") + pack("<Q", len(zeros))
     large = record(6, head + zeros)
-    yield "zeros", mcap(ONE + large + large, closed=False), "of no kind"
-    many = chunk(record(0x80, b"") * 3_000_000)
-    yield "records", mcap(ONE + many, closed=False), "records for each of its bytes"
+    return mcap(ONE + large + large, closed=False)
 
 
-@pytest.mark.parametrize("what", bombs(), ids=lambda what: what[0])
+def many_records():
+    """Return a recording with a chunk of empty records."""
+    return mcap(ONE + chunk(record(0x80, b"") * 3_000_000), closed=False)
+
+
+#: Functions that make small files that hold much, and why these are refused.
+BOMBS = {
+    "zeros": (zeros, "of no kind"),
+    "records": (many_records, "records for each of its bytes"),
+}
+
+
+@pytest.mark.parametrize("what", BOMBS)
 def test_a_bomb_is_refused_soon(what, tmp_path):
-    _, data, reason = what
+    make, reason = BOMBS[what]
     path = tmp_path / "a.mcap"
-    path.write_bytes(data)
+    path.write_bytes(make())
     with pytest.raises(RecordingError, match=reason):
         open_recording(path)
