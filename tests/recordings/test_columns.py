@@ -9,7 +9,6 @@ import sys
 from base64 import b64decode
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pytest
 from pyarrow import parquet
@@ -37,6 +36,8 @@ def table(recording, topic, **options):
 
 
 def test_a_newcomer_gets_from_a_file_to_a_data_frame(recording, here, capfd):
+    import pandas as pd
+
     assert main(["show", str(recording)]) == 0
     shown = capfd.readouterr().out
     assert "/imu" in shown

