@@ -7,7 +7,6 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
 
 import tests.support.shell  # noqa: F401 - first, see there
 from tests.support import costs, generated, waiting
@@ -27,12 +26,6 @@ os.environ["IDLC_CACHE"] = CACHE.name
 
 # Where pytest keeps the names of the tests that passed in the last run, for --left-out.
 PASSED = "idlc/passed"
-
-# The same examples in every run, and no verdict that depends on how busy the machine is.
-settings.register_profile(
-    "idlc", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("idlc")
 
 
 def pytest_addoption(parser):

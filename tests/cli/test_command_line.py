@@ -80,9 +80,9 @@ def test_a_run_with_nothing_to_do_imports_no_compiler():
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])
-def test_the_example_in_each_help_works_as_pasted(command):
-    words = [command, "--help"] if command else ["--help"]
-    text = idlc(*words).stdout
+def test_the_example_in_each_help_works_as_pasted(command, capfd):
+    assert main([command, "--help"] if command else ["--help"]) == 0
+    text = capfd.readouterr().out
     if " rec.mcap" in text:  # this cannot be pasted
         recordings.by_mcap(Path("rec.mcap"), recordings.messages(6))
     example = text.partition("Example:\n\n")[2].partition("\n\n  ")[0]
@@ -286,24 +286,23 @@ def test_json_output_is_one_object_per_line():
 
 
 @pytest.mark.parametrize("style", DOCUMENTS)
-def test_what_ci_systems_read_of_generated_code(style):
+def test_what_ci_systems_read_of_generated_code(style, capfd):
     """One whole document, whatever there is to say, and nothing of it for people."""
     make("demo/msg/A.msg", "float64 a\n")
     words = ("gen", "demo", "-o", "out/demo", "--format", style)
-    missing = idlc(*words, "--check")
-    assert missing.returncode == 1
-    assert missing.stdout.count("IDL616") >= 1
-    written = idlc(*words)
-    current = idlc(*words, "--check")
-    assert (written.returncode, current.returncode) == (0, 0)
-    assert written.stdout == current.stdout
+
+    def printed(*more, status):
+        assert main([*words, *more]) == status
+        out, err = capfd.readouterr()
+        assert err == ""
+        return out
+
+    assert printed("--check", status=1).count("IDL616") >= 1
+    assert printed(status=0) == printed("--check", status=0)
     make("pyproject.toml", "[tool.idlc]\nout = 5\n")
-    wrong = idlc(*words, "--check")
-    assert wrong.returncode == 2
-    assert "IDL611" in wrong.stdout
-    assert [done.stderr for done in (missing, written, current, wrong)] == [""] * 4
+    assert "IDL611" in printed("--check", status=2)
     Path("pyproject.toml").unlink()
-    assert idlc(*words, "--watch").returncode == 2
+    assert main([*words, "--watch"]) == 2
 
 
 @pytest.mark.parametrize(
@@ -333,11 +332,23 @@ def test_what_ci_systems_read_of_generated_code(style):
     ],
     ids=" ".join,
 )
-def test_piped_output_is_plain_unless_colour_is_requested(words, variables, colour):
+def test_piped_output_is_plain_unless_colour_is_requested(
+    words, variables, colour, capfd, monkeypatch
+):
     make("demo/msg/A.msg", "flot64 a\n")
     make("demo/msg/B.msg", "float64 a 0.5  # [m]\n")
-    done = idlc(*words, env={**os.environ, "PYTHONUTF8": "1", **variables})
-    assert ("\x1b[" in done.stdout + done.stderr) is colour
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    main(words)
+    assert ("\x1b[" in "".join(capfd.readouterr())) is colour
+
+
+@pytest.mark.parametrize(("variables", "colour"), [({}, False), ({"FORCE_COLOR": "1"}, True)])
+def test_a_program_behind_a_pipe_prints_as_plainly(variables, colour):
+    make("demo/msg/A.msg", "flot64 a\n")
+    for words in (["check", "demo"], ["gen", "--no-such-option"]):
+        done = idlc(*words, env={**os.environ, "PYTHONUTF8": "1", **variables})
+        assert ("\x1b[" in done.stdout + done.stderr) is colour
 
 
 @pytest.mark.parametrize(
@@ -369,10 +380,9 @@ def test_headings_are_bold(words, headings):
         (["lsp", "x"], "unexpected argument `x`", "`idlc lsp --help`"),
     ],
 )
-def test_a_wrong_command_line_is_reported_like_every_other_problem(words, message, hint):
-    done = idlc(*words)
-    assert done.returncode == 2
-    first, second = done.stderr.splitlines()
+def test_a_wrong_command_line_is_reported_like_every_other_problem(words, message, hint, capfd):
+    assert main(words) == 2
+    first, second = capfd.readouterr().err.splitlines()
     assert first.startswith(f"error: {message}")
     assert second.startswith(f"  = hint: {hint}")
 

@@ -5,13 +5,12 @@ import re
 import unicodedata
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Label, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import display_width, one_line, visible
+from tests.support.examples import given, st
 
 
 def shown(text: str, start: int, end: int, **options) -> list[str]:

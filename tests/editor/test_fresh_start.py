@@ -5,12 +5,10 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from idlc.editor.documents import Places
 from idlc.editor.problems import diagnostics
 from idlc.editor.server import Server
+from tests.support.examples import given, settings, st
 
 #: Pieces of text that are put together and cut up, so that names clash, appear and vanish.
 PIECES = [

@@ -5,8 +5,6 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 from jinja2 import UndefinedError
 from msgspec import Struct
 from msgspec.structs import asdict, replace
@@ -16,6 +14,7 @@ from idlc.model import ir, link
 from idlc.model.python_names import modules
 from idlc.project.templates import Code, Text, code
 from tests.support import generated
+from tests.support.examples import example, given, st
 
 HOSTILE = [
     '"""',

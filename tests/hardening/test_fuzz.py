@@ -7,10 +7,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.support import fuzzing
+from tests.support.examples import given, settings, st
 from tests.support.rounds import FUZZING, SEED, rounds
 
 

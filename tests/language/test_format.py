@@ -5,8 +5,6 @@ import re
 from random import Random
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
@@ -16,6 +14,7 @@ from idlc.model import ir
 from idlc.model.ir import meaning
 from idlc.model.lower import lower
 from tests.support import rosidl_view
+from tests.support.examples import example, given, settings, st
 from tests.support.inventions import Inventor
 from tests.support.paths import VERDICTS
 

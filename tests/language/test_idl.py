@@ -5,8 +5,6 @@ from pathlib import Path
 from time import process_time
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
@@ -16,6 +14,7 @@ from idlc.model import catalog, ir
 from idlc.model.distros import DISTROS
 from idlc.model.lower import lower
 from tests.support import idl_view
+from tests.support.examples import given, st
 
 SHARE = Path(sys.prefix) / "share"
 INSTALLED = sorted(SHARE.glob("*/*/*.idl"))

@@ -3,8 +3,6 @@
 import math
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from idlc.check import registry
 from idlc.diagnostics.report import Report
@@ -15,6 +13,7 @@ from idlc.model.link import link
 from idlc.model.lower import lower
 from idlc.model.lower_types import Fault
 from idlc.model.lower_values import scalar
+from tests.support.examples import example, given, st
 
 WORDS = [
     "int32",

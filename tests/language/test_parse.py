@@ -6,8 +6,6 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from lark import Lark, Transformer, v_args
 from lark.exceptions import UnexpectedInput
 
@@ -15,6 +13,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source
 from idlc.language import tree
 from idlc.language.parse import LINE_ENDS, grammar, parse, parse_definition, terminals
+from tests.support.examples import example, given, settings, st
 from tests.support.paths import VERDICTS
 
 TEXTS = [

@@ -6,12 +6,11 @@ import string
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from idlc.diagnostics.report import Report
 from idlc.project import lock
 from idlc.project.lock import load_lock
+from tests.support.examples import example, given, settings, st
 from tests.support.fuzzing import idlc
 
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9)

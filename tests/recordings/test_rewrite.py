@@ -6,8 +6,6 @@ from functools import partial
 from struct import pack, unpack_from
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2.decoder import DecoderFactory
@@ -18,6 +16,7 @@ from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.rewrite import Conversion, rewrite
 from tests.recordings.test_mixed_mcap import DEFINED, SCHEMA, File, record, text
 from tests.support import recordings as made
+from tests.support.examples import given, settings, st
 from tests.support.mcap_content import check_indexes, content
 from tests.support.mcap_mutations import MAGIC
 from tests.support.rounds import SEED, rounds

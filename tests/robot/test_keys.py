@@ -4,8 +4,6 @@ import json
 
 import msgspec
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from idlc.robot.keys import (
     Entity,
@@ -32,6 +30,7 @@ from idlc.robot.qos import (
     qos_profile_system_default,
 )
 from tests.robot.test_qos import BEST_AVAILABLE
+from tests.support.examples import given, st
 from tests.support.paths import ROOT
 
 CAPTURE = json.loads((ROOT / "golden/robot/rmw_zenoh.json").read_text(encoding="utf-8"))

@@ -3,11 +3,10 @@
 from contextlib import suppress
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from idlc.robot import names
 from idlc.robot.names import InvalidNameError, expand_name, expand_namespace
+from tests.support.examples import given, st
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,6 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from idlc.model import catalog
 from tests.support import generated, values
@@ -21,6 +19,7 @@ from tests.support.columns import (
     messages_of,
     selected,
 )
+from tests.support.examples import given, settings, st
 from tests.support.layouts import random_package
 from tests.support.rounds import rounds
 

@@ -3,10 +3,9 @@
 import struct
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from tests.support import generated
+from tests.support.examples import HealthCheck, given, settings, st
 from tests.support.values import INTEGERS
 
 pytestmark = pytest.mark.usefixtures("standard")

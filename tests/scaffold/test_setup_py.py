@@ -6,11 +6,10 @@ import re
 import tokenize
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from idlc.project.edits import Edited, Refused, Script
 from idlc.scaffold.edits.setup_py import add_to_setup
+from tests.support.examples import HealthCheck, given, settings, st
 
 TALKER = Script("talker", "demo.talker:main")
 HEAD = "from setuptools import setup\n\npackage_name = 'demo'\n"

@@ -2,10 +2,9 @@
 
 from typing import NamedTuple
 
-from hypothesis import strategies as st
-
 import idlc
 from idlc.model.ir import PRIMITIVES
+from tests.support.examples import st
 
 #: Wider types of each primitive, by hand.
 WIDER = {

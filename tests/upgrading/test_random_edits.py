@@ -4,12 +4,11 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import idlc
 from idlc.recordings.columns.values import Columns
 from tests.support import upgrades
+from tests.support.examples import given, settings, st
 from tests.support.rounds import rounds
 
 

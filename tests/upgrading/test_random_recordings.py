@@ -9,8 +9,6 @@ from contextlib import closing
 
 import pytest
 import zstandard
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
@@ -23,6 +21,7 @@ from idlc.upgrading.versions import version_of
 from tests.recordings import test_rewrite
 from tests.support import recordings as made
 from tests.support import upgrades
+from tests.support.examples import given, settings, st
 
 #: The topics of random types; /imu and /joints have others, of which the target knows nothing.
 TOPICS = {"/top": "M0", "/inner": "M1"}
