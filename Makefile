@@ -60,8 +60,9 @@ UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version
 # Nothing that we run leaves this machine, or this folder: rclpy stops where it cannot write its logs.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export ROS_LOG_DIR := $(CURDIR)/build/log
-# What it names would come before the packages of each environment.
-unexport PYTHONPATH
+# PYTHONPATH would come before the packages of each environment. Without bytecode, each of the thousands of
+# programs that tests start would compile all that it imports.
+unexport PYTHONPATH PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

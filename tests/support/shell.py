@@ -38,6 +38,7 @@ def _leave() -> None:
         prefix = Path(sys.prefix).resolve()
         own = [path for path in paths if prefix in Path(path).resolve().parents]
         os.environ["LD_LIBRARY_PATH"] = os.pathsep.join(own)
+    sys.dont_write_bytecode = False  # each process would compile all tests, and idlc
     os.environ.update(SET)
     os.umask(0o022)
 
