@@ -23,7 +23,7 @@ from idlc.editor.protocol import ADD_DEPENDENCY
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Workspace
 from idlc.language import tree
-from idlc.language.parse import parse_definition
+from idlc.language.definition import parse_definition
 from idlc.model import ir, names
 from idlc.model.comments import deprecation
 from idlc.model.lower_types import STRINGS

@@ -15,7 +15,8 @@ from idlc.editor.parts import Position, TextEdit
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot, in_folder
 from idlc.language import tree
-from idlc.language.parse import parse, parse_definition
+from idlc.language.definition import parse_definition
+from idlc.language.parse import parse
 from idlc.model import derive, ir
 from idlc.model.lower import SECTIONS
 

@@ -14,7 +14,7 @@ from itertools import groupby, takewhile
 from typing import TypeAlias
 
 from idlc.language import tree
-from idlc.language.parse import parse_definition
+from idlc.language.definition import parse_definition
 
 #: A tab reaches to the next multiple of one of these, whichever makes more sense of a section.
 TAB_WIDTHS = (8, 4)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from lark import Lark, Token
+from lark import Lark
 from lark.exceptions import UnexpectedInput
 
 from idlc.diagnostics.source import Source
@@ -27,12 +27,6 @@ class IdlFile(msgspec.Struct, frozen=True):
 
 
 _WORD = re.compile(r"\w+|\S")
-
-
-def piece(token: Token) -> Piece:
-    """Return a token as a piece of the file."""
-    position: Any = token.start_pos  # Optional in lark 1.x, an int in the stubs of 0.12
-    return Piece(str(token), int(position))
 
 
 @lru_cache(maxsize=1)

@@ -6,12 +6,15 @@ can be shared; `File.span` turns them into ranges of the file.
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
 from idlc.diagnostics.codes import Code
 from idlc.diagnostics.source import Source, Span
+
+if TYPE_CHECKING:
+    from lark import Token
 
 #: An ordinary character for ROS 2, and therefore wrong anywhere in a file (language 1.1).
 BYTE_ORDER_MARK = "\ufeff"
@@ -29,6 +32,12 @@ class Piece(msgspec.Struct, frozen=True):
     def end(self) -> int:
         """The offset after the last character."""
         return self.start + len(self.text)
+
+
+def piece(token: Token) -> Piece:
+    """Return a token of lark as a piece of the text."""
+    position: Any = token.start_pos  # Optional in lark 1.x, an int in the stubs of 0.12
+    return Piece(str(token), int(position))
 
 
 class Type(msgspec.Struct, frozen=True):

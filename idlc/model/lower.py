@@ -13,7 +13,6 @@ from idlc.diagnostics.report import Edit, Report
 from idlc.diagnostics.source import Span
 from idlc.language import tree
 from idlc.language.escapes import EscapeError, through_idl
-from idlc.language.parse import parse_definition
 from idlc.language.tree import Fault
 from idlc.model import ir, lower_types
 from idlc.model.comments import Comment, condense, problem
@@ -64,6 +63,8 @@ class _Section(msgspec.Struct):
 
     def _elements(self, first: int) -> list[_Element]:
         """Return the sound definitions with their comments; report the broken ones."""
+        from idlc.language.definition import parse_definition  # loads lark
+
         elements: list[_Element] = []
         latest: list[tree.Line] = []  # the comments of the last definition
         pending: list[tree.Line] = []

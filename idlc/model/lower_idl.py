@@ -18,8 +18,8 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import including
 from idlc.language.escapes import inside_literal
-from idlc.language.idl import IdlFile, piece
-from idlc.language.tree import OPTIONAL, Fault, Piece
+from idlc.language.idl import IdlFile
+from idlc.language.tree import OPTIONAL, Fault, Piece, piece
 from idlc.model import ir, lower_types, lower_values, names
 from idlc.model.lower_types import STRINGS, as_parsed, positive
 from idlc.model.lower_values import MAX_ELEMENTS

@@ -13,7 +13,6 @@ from typing import TypeAlias
 
 from idlc.diagnostics import codes
 from idlc.language.escapes import EscapeError, read_back, through_idl
-from idlc.language.parse import terminals
 from idlc.language.tree import Fault
 from idlc.model import ir
 
@@ -145,6 +144,8 @@ def _shown(text: str) -> str:
 
 
 def _number(type_: str, text: str) -> Number | Fault:
+    from idlc.language.definition import pattern  # loads lark
+
     info = ir.PRIMITIVES[type_]
     form, noun, hint = "INTEGER", "an integer", "a number such as `10`, `-3`, `0xff` or `0b101`"
     # as rosidl does: decimal first, leading zeros allowed, then by prefix
@@ -156,7 +157,7 @@ def _number(type_: str, text: str) -> Number | Fault:
         form, noun, hint = "REAL", "a number", "a number such as `1`, `-0.5` or `1e-3`"
         readers = [float]
     is_long = len(text) > LONG and type_ != "bool"
-    for reader in readers if is_long or re.fullmatch(terminals()[form], text) else ():
+    for reader in readers if is_long or re.fullmatch(pattern(form), text) else ():
         with suppress(ValueError):
             value = reader(text)
             if info.low is None or info.high is None or info.low <= value <= info.high:

@@ -10,7 +10,8 @@ from idlc.check.format import laid_out
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.language.parse import parse, parse_definition
+from idlc.language.definition import parse_definition
+from idlc.language.parse import parse
 from idlc.language.tree import Constant, Fault
 from idlc.model.ir import TypeName
 

@@ -1,154 +1,115 @@
-"""Files are read as lark reads them by the grammar."""
+"""Files are divided into lines, and lines are parsed into trees."""
 
 import json
-import re
-import subprocess
-import sys
 
 import pytest
-from lark import Lark, Transformer, v_args
-from lark.exceptions import UnexpectedInput
 
-from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source
-from idlc.language import tree
-from idlc.language.parse import LINE_ENDS, grammar, parse, parse_definition, terminals
-from tests.support.examples import example, given, settings, st
-from tests.support.paths import VERDICTS
+from idlc.language import definition, tree
+from idlc.language.definition import parse_definition
+from idlc.language.parse import parse
+from tests.support.examples import example, given, st
+from tests.support.paths import GOLDEN
+from tests.support.refresh import refreshed, wanted
 
-TEXTS = [
-    case["text"]
-    for case in map(json.loads, VERDICTS.read_text("utf-8").splitlines())
-    if "text" in case
-]
-PIECES = ["int8", "a", "B", " ", "  ", "=", "<=", "[", "]", "3", "/", "x y", '"', ",", "-", "\t"]
-
-
-def piece(token):
-    return tree.Piece(str(token), token.start_pos)
+#: Lines of invented and mutated files in JSON, and below each its tree: a field or constant with
+#: the offsets of its pieces, `-` for each that is not there, or a fault. A type has its whole, its
+#: name, the bound of the string, the brackets, `<=` in brackets, and the size.
+TREES = GOLDEN / "definitions.txt"
+PIECES = ["int8", "a", "B", " ", "  ", "=", "<=", "[", "]", "3", "/", "x y", '"', ",", "-", "\xa0"]
 
 
-@v_args(inline=True)
-class Builder(Transformer):
-    """Builds what is read; the method names are the grammar's rules."""
-
-    def line(self, *tokens):
-        return tree.Line(tokens[0].start_pos, **{token.type.lower(): token for token in tokens})
-
-    def separator(self, token):
-        return token.start_pos
-
-    def section(self, *lines):
-        return lines
-
-    def file(self, *parts):
-        return parts[::2], parts[1::2]
-
-    def string_bound(self, _, size):
-        return {"bound": piece(size)}
-
-    def array(self, *tokens):
-        return {"at_most": len(tokens) == 2, "size": piece(tokens[-1]) if tokens else None}
-
-    def type(self, name, *parts):
-        known = {"name": piece(name)}
-        for part in parts:
-            known |= part
-        return known
-
-    def field(self, name, default=None):
-        return piece(name), None if default is None else piece(default)
-
-    def constant(self, *tokens):
-        return {token.type: str(token) for token in tokens}
-
-    def definition(self, type_, body):
-        return type_, body
+def shown(text, node):
+    """Return a node of a line's tree; a piece must have the text at its offsets."""
+    match node:
+        case tree.Piece(start=start, end=end):
+            assert text[start:end] == node.text
+            return f"{start}:{end}"
+        case tree.Fault(start=start, end=end):
+            return f"{node.code.id} {start}:{end} {json.dumps([node.message, node.hint])}"
+        case bool():
+            return "<=" if node else "-"
+        case None:
+            return "-"
+    parts = (shown(text, getattr(node, name)) for name in node.__struct_fields__)
+    return f"{type(node).__name__}({' '.join(parts)})"
 
 
-LARK = Lark(
-    grammar(),
-    parser="lalr",
-    start=["file", "definition", "literal"],
-    transformer=Builder(),
-    maybe_placeholders=False,
-)
+def test_lines_have_the_trees_of_the_golden_file():
+    lines = TREES.read_text(encoding="ascii").splitlines()[::2]
+    texts = [json.loads(line) for line in lines]
+    trees = [shown(text, parse_definition(text)) for text in texts]
+    pairs = zip(lines, trees, strict=True)
+    expected = "".join(f"{line}\n    {tree}\n" for line, tree in pairs)
+    if wanted("definitions"):
+        TREES.write_text(expected, encoding="ascii")
+        refreshed()
+    assert TREES.read_text(encoding="ascii").splitlines() == expected.splitlines()
+    assert len(set(lines)) >= 2000
 
 
-def assert_same_definition(text):
-    """Compare a definition with lark's, which does not know where brackets are."""
-    body = parse_definition(text)
-    try:
-        type_, expected = LARK.parse(text, start="definition")
-    except UnexpectedInput as error:
-        end = error.pos_in_stream
-        type_ = None
-    if isinstance(body, tree.Fault):
-        assert type_ is None or text[0].isspace(), text
-        if body.code is codes.MALFORMED_TYPE:
-            assert body.start == min(end, body.end - 1)
-        return
-    assert {name: getattr(body.type, name) for name in type_} == type_, text
-    assert "bound" in type_ or body.type.bound is None
-    assert ("size" in type_) == (body.type.brackets is not None)
-    if isinstance(body, tree.Field):
-        assert (body.name, body.default) == expected
-    else:
-        assert body.name.text == expected.get("CONSTANT_NAME", "").rstrip()
-        assert body.value.text == expected.get("VALUE", "").lstrip()
-    parts = [body.type.name, body.type.bound, body.type.brackets, body.type.size, body.name]
-    parts += [body.type.whole, body.default if isinstance(body, tree.Field) else body.value]
-    for part in filter(None, parts):
-        assert text[part.start : part.end] == part.text
-
-
-def assert_same(text):
-    file = parse(Source("A.msg", text))
-    sections, separators = LARK.parse(
-        text if text[-1:] in tuple(LINE_ENDS) else f"{text}\n", "file"
-    )
-    assert tuple(section.lines for section in file.sections) == sections
-    assert file.separators == separators
-    for lines in sections:
-        for line in filter(None, (line.definition for line in lines)):
-            assert_same_definition(line)
-
-
-def test_every_recorded_case_is_read_as_lark_reads_it():
-    for text in TEXTS:
-        assert_same(text)
-
-
-@settings(max_examples=400)
-@given(st.lists(st.sampled_from([*PIECES, "\n", "#", "---\n"]) | st.text(max_size=2)).map("".join))
+@given(st.lists(st.sampled_from(PIECES) | st.text(max_size=2)).map("".join))
 @example("int8  =5")
-@example("int8[<=3] a 1")
+@example("int8 A  =  ")
 @example("string<=3<=4 a")
-@example("int8[<=] a")
-@example("---\n---")
-@example("")
-def test_any_text_is_read_as_lark_reads_it(text):
-    assert_same(text)
+def test_pieces_are_parts_of_the_line(text):
+    for section in parse(Source("A.msg", text)).sections:
+        for line in filter(None, (line.definition for line in section.lines)):
+            body = parse_definition(line)
+            shown(line, body)
+            if isinstance(body, tree.Fault):
+                assert 0 <= body.start < body.end <= len(line)
 
 
-def test_terminals_are_those_that_lark_reads():
-    read = {one.name: one.pattern.to_regexp() for one in LARK.terminals}
-    # lark spells control characters out
-    plain = {name for name in read if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar())}
-    plain -= {"CODE", "COMMENT", "NEWLINE", "SEPARATOR"}
-    assert len(plain) > 10
-    assert {name: terminals()[name] for name in plain} == {name: read[name] for name in plain}
+def test_lines_are_divided_at_every_line_end_and_at_the_first_number_sign():
+    file = parse(Source("A.srv", 'int8 a # "#"\r\n---\n#\u2028\n ---\r\tint8 b'))
+    assert [(section.start, section.lines) for section in file.sections] == [
+        (0, (tree.Line(0, "int8 a ", '# "#"', "\r\n"),)),
+        (
+            18,
+            (
+                tree.Line(18, "", "#", "\u2028"),
+                tree.Line(20, "", "", "\n"),
+                tree.Line(21, " ---", "", "\r"),
+                tree.Line(26, "\tint8 b", "", "\n"),
+            ),
+        ),
+    ]
+    assert file.separators == (14,)
 
 
-@pytest.mark.parametrize(("line", "needs_lark"), [("int8 a 5  # x", False), ("int8[][] a", True)])
-def test_ordinary_files_do_without_lark(line, needs_lark, tmp_path):
-    (tmp_path / "demo/msg").mkdir(parents=True)
-    (tmp_path / "demo/msg/A.msg").write_text(f"{line}\n")
-    code = (
-        "import sys\nfrom idlc.cli.main import main\n"
-        "main(['check', 'demo'])\nprint('lark' in sys.modules)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == str(needs_lark)
+HOSTILE = {
+    "a long name": "int8 " + "a" * 400_000,
+    "spaces in a name": "int8 a" + " " * 400_000 + "b",
+    "spaces before a sign": "int8 A" + " " * 400_000 + "=5",
+    "words before a sign": "int8 " + "A " * 200_000 + "=5",
+    "words": "int8 " + "a " * 200_000 + "b",
+    "signs": "int8 A" + "=" * 400_000,
+    "digits": "int8 a " + "1" * 400_000,
+    "a large size": "int8[" + "1" * 400_000 + "] a",
+    "a long type": "a" * 400_000 + " a",
+    "no name": "a" * 400_000,
+    "brackets": "int8" + "[" * 400_000 + "] a",
+    "pairs of brackets": "int8" + "[]" * 200_000 + " a",
+    "bounds": "string" + "<=" * 200_000 + " a",
+    "angles": "<" * 400_000 + " a",
+    "dashes": "-" * 400_000,
+    "spaces": " " * 400_000 + "a",
+}
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
+def test_a_hostile_line_takes_no_more_than_linear_time(text):
+    """It would take hours if time grew with the square of the length."""
+    shown(text, parse_definition(text))
+
+
+def test_only_some_short_lines_are_kept():
+    definition._parse_common.cache_clear()
+    for number in range(definition._parse_common.cache_info().maxsize + 10):
+        parse_definition(f"int8 a{number}")
+    before = definition._parse_common.cache_info()
+    parse_definition("int8 " + "a" * definition.COMMON)
+    assert definition._parse_common.cache_info() == before
+    assert before.currsize == before.maxsize
