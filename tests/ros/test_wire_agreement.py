@@ -3,6 +3,7 @@
 Both have the same names, so each lives in its own process; they exchange files.
 """
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from tests.support.paths import PROGRAMS
 MIXED = ("nav_msgs", "sensor_msgs", "std_srvs", "test_msgs")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def side(ros_environment):
     """Run one side; fail with what it printed unless it looked at everything without complaint."""
 
@@ -37,23 +38,33 @@ def side(ros_environment):
     return run
 
 
-def test_every_message_both_ways(side, tmp_path):
+@pytest.fixture(scope="module")
+def invented(side, tmp_path_factory):
+    """Return a file with values of all messages, and what rosidl makes of them."""
+    record = tmp_path_factory.mktemp("invented") / "record.json"
+    side("invent", record, names_in(interfaces(), interfaces()))
+    return record
+
+
+@pytest.fixture
+def record(invented, tmp_path):
+    """Return a copy of the values, to which one test adds idlc's bytes."""
+    return Path(shutil.copy(invented, tmp_path))
+
+
+def test_every_message_both_ways(side, record, tmp_path):
     found = interfaces()
     packages = sorted(found)
     names = names_in(packages, found)
     assert len(names) > 200
     for package in packages:
         generate(SHARE / package, tmp_path / "classes" / package)
-    record = tmp_path / "record.json"
-    side("invent", record, names)
     side("check", record, names, tmp_path / "classes")
     side("read", record, names)
 
 
 @pytest.mark.parametrize("package", MIXED)
-def test_one_package_among_official_ones(package, side, tmp_path):
+def test_one_package_among_official_ones(package, side, record, tmp_path):
     generate(SHARE / package, tmp_path / "classes" / package)
-    record = tmp_path / "record.json"
-    side("invent", record, names_in([package], interfaces()))
     side("check", record, names_in([package], interfaces()), tmp_path / "classes")
     side("read", record, names_in([package], interfaces()))

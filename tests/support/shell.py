@@ -28,11 +28,15 @@ SET = {
 
 def _leave() -> None:
     """Remove from this process what the shell set, except what KEPT allows."""
-    for path in filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep)):
+    paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    for path in filter(None, paths):
         if (entry := os.path.abspath(path)) in sys.path:  # noqa: PTH100 - as `site` does it
             sys.path.remove(entry)
     for name in [name for name in os.environ if not KEPT.fullmatch(name)]:
         del os.environ[name]
+    if str(ROOT) in paths:  # a copy of this repository, whose programs import idlc from it
+        os.environ["PYTHONPATH"] = str(ROOT)
+        sys.path.insert(0, str(ROOT))
     if "LD_LIBRARY_PATH" in os.environ:  # the ROS 2 wheels add theirs to the shell's
         paths = os.environ["LD_LIBRARY_PATH"].split(os.pathsep)
         prefix = Path(sys.prefix).resolve()
