@@ -60,8 +60,8 @@ def columns(work: Work, name: str):
     kind = work.implementations[IDLC].class_of(*MESSAGES[name].parts)
     count = COUNT if work.quick else ROWS
     buffers = copies(work, name, count)
-    assert len(kind.to_columns(buffers, ragged=True)) == count
-    found = {IDLC: each(lambda: kind.to_columns(buffers, ragged=True), count)}
+    assert len(kind.to_columns(buffers)) == count
+    found = {IDLC: each(lambda: kind.to_columns(buffers), count)}
     found |= decoders(work, name, buffers[:COUNT])
     return found | {"join of the buffers": each(lambda: bytearray().join(buffers), count)}
 

@@ -44,10 +44,10 @@ def columns(work: Work, varied: Varied):
     whole, rng = work.message(IDLC, varied.message), Random(1)
     messages = [shortened(whole, rng) for _ in range(count)]
     buffers = kind.serialize_many(messages)
-    assert kind.to_columns(buffers, ragged=True)[-1] == messages[-1].to_dict()
+    assert kind.to_columns(buffers)[-1] == messages[-1].to_dict()
     memory = np.frombuffer(b"".join(buffers), np.uint8)
     return {
-        IDLC: each(lambda: kind.to_columns(buffers, ragged=True), count),
+        IDLC: each(lambda: kind.to_columns(buffers), count),
         "to_arrow": each(lambda: kind.to_arrow(buffers), count),
         "deserialize_many": each(lambda: kind.deserialize_many(buffers), count),
         **decoders(work, varied.message, buffers[:1000]),

@@ -33,7 +33,6 @@ from idlc.recordings.memory import (
     is_kept,
     keep_as_named,
 )
-from idlc.recordings.memory import class_from as class_from  # earlier pickles name it here
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import LocalTypes, RecordedTypes, recorded_types, topics_of, versions
 from idlc.runtime.names import owner_of

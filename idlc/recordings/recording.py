@@ -278,7 +278,7 @@ class Selection:
         recorded = join_messages(list(self.recorded()))
         batch = self._read_as(recorded)
         with _at(self.topic, recorded.views):
-            table = to_columns(source, batch, fields, True)
+            table = to_columns(source, batch, fields)
         times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
         columns = {name: values for name, values in times if values is not None}
         codes = {**dict.fromkeys(columns, "M8[ns]"), **table.times}

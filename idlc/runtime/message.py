@@ -351,15 +351,13 @@ class Message(metaclass=MessageMeta):
         messages: Iterable[bytes | bytearray | memoryview],
         *,
         fields: Iterable[str] | None = None,
-        ragged: bool | None = None,
         datetimes: bool = False,
     ) -> Any:
-        """Return many serialized messages as columns of numpy, without making messages.
+        """Return many serialized messages as Columns of numpy, without making messages.
 
-        They are Columns with `ragged=True`, which is to be the default; else a structured array, if
-        that can hold them. An `idlc.Batch` of messages is not copied. Needs idlc itself.
+        An `idlc.Batch` of messages is not copied. Needs idlc itself.
         """
-        return _columns().to_columns(cls, messages, fields, ragged, datetimes)
+        return _columns().to_columns(cls, messages, fields, datetimes)
 
     @classmethod
     def to_arrow(

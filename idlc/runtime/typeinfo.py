@@ -195,11 +195,7 @@ _types_in = cache(Types)
 def types_of(kind: type) -> Types:
     """Return what the package of a generated class says of types."""
     home, _, _ = kind.__module__.rsplit(".", 2)
-    try:
-        data = import_module(f"{home}._type_data")
-    except ModuleNotFoundError:
-        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
-    return _types_in(data.JSON, home)
+    return _types_in(import_module(f"{home}._type_data").JSON, home)
 
 
 def structure_of(kind: type) -> Structure:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from idlc.recordings.batches import Batch
-from idlc.recordings.columns.read import columns_of
+from idlc.recordings.columns.read import to_columns
 from idlc.recordings.columns.values import Columns, Ragged
 from idlc.recordings.containers.messages import Messages, Raw
 from idlc.upgrading.convert import kind_of
@@ -39,10 +39,10 @@ class Upgraded(Messages, frozen=True, eq=False):
         """Return columns of a type, the new version's."""
         plan = self.upgrade.plan
         if plan.through or plan.uses_rules:
-            return columns_of(kind, self.views(), fields, False)
-        wanted = columns_of(kind, (), fields, False)
+            return to_columns(kind, self.views(), fields)
+        wanted = to_columns(kind, (), fields)
         kept = [field.old.name for field in plan.fields if field.old and field.new.name in wanted]
-        return _columns(plan, columns_of(self.upgrade.old, self.recorded, kept, False), wanted)
+        return _columns(plan, to_columns(self.upgrade.old, self.recorded, kept), wanted)
 
 
 def _columns(plan: Plan, old: Columns, wanted: Columns) -> Columns:
@@ -60,7 +60,7 @@ def _columns(plan: Plan, old: Columns, wanted: Columns) -> Columns:
             kind, count = kind_of(plan.new), len(old)
             data = kind().serialize()
             every = Batch(data, np.zeros(count, np.int64), np.full(count, len(data)))
-            defaults = columns_of(kind, every, None, False)
+            defaults = to_columns(kind, every)
         columns[name] = _picked(defaults[name], wanted[name])
     return Columns(columns, len(old), wanted.times)
 

@@ -37,7 +37,7 @@ SHAPES = {
     "nothing": "None",
     "the marker alone": f"[{MARKER}]",
     "a tuple of lists": f"([*{MARKER}], ['share/demo/msg', ('msg/Drive.msg',)])",
-    "all of it, and files of idlc 0.1": f"""[
+    "all of it, and other descriptions": f"""[
         {MARKER},
         ('{INDEX}/rosidl_interfaces/', glob('resource/rosidl_interfaces/*')),
         (os.path.join('share', package_name), ['package.xml', 'README.md']),
@@ -103,7 +103,7 @@ def test_the_index_says_what_is_installed(shape, machine, package, tmp_path):
 
 @pytest.mark.parametrize("machine", ["x86_64", "riscv64"])
 def test_a_source_distribution_holds_what_data_files_lists(machine, package, tmp_path):
-    shape = "all of it, and files of idlc 0.1"
+    shape = "all of it, and other descriptions"
     set_up(package, shape, machine, "install_data", "--install-dir", str(tmp_path / "prefix"),
            "sdist", "--dist-dir", str(tmp_path / "dist"))  # fmt: skip
     (archive,) = (tmp_path / "dist").glob("*.tar.gz")

@@ -1,7 +1,8 @@
-"""Packages that idlc 0.2 generated before the runtime was one folder, beside packages of today.
+"""Packages with another runtime beside packages of today, as packages of another version have it.
 
-earlier.tar.xz has them: `outlines` (messages, a service, an action), `canvas`, whose messages hold
-brushes/msg/Brush, and `logged` with the `std_msgs` and `builtin_interfaces` that it uses.
+An idlc from before the first release generated those in earlier.tar.xz: `outlines` (messages, a
+service, an action), `canvas`, whose messages hold brushes/msg/Brush, and `logged` with the
+`std_msgs` and `builtin_interfaces` that it uses.
 """
 
 import shutil
@@ -31,6 +32,8 @@ def folder(tmp_path_factory):
     """A folder with packages of both versions."""
     folder = tmp_path_factory.mktemp("versions")
     shutil.unpack_archive(EARLIER, folder)
+    for types in folder.glob("*/_idlc/type_data.py"):  # the first release expects them elsewhere
+        shutil.copy(types, types.parents[1] / "_type_data.py")
     generated.write_package(folder, "brushes", BRUSH)
     generated.write_package(folder, "unique_identifier_msgs", UUID)
     for name, files in (("robot", ROBOT), ("noted", {"msg/Note.msg": "std_msgs/Header header\n"})):

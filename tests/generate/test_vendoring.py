@@ -345,22 +345,6 @@ def test_two_libraries_pass_values_to_each_other(library, other_library):
     assert prints(USE + SHARE, library, other_library) == []
 
 
-def test_types_can_be_where_earlier_versions_had_them(library, other_library, tmp_path):
-    """As those of an installed package that idlc generated before version 0.2."""
-    folder = packages(tmp_path, std_msgs=HEADER, builtin_interfaces=TIME)
-    for package in ("std_msgs", "builtin_interfaces"):
-        data = folder / package / "_type_data.py"
-        data.rename(folder / package / "_idlc/type_data.py")
-    late = f"""
-sys.path.insert(0, {str(folder)!r})
-import std_msgs.msg
-old = std_msgs.msg.Header(stamp=header.stamp, frame_id="map")
-assert header == old and Track(header=old, check_fields=True) == Track(header=header)
-"""
-    assert prints(USE + late, library) == []
-    assert prints(USE, library, folder) == []
-
-
 def test_types_of_one_name_and_another_hash_are_unequal(library, tmp_path):
     write(tmp_path / "files", {"msg/Bee.msg": "std_msgs/Header header\n"})
     write(

@@ -97,7 +97,7 @@ def test_every_kind_of_field_and_no_messages(types):
         data=b"ab",
         numbers=[np.nan, 1.5],
     )
-    columns = types.Odd.to_columns([first.serialize(), second.serialize()], ragged=True)
+    columns = types.Odd.to_columns([first.serialize(), second.serialize()])
     frame = columns.to_pandas()
     assert frame["at"].astype("int64").tolist() == [-999_999_995, 0]
     assert frame["for"].dtype == "timedelta64[ns]"
@@ -111,12 +111,10 @@ def test_every_kind_of_field_and_no_messages(types):
     assert table["headers"][1][0]["frame_id"] == "a"
     assert table.schema["headers"].inner.fields[0].dtype == pl.Datetime("ns")
     # a table of no messages has the same types
-    none = types.Odd.to_columns([], ragged=True)
+    none = types.Odd.to_columns([])
     assert none.to_polars().schema == table.schema
     assert none.to_pandas().dtypes.to_dict() == frame.dtypes.to_dict()
-    assert (
-        len(types.Empty.to_columns([types.Empty().serialize()] * 3, ragged=True).to_pandas()) == 3
-    )
+    assert len(types.Empty.to_columns([types.Empty().serialize()] * 3).to_pandas()) == 3
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars", "pyarrow"])

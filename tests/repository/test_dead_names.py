@@ -9,8 +9,8 @@ from tests.support.paths import ROOT
 
 #: What is called by its name from outside: by click, pytest, Python, and PEP 517's frontends.
 CALLED = re.compile(r"__\w+__|pytest_\w+|hatch_\w+|command|(get_requires_for_)?build_\w+")
-#: What only programs use, as docs/ says: `Ragged.stacked`.
-PUBLIC = {"stacked"}
+#: What only programs use, as docs/ says: `Ragged.stacked`, `Columns.structured`.
+PUBLIC = {"stacked", "structured"}
 #: What generated code has for numbers of each size, and what no golden package happens to use.
 NUMBERS = re.compile(r"(U?Int|Float)\d+(Array|Sequence)|(U?INT|FLOAT)\d+|PAD\d")
 UNUSUAL = {"PROTOCOL", "flags_writer"}

@@ -165,7 +165,7 @@ if sys.argv[2:]:
     except ImportError as error:
         print(json.dumps([error.name, str(error)]))
 else:
-    Lists.to_columns([raw], ragged=True)
+    Lists.to_columns([raw])
     between = {"pyarrow"} & set(sys.modules)
     Lists.to_arrow([raw])
     print(json.dumps([list(before), list(between), "pandas" in sys.modules]))

@@ -126,7 +126,7 @@ def test_the_chunks_of_an_mcap_file(msg, tmp_path):
         number = channels[cls.__name__]
         split = [part for c in chunks for part in split_mcap_chunk(c, number)]
         assert cls.deserialize_many(split) == messages
-        assert len(cls.to_columns(split, ragged=True)) == len(messages)
+        assert len(cls.to_columns(split)) == len(messages)
     for size in (1, 8, 9, 20, len(chunks[0]) - 1):
         with pytest.raises(ValueError, match="ends within a record"):
             list(split_mcap_chunk(chunks[0][:size], channels["Point"]))

@@ -667,7 +667,7 @@ def test_fields_are_free_to_have_the_names_of_methods(hiding):
             assert super(kind, kind).deserialize(bytearray(buffer), copy=False).mro == 9
             assert super(kind, kind).deserialize_many([buffer]) == [message]
             assert super(kind, kind).serialize_many([message], byteorder=order) == [buffer]
-        assert list(super(kind, kind).to_columns([buffer], ragged=True)["from_dict"][0]) == [
+        assert list(super(kind, kind).to_columns([buffer])["from_dict"][0]) == [
             5,
             6,
             7,

@@ -122,7 +122,7 @@ def test_only_what_is_wanted_is_read(folder, name):
         message = rng.choice(whole).to_dict()
         names = list(dotted(message, rng))
         wanted = [selected(one.to_dict(), names) for one in whole]
-        columns = cls.to_columns(buffers, fields=iter(names), ragged=True)
+        columns = cls.to_columns(buffers, fields=iter(names))
         assert repr(columns.to_list()) == repr(wanted)
         if names:
             assert cls.to_arrow(buffers, fields=names).column_names == list(wanted[0])
@@ -130,9 +130,9 @@ def test_only_what_is_wanted_is_read(folder, name):
 
 def test_what_comes_after_the_last_wanted_field_is_not_looked_at(msg, error):
     raw = msg.Image(width=7, data=[1, 2]).serialize()[:-6]
-    assert msg.Image.to_columns([raw], fields="width", ragged=True)["width"].tolist() == [7]
+    assert msg.Image.to_columns([raw], fields="width")["width"].tolist() == [7]
     with pytest.raises(error, match=r"^\[0\]\.gains: "):
-        msg.Image.to_columns([raw], ragged=True)
+        msg.Image.to_columns([raw])
 
 
 def test_a_field_that_there_is_not(msg):
@@ -171,7 +171,7 @@ def test_large_messages_with_small_ones_and_long_texts_among_them(msg, error):
     small = min(range(40), key=lambda index: len(raws[index]))
     for wrong in (raws[small][:17], raws[small][:25]):
         with pytest.raises(error, match=rf"^\[{small}\]"):
-            msg.Image.to_columns([*raws[:small], wrong, *raws[small + 1 :]], ragged=True)
+            msg.Image.to_columns([*raws[:small], wrong, *raws[small + 1 :]])
 
 
 @pytest.mark.parametrize("name", ["Joints", "Deep", "Deeper", "Wide"])
@@ -190,7 +190,7 @@ def test_many_messages_of_a_few_layouts(folder, error, name):
     for wrong in (0, 150):
         broken = [*raws[:wrong], raws[wrong][:9], *raws[wrong + 1 :]]
         with pytest.raises(error, match=rf"^\[{wrong}\]"):
-            cls.to_columns(batch_of(broken, rng), ragged=True)
+            cls.to_columns(batch_of(broken, rng))
 
 
 def test_one_long_sequence_among_short_ones(msg):
@@ -209,7 +209,7 @@ def test_texts_that_are_no_utf_8(msg):
     raws = [head + struct.pack("<I", len(text)) + text for text in texts]
     for buffers in (raws, raws[:4], raws[6:8], raws[8:]):
         wanted = [msg.Header.deserialize(raw).frame_id for raw in buffers]
-        columns = msg.Header.to_columns(buffers, ragged=True)
+        columns = msg.Header.to_columns(buffers)
         assert columns["frame_id"].to_list() == list(columns["frame_id"]) == wanted
         assert msg.Header.to_arrow(buffers)["frame_id"].to_pylist() == wanted
 
@@ -217,7 +217,7 @@ def test_texts_that_are_no_utf_8(msg):
 def test_any_byte_but_zero_is_true(msg):
     raw = bytearray(msg.Joints(moving=[True, False]).serialize())
     raw[-2] = 77
-    assert msg.Joints.to_columns([raw], ragged=True)["moving"].to_list() == [[True, False]]
+    assert msg.Joints.to_columns([raw])["moving"].to_list() == [[True, False]]
     assert msg.Joints.to_arrow([raw])["moving"].to_pylist() == [[True, False]]
 
 
@@ -227,44 +227,28 @@ def test_any_byte_but_zero_is_true(msg):
 def test_the_structured_array_of_messages_that_are_alike(msg):
     messages = [msg.Joints(name=["a", "bc"], position=[n, 2]) for n in range(3000)]
     raws = msg.Joints.serialize_many(messages)
-    rows = msg.Joints.to_columns(map(memoryview, raws), ragged=True).structured()
+    rows = msg.Joints.to_columns(map(memoryview, raws)).structured()
     assert rows.shape == (3000,)
     assert rows["header"]["stamp"]["sec"].dtype == np.int32
     assert rows["position"][:, 0].tolist() == list(range(3000))
     assert rows["name"][0].tolist() == [b"a", b"bc"]
-    nothing = msg.Joints.to_columns([], ragged=True).structured()
+    nothing = msg.Joints.to_columns([]).structured()
     assert nothing.dtype.names == ("header", "name", "position", "moving")
     empty = msg.Empty.serialize_many([msg.Empty()] * 3)
-    assert msg.Empty.to_columns(empty, ragged=True).structured().shape == (3,)
-    wide = msg.Wide.to_columns([msg.Wide(wide=["é"]).serialize()], ragged=True).structured()
+    assert msg.Empty.to_columns(empty).structured().shape == (3,)
+    wide = msg.Wide.to_columns([msg.Wide(wide=["é"]).serialize()]).structured()
     assert wide["wide"].tolist() == [["é".encode()]]
 
 
 def test_what_a_structured_array_cannot_hold(msg):
     uneven = [msg.Joints(position=[1.0] * count).serialize() for count in (2, 2, 3)]
-    columns = msg.Joints.to_columns(uneven, ragged=True)
+    columns = msg.Joints.to_columns(uneven)
     with pytest.raises(ValueError, match=r"^\[2\]\.position: has 3 elements and 2 before"):
         columns.structured()
     joints = [msg.Joints(position=[1.0] * count) for count in (1, 2)]
-    columns = msg.Deep.to_columns([msg.Deep(joints=joints).serialize()], ragged=True)
+    columns = msg.Deep.to_columns([msg.Deep(joints=joints).serialize()])
     with pytest.raises(ValueError, match=r"^joints\.position: has 2 elements and 1 before"):
         columns.structured()
-
-
-def test_without_ragged_it_is_as_before_and_warns(msg):
-    even, uneven = ([msg.Joints(position=[1.0] * n).serialize() for n in (2, n)] for n in (2, 3))
-    with pytest.warns(DeprecationWarning, match="ragged=True") as caught:
-        assert msg.Joints.to_columns(even)["position"].shape == (2, 2)
-    assert caught[0].filename == __file__
-    with pytest.warns(DeprecationWarning, match="ragged=True"):
-        assert msg.Joints.to_columns(even, ragged=False).shape == (2,)
-    with pytest.warns(DeprecationWarning, match="ragged=True"):
-        assert msg.Joints.to_columns(uneven)["position"].sizes.tolist() == [2, 3]
-    with (
-        pytest.warns(DeprecationWarning, match="ragged=True"),
-        pytest.raises(ValueError, match=r"2 before.*; ragged=True takes it"),
-    ):
-        msg.Joints.to_columns(uneven, ragged=False)
 
 
 # Columns, Texts and Ragged
@@ -272,7 +256,7 @@ def test_without_ragged_it_is_as_before_and_warns(msg):
 
 def test_columns_are_used_like_lists_and_by_name(msg):
     messages = [msg.Joints(name=["a"] * n, position=range(n)) for n in (2, 0, 3)]
-    columns = msg.Joints.to_columns(msg.Joints.serialize_many(messages), ragged=True)
+    columns = msg.Joints.to_columns(msg.Joints.serialize_many(messages))
     plain = [message.to_dict() for message in messages]
     assert columns.keys() == ["header", "name", "position", "moving"]
     assert "name" in columns
@@ -321,7 +305,7 @@ def test_a_file_in_memory_is_read_in_place(msg, tmp_path):
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as memory:
         batch.buffer = memory
         assert msg.Image.deserialize_many(batch) == messages
-        columns = msg.Image.to_columns(batch, ragged=True)
+        columns = msg.Image.to_columns(batch)
         table = msg.Image.to_arrow(batch)
     # nothing keeps the map, or it could not have been closed
     assert columns.to_list() == [message.to_dict() for message in messages]
@@ -334,7 +318,7 @@ def test_columns_share_nothing_with_the_buffers(msg, count):
         raws = cls.serialize_many(messages_of(cls, random.Random(1), count, 9)) * 2
         batch = batch_of(raws, random.Random(1))
         memory = batch.buffer
-        columns = cls.to_columns(batch, ragged=True)
+        columns = cls.to_columns(batch)
         before = repr(columns[:])
         memory[:] = b"\x55" * len(memory)
         assert repr(columns[:]) == before
@@ -343,7 +327,7 @@ def test_columns_share_nothing_with_the_buffers(msg, count):
 def test_columns_of_messages_within_each_other_share_nothing_either(msg):
     memory = bytearray(40)
     kind = type(batch_of([bytes(5)], random.Random(1)))
-    columns = msg.Byte.to_columns(kind(memory, np.arange(30), np.arange(5, 35)), ragged=True)
+    columns = msg.Byte.to_columns(kind(memory, np.arange(30), np.arange(5, 35)))
     memory[:] = b"\1" * 40
     assert columns["a"].tolist() == [0] * 30
 
@@ -353,11 +337,11 @@ def test_a_batch_that_is_none(msg):
     kind = type(batch_of([raw], random.Random(1)))
     for starts, stops in (([0], [29]), ([-1], [4]), ([5], [4]), ([30], [30])):
         with pytest.raises(ValueError, match="not within its buffer"):
-            msg.Point.to_columns(kind(raw, starts, stops), ragged=True)
+            msg.Point.to_columns(kind(raw, starts, stops))
     with pytest.raises(ValueError, match="as many"):
-        msg.Point.to_columns(kind(raw, [0, 0], [28]), ragged=True)
-    assert len(msg.Point.to_columns(kind(raw, [0, 0], [28, 28]), ragged=True)) == 2
-    assert len(msg.Point.to_columns(kind(b"", [], []), ragged=True)) == 0
+        msg.Point.to_columns(kind(raw, [0, 0], [28]))
+    assert len(msg.Point.to_columns(kind(raw, [0, 0], [28, 28]))) == 2
+    assert len(msg.Point.to_columns(kind(b"", [], []))) == 0
 
 
 # what is refused
@@ -439,13 +423,13 @@ def test_times_as_times_of_numpy_and_arrow(msg):
     ]
     for order in ("little", "big"):
         raws = msg.Times.serialize_many(messages, byteorder=order)
-        columns = msg.Times.to_columns(raws, datetimes=True, ragged=True)
+        columns = msg.Times.to_columns(raws, datetimes=True)
         assert columns["at"].dtype == "M8[ns]"
         assert columns["at"].view(np.int64).tolist() == wanted
         assert columns["after"].values.dtype == "m8[ns]"
         assert columns["after"][4].view(np.int64).tolist() == [wanted[4]] * 4
         assert columns["two"].stacked()[:, 0].view(np.int64).tolist() == wanted
-        columns = msg.Times.to_columns(raws, datetimes=True, fields=["two", "header"], ragged=True)
+        columns = msg.Times.to_columns(raws, datetimes=True, fields=["two", "header"])
         rows = columns.structured()
         assert rows["two"][:, 0].view(np.int64).tolist() == wanted
         assert rows["header"]["stamp"].dtype == "M8[ns]"
@@ -453,27 +437,7 @@ def test_times_as_times_of_numpy_and_arrow(msg):
         assert table.schema.field("at").type == pa.timestamp("ns")
         assert table.schema.field("after").type == pa.large_list(pa.duration("ns"))
         assert table["at"].cast(pa.int64()).to_pylist() == wanted
-    columns = msg.Times.to_columns(raws, datetimes=True, fields=["at.sec", "two"], ragged=True)
+    columns = msg.Times.to_columns(raws, datetimes=True, fields=["at.sec", "two"])
     assert columns["at"]["sec"].tolist() == [seconds for seconds, _ in instants]
-    stamps = time.to_columns([time(sec=5, nanosec=6).serialize()], datetimes=True, ragged=True)
+    stamps = time.to_columns([time(sec=5, nanosec=6).serialize()], datetimes=True)
     assert stamps.structured().tolist() == [(5, 6)]
-
-
-# whose classes
-
-
-def test_classes_of_a_package_from_before_are_read_too(tmp_path):
-    """Its types were in the folder of its runtime."""
-    from idlc.recordings.columns import to_arrow, to_columns
-
-    generated.write_package(tmp_path, "before_msgs", {"msg/Odd.msg": FILES["msg/Odd.msg"]})
-    package = tmp_path / "before_msgs"
-    (package / "_type_data.py").rename(package / "_idlc" / "type_data.py")
-    with generated.importable(tmp_path):
-        cls = generated.class_of("before_msgs/msg/Odd")
-        buffers = [cls(1, 2, 3).serialize()] * 2
-        assert to_columns(cls, buffers, ragged=True)["b"].tolist() == [2, 2]
-        assert to_arrow(cls, buffers).to_pylist() == [{"a": 1, "b": 2, "c": 3}] * 2
-        error = __import__("before_msgs._idlc")._idlc.DecodeError
-        with pytest.raises(error, match=r"^\[1\]\.b: "):
-            to_columns(cls, [buffers[0], buffers[1][:6]], ragged=True)

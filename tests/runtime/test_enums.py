@@ -125,7 +125,7 @@ def test_columns_compare_with_members(drive_class):
     import pandas as pd
 
     messages = [drive_class(mode, plan=[mode]).serialize() for mode in (0, 1, 1, 9)]
-    columns = drive_class.to_columns(messages, ragged=True)
+    columns = drive_class.to_columns(messages)
     assert np.count_nonzero(columns["mode"] == drive_class.Mode.MOVING) == 2
     frame = pd.DataFrame({"mode": columns["mode"]})
     assert list(frame[frame["mode"] == drive_class.Mode.IDLE].index) == [0]

@@ -98,7 +98,7 @@ def inflated(tmp_path_factory):
         cls = generated.class_of("inflated_msgs/msg/Pair")
         with suppress(ValueError):  # loads what explains an error, and numpy
             cls.deserialize(b"")
-        cls.to_columns([cls().serialize()], ragged=True)
+        cls.to_columns([cls().serialize()])
         yield folder
 
 
@@ -107,8 +107,8 @@ READERS = {
     "of a view": lambda cls, raw: cls.deserialize(memoryview(raw)),
     "copy=False": lambda cls, raw: cls.deserialize(raw, copy=False),
     "deserialize_many": lambda cls, raw: cls.deserialize_many([raw]),
-    "to_columns": lambda cls, raw: cls.to_columns([raw], ragged=True),
-    "ragged": lambda cls, raw: cls.to_columns([raw] * 20, ragged=True),
+    "to_columns": lambda cls, raw: cls.to_columns([raw]),
+    "ragged": lambda cls, raw: cls.to_columns([raw] * 20),
 }
 
 
@@ -169,7 +169,7 @@ def test_what_prepares_for_many_texts_is_done_once(tmp_path, monkeypatch):
 def test_columns_are_not_made_wide_by_one_text(inflated):
     cls = generated.class_of("inflated_msgs/msg/Pair")
     raws = [cls("x" * 1_000_000).serialize(), *[cls("x").serialize()] * 1000]
-    columns = cls.to_columns(raws, ragged=True)
+    columns = cls.to_columns(raws)
     with pytest.raises(ValueError, match=r"1,00.* bytes for 1,0.* bytes of columns"):
         columns.structured()
     assert columns["k"][0] == "x" * 1_000_000

@@ -76,14 +76,14 @@ def from_arrow(value):
 def check(cls, buffers, rng):
     """Check all kinds of columns of some messages against the messages."""
     wanted = [cls.deserialize(buffer).to_dict() for buffer in buffers]
-    columns = cls.to_columns(buffers, ragged=True)
+    columns = cls.to_columns(buffers)
     assert len(columns) == len(buffers)
     assert repr(columns.to_list()) == repr(wanted)
     if buffers:
-        columns = cls.to_columns(batch_of(buffers, rng), ragged=True)
+        columns = cls.to_columns(batch_of(buffers, rng))
         assert repr(columns.to_list()) == repr(wanted)
     with suppress(ValueError):  # not all columns fit into one array
-        rows = cls.to_columns(buffers, ragged=True).structured()
+        rows = cls.to_columns(buffers).structured()
         assert repr([plain_row(row) for row in rows]) == repr(short_texts(wanted))
     table = cls.to_arrow(iter(map(memoryview, buffers)))
     table.validate(full=True)

@@ -53,7 +53,7 @@ def test_columns_are_those_of_the_new_bytes(tmp_path_factory, data):
         for each in values
     ]
     names = data.draw(st.none() | st.lists(st.sampled_from(paths(pair.new, "M0")), max_size=4))
-    options = {"fields": names, "ragged": True}
+    options = {"fields": names}
     wanted = new.to_columns(upgrade.many(payloads), **options)
     assert parts(upgrade.columns(payloads, **options)) == parts(wanted)
     assert upgrade.arrow(payloads).equals(new.to_arrow(upgrade.many(payloads)), check_metadata=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from idlc.recordings.columns.read import columns_of, type_of
+from idlc.recordings.columns.read import to_columns, type_of
 from idlc.recordings.columns.values import needing, record_batch
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
@@ -21,7 +21,7 @@ def to_arrow(
     """Return a `pyarrow.Table` with a row for each message."""
     with needing("pyarrow", "to_arrow"):
         import pyarrow  # type: ignore[import-untyped,unused-ignore]
-    columns = columns_of(kind, messages, fields, datetimes)
+    columns = to_columns(kind, messages, fields, datetimes)
     batch = record_batch(columns.flattened() if flat else columns, dictionary)
     structure = type_of(kind)
     metadata = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
@@ -73,57 +72,21 @@ def to_columns(
     kind: type | Structure,
     messages: Any,
     fields: Iterable[str] | None = None,
-    ragged: bool | None = None,
     datetimes: bool = False,
-) -> Any:
-    """Return Columns with a row for each message, or without `ragged` what was returned before."""
-    if ragged:
-        return columns_of(kind, messages, fields, datetimes)
-    table, top = _table_of(kind, messages, fields)
-
-    def columns() -> Columns:
-        every = table.columns(top)
-        return every.dated() if datetimes else every
-
-    warnings.warn(
-        "to_columns will return Columns: `to_columns(..., ragged=True)` does so now, "
-        "and `.structured()` makes a structured array of them",
-        DeprecationWarning,
-        stacklevel=3,
-    )
-    table.views = True  # they are copied into the array
-    try:
-        return columns().structured()
-    except ValueError as error:
-        table.views = False
-        if ragged is None:
-            return columns()
-        raise ValueError(f"{error}; ragged=True takes it") from None
-
-
-def columns_of(
-    kind: type | Structure, messages: Any, fields: Iterable[str] | None, datetimes: bool
 ) -> Columns:
     """Return the columns of messages, which may have a way of their own; raise DecodeError."""
     wanted = (fields,) if isinstance(fields, str) else fields
     if hasattr(messages, "columns"):
         columns: Columns = messages.columns(kind, wanted)
     else:
-        table, top = _table_of(kind, messages, wanted)
+        plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted))
+        located = messages_of(messages)
+        try:
+            table, top = _read(plan, located)
+        except UnreadableError:
+            explain(kind, plan, located)
         columns = table.columns(top)
     return columns.dated() if datetimes else columns
-
-
-def _table_of(
-    kind: type | Structure, messages: Any, fields: Iterable[str] | None
-) -> tuple[Table, Elements]:
-    wanted = (fields,) if isinstance(fields, str) else fields
-    plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted))
-    all_of_them = messages_of(messages)
-    try:
-        return _read(plan, all_of_them)
-    except UnreadableError:
-        explain(kind, plan, all_of_them)
 
 
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:

@@ -28,11 +28,8 @@ class Elements(NamedTuple):
 class Table:
     """The located fields of messages, by column.
 
-    `order` is that of all messages; "<" if only some are big-endian. With `views`, columns may be
-    in the memory of the messages.
+    `order` is that of all messages; "<" if only some are big-endian.
     """
-
-    views = False
 
     def __init__(self, source: Source, order: str, scanned: ScanResult) -> None:
         self.source = source
@@ -119,14 +116,12 @@ class Table:
         return result
 
     def native(self, numbers: Any, code: str, big: Any) -> Any:
-        """Return numbers as this machine has them, and outside of the messages without `views`.
+        """Return numbers as this machine has them, and outside of the messages.
 
         Those at `big` are big-endian; of bools, every byte but zero is true.
         """
         if code == "?":
             return numbers != 0
-        if self.views and big is None and numbers.dtype == code:
-            return numbers
         if self.source.shares(numbers):
             numbers = numbers.copy()
         result = np.ascontiguousarray(numbers, code)
