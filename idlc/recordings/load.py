@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Iterable
 from functools import cached_property, lru_cache
@@ -153,8 +152,7 @@ class TopicType:
     @cached_property
     def structure(self) -> Structure:
         """The type, field by field."""
-        described = content(self._models[self._name.package])
-        return Types(json.dumps(described))[str(self._name)]
+        return Types(content(self._models[self._name.package]))[str(self._name)]
 
     @cached_property
     def kind(self) -> Any:

@@ -100,15 +100,14 @@ Numbers: TypeAlias = Callable[[Any, FieldInfo, Any], Any]
 
 
 class Types:
-    """The types of the package `home`, and all that they refer to: the JSON of its `_type_data.py`.
+    """The types of the package `home`, and all that they refer to, as its `_type_data.py` has them.
 
     Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
     imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
     Packages may describe types of one name in different ways, so nothing is kept by names alone.
     """
 
-    def __init__(self, text: str, home: str = "") -> None:
-        content = json.loads(text)
+    def __init__(self, content: Mapping[str, Any], home: str = "") -> None:
         self.home = home
         self.package: str = content["package"]
         #: The prefix of other packages' modules, relative to this one if it begins with a dot.
@@ -189,7 +188,9 @@ class Structure:
         return self.types.find_class(self.name)
 
 
-_types_in = cache(Types)
+@cache
+def _types_in(text: str, home: str) -> Types:
+    return Types(json.loads(text), home)
 
 
 def types_of(kind: type) -> Types:
