@@ -102,13 +102,6 @@ def endpoint(context: click.Context, option: click.Parameter, word: str) -> list
     return _types(word, _library(context), kinds, list(nearby_packages(Root.here())))
 
 
-def templates(_: click.Context, __: click.Parameter, word: str) -> list[str]:
-    """Offer the templates that a user can replace."""
-    from idlc.scaffold.templates import names
-
-    return [name for name in names() if name.startswith(word)]
-
-
 def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionItem[str]]:
     """Offer the ids and names of codes."""
     from idlc.diagnostics.codes import CODES

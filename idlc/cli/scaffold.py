@@ -17,7 +17,6 @@ COMMANDS = {
     "package": "Create a package.",
     "interface": "Create a .msg, .srv or .action file.",
     "node": "Create a node with a test, and register it in its package.",
-    "templates": "List the templates, or copy one to change it.",
 }
 
 
@@ -26,7 +25,6 @@ SYNONYMS = {
     **dict.fromkeys(("pkg", "project", "workspace"), "package"),
     **dict.fromkeys(("msg", "srv", "action", "message", "service", "type"), "interface"),
     **dict.fromkeys(("publisher", "subscriber", "client", "server"), "node"),
-    "template": "templates",
 }
 
 
@@ -57,18 +55,12 @@ def command() -> None:
 
 
 def writing(function: Command) -> Command:
-    """Add the options of a command that writes files, perhaps by templates."""
+    """Add the options of a command that writes files."""
     dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the changes.")
     force = click.option(
         "--force", is_flag=True, help="Replace existing files that differ, and keep backups."
     )
-    templates = click.option(
-        "--templates",
-        metavar="DIR",
-        type=click.Path(file_okay=False),
-        help="Use a template in this folder instead of idlc's template of the same name.",
-    )
-    return dry(force(templates(function)))
+    return dry(force(function))
 
 
 def common(function: Command) -> Command:

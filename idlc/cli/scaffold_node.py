@@ -218,7 +218,7 @@ def command(name: str, **arguments: Any) -> int:
     from idlc.project.root import Root
     from idlc.scaffold import changes, new_node
 
-    shared = ("dry_run", "force", "include", "templates", "launch")
+    shared = ("dry_run", "force", "include", "launch")
     settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle")
     translator = None

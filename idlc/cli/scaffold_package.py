@@ -84,7 +84,7 @@ def command(
         arguments["licence"] or LICENSES[0],
         BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
-    shared = {key: arguments[key] for key in ("dry_run", "force", "include", "templates")}
+    shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
     chosen |= {"starters"} if starters else set()
     result = package(requested, folder, Settings(root, **shared), report, examples, chosen)

@@ -136,7 +136,6 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     vendor_deps: SwitchOrBeside = False
     enums: Switch = False
     distro: TextOrTexts = ()
-    templates: Text = ""
     breaking: Table = {}
     check: Table = {}
 
@@ -209,7 +208,6 @@ def _read(path: Path, root: Root, report: Report) -> Config:
         "out": settings.out and _typed(folder, settings.out, root),
         "include": tuple(_typed(folder, each, root) for each in settings.include),
         "distro": tuple(name for name in distros if name in BY_NAME),
-        "templates": settings.templates and _typed(folder, settings.templates, root),
     }
     return Config(root=root, source=source, folder=folder, **values)
 

@@ -53,20 +53,15 @@ def environment() -> jinja2.Environment:
 
 @cache
 def code() -> jinja2.Environment:
-    """Return the environment of source files, which places nothing but Code and Text."""
-    return place_only_code(environment().overlay(bytecode_cache=_compiled("code")))
-
-
-def place_only_code(environment: jinja2.Environment) -> jinja2.Environment:
-    """Let an environment refuse each string that is neither Code nor Text; return it.
+    """Return the environment of source files, which places nothing but Code and Text.
 
     `join` and `indent`, macros and `set` blocks keep the type. Whatever else templates do with a
     string gives an ordinary one, which cannot be placed.
     """
-    environment.finalize = _placed
-    environment.concat = _concatenated  # type: ignore[method-assign]
-    environment.filters = {**environment.filters, "indent": _indented, "join": _joined}
-    return environment
+    source = environment().overlay(finalize=_placed, bytecode_cache=_compiled("code"))
+    source.concat = _concatenated  # type: ignore[method-assign]
+    source.filters = {**source.filters, "indent": _indented, "join": _joined}
+    return source
 
 
 def _placed(value: object) -> object:

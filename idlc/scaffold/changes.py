@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import difflib
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from idlc.check.compiler import stage
 from idlc.check.package.facts import home_of
 from idlc.check.package.setup_edits import wrap_lines
 from idlc.diagnostics import codes
@@ -24,10 +22,8 @@ from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
-from idlc.project.templates import verbatim
 from idlc.project.write import Change, Plan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, Endpoint, Role
-from idlc.scaffold.templates import BrokenTemplateError, Templates, read
 
 
 class FileOutcome(NamedTuple):
@@ -45,7 +41,6 @@ class Settings(NamedTuple):
     force: bool = False
     include: tuple[str, ...] = ()
     launch: bool = True
-    templates: str | None = None
 
 
 class Result(NamedTuple):
@@ -187,26 +182,6 @@ class Project:
                 yield f"--- {before}\n+++ b/{path}\n"
 
 
-def templates(settings: Settings, report: Report) -> Templates:
-    """Return idlc's templates, where templates in the user's folder replace them."""
-    folder = settings.templates or load_settings(settings.root, report).templates
-    if not folder:
-        return Templates()
-    user_templates = Templates(read(folder, settings.root, report))
-    user_templates.check(report)
-    return user_templates
-
-
-@contextmanager
-def rendering(subject: str, report: Report) -> Iterator[None]:
-    """Report problems of a user's template within; other exceptions are bugs of idlc."""
-    with stage("scaffold", subject):
-        try:
-            yield
-        except BrokenTemplateError as error:
-            report.add(error.problem)
-
-
 def find_package(settings: Settings, report: Report) -> Project | None:
     """Return the package that the working folder belongs to; report a missing one."""
     root = settings.root
@@ -219,24 +194,6 @@ def find_package(settings: Settings, report: Report) -> Project | None:
     name = declared_name(path, root, report)
     folder = root.shown(path.parent) if path.parent != root.base else "."
     return None if name is None else Project(folder, settings, report, name)
-
-
-#: The default folder of copies.
-FOLDER = "templates"
-
-
-def copied(chosen: Sequence[str], settings: Settings, report: Report) -> Result | None:
-    """Copy templates into the user's folder, to be changed there."""
-    set_already = settings.templates or load_settings(settings.root, report).templates
-    if report.had_errors:
-        return None
-    folder = set_already or FOLDER
-    project = Project(folder, settings, report)
-    result = project.write({name: verbatim(name) for name in chosen})
-    if result is None or set_already:
-        return result
-    note = f'set `templates = "{folder}"` in [tool.idlc] of pyproject.toml, or use --templates'
-    return result._replace(notes=(note,))
 
 
 def check(role: Role, type_: str, settings: Settings) -> None:

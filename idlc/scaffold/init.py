@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
-from idlc.check.compiler import models_of
+from idlc.check.compiler import models_of, stage
 from idlc.check.package.facts import folders
 from idlc.check.package.installation import check_setup
 from idlc.check.package.python_packages import layout
@@ -40,11 +40,11 @@ from idlc.project.inputs import Inputs, packages
 from idlc.project.lock import Tree
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, load_settings, scope, toml
-from idlc.scaffold.changes import Project, Result, Settings, marked, rendering, templates
+from idlc.project.templates import code
+from idlc.scaffold.changes import Project, Result, Settings, marked
 from idlc.scaffold.interface import implied_packages, starter
 from idlc.scaffold.layouts import SETUP, Layout, package_of
 from idlc.scaffold.package import LICENSES, Package, package_files
-from idlc.scaffold.templates import Templates
 
 #: The folder of generated classes in a library.
 _ROS = "ros"
@@ -156,7 +156,7 @@ def prepare(layout: Layout, settings: Settings, report: Report) -> Preparation |
     """Plan the changes to the package of a root; `None` after an error."""
     draft = Draft(Project(".", settings, report, layout.name))
     if layout.kind == "empty":
-        _new_package(layout, draft, settings, report)
+        _new_package(layout, draft)
     config = load_settings(draft.root(), report)
     if report.had_errors:
         return None
@@ -260,14 +260,14 @@ def _free(home: Path) -> str:
     return next(free, _ROS)
 
 
-def _new_package(layout: Layout, draft: Draft, settings: Settings, report: Report) -> None:
+def _new_package(layout: Layout, draft: Draft) -> None:
     """Add the files of `idlc scaffold package`."""
     name, here = layout.name, layout.folder
     maintainer = git.setting("user.name", here) or "Your Name"
     email = git.setting("user.email", here) or "you@example.com"
     package = Package(name, f"The package {name}.", maintainer, email, LICENSES[0])
-    with rendering(name, report):
-        for path, text in package_files(package, templates(settings, report)).items():
+    with stage("scaffold", name):
+        for path, text in package_files(package).items():
             if not draft.project.has(path):
                 draft.put(path, text, "every new package contains this file")
 
@@ -499,7 +499,7 @@ def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
     path, template = SERVICES[service]
     # what CMake's packages generate for Python is not committed, and others name their folder
     is_committed = top == layout.folder and layout.kind not in ("ament_cmake", "workspace")
-    text = Templates().render(template, is_committed=is_committed)
+    text = code().get_template(template).render(is_committed=is_committed)
     draft = Draft(Project(".", Settings(Root(top)), report))
     if draft.text(path) in (None, text):
         draft.put(path, text, "CI checks the interfaces")

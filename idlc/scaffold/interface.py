@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from idlc.check.compiler import compile_package
+from idlc.check.compiler import compile_package, stage
 from idlc.check.package.cmake import calls
 from idlc.check.package.cmake_lists import dependency_edit
 from idlc.check.package.facts import folders
@@ -14,7 +14,8 @@ from idlc.model import catalog, derive, ir, names
 from idlc.model.link import Model
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused
-from idlc.scaffold.changes import Result, Settings, find_package, rendering, templates
+from idlc.project.settings import load_settings
+from idlc.scaffold.changes import Result, Settings, find_package
 from idlc.scaffold.edits import setup_py
 from idlc.scaffold.package import rendered_for
 
@@ -133,7 +134,7 @@ def interface(
     own = project.package
     path = f"{kind}/{name}.{kind}"
     text = interface_text(kind, fields, comment)
-    used = templates(settings, report)
+    load_settings(settings.root, report)  # reports what is wrong with them
     source = Source(project.shown(path), text)
     named = [(ir.TypeName(own, kind, name), source)]
     model = compile_package(own, named, project.library(), report)
@@ -142,8 +143,8 @@ def interface(
     added = {path: text}
     has_settings = "[tool.idlc]" in (project.text("pyproject.toml") or "")
     if has_settings and not project.has(TEST):
-        with rendering(name, report):
-            added[TEST] = rendered_for(own, "package/test_interfaces.py.jinja", used)
+        with stage("scaffold", name):
+            added[TEST] = rendered_for(own, "package/test_interfaces.py.jinja")
     needed, tests = implied_packages(model), ["python3-pytest"] if TEST in added else []
     manifest = project.text(MANIFEST) or ""
     declared = package_xml.add_dependencies(manifest, depends=needed, tests=tests, group=True)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-from idlc.check.compiler import compile_package
+from idlc.check.compiler import compile_package, stage
 from idlc.check.package.facts import folders
 from idlc.diagnostics.report import Report
 from idlc.model import ir
@@ -19,13 +19,13 @@ from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.project.prefixes import distribution, python_folders
 from idlc.project.settings import load_settings
 from idlc.project.settings import scope as settings_scope
+from idlc.project.templates import code
 from idlc.scaffold import changes, spec
 from idlc.scaffold.changes import FileOutcome, Project, Result, Settings
 from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
 from idlc.scaffold.spec import Plan, plan
-from idlc.scaffold.templates import Templates
 
 if TYPE_CHECKING:
     from idlc.scaffold.translator import Request, Translated
@@ -60,7 +60,6 @@ def paths(package: str, launch_files: Iterable[str]) -> list[str]:
 def node_entry(
     planned: Plan,
     texts: Mapping[str, str],
-    templates: Templates,
     *,
     launch: bool = True,
     keys: Iterable[str] = (),
@@ -90,12 +89,12 @@ def node_entry(
     # files that nodes need beside them
     added = {} if f"{node.package}/__init__.py" in texts else {f"{node.package}/__init__.py": ""}
     if CONFTEST not in texts:
-        added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja", templates)
+        added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja")
     if not launch:
         return Entry(added, edits)
     file = next((name for name in texts if name.startswith("launch/")), "")
     template = "package/launch.py.jinja"
-    old = texts[file] if file else rendered_for(node.package, template, templates)
+    old = texts[file] if file else rendered_for(node.package, template)
     started = launch_py.add_node(old, launch_py.Started(node.package, node.name, node.lifecycle))
     path = file or f"launch/{node.package}_launch.py"
     if isinstance(started, Refused):
@@ -121,32 +120,38 @@ def node(
     if project is None:
         return None
     own, name = project.package, requested.name
-    used = changes.templates(settings, report)
     translated = translator and _translated(translator, name, project, settings, report)
     if translated is not None:
         requested = requested._replace(endpoints=translated.endpoints)
+    load_settings(settings.root, report)  # reports what is wrong with them
     planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
         return None
     if translated is not None:
         planned = planned.translating(translated.translations)
     entry = Entry({}, {})
-    with changes.rendering(name, report):
+    with stage("scaffold", name):
         files = {
-            f"{own}/{name}.py": render(planned, used),
-            f"test/test_{name}.py": render_test(planned, used),
+            f"{own}/{name}.py": render(planned),
+            f"test/test_{name}.py": render_test(planned),
         }
         if translated is not None:
-            conversion = used.render("node/conversion.py.jinja", conversion=translated.conversion)
+            conversion = (
+                code()
+                .get_template("node/conversion.py.jinja")
+                .render(conversion=translated.conversion)
+            )
             files[f"{own}/{name}_conversion.py"] = conversion
-            files[f"{own}/{translated.home}"] = used.render("node/versions.py.jinja")
+            files[f"{own}/{translated.home}"] = (
+                code().get_template("node/versions.py.jinja").render()
+            )
             files |= {f"{own}/{path}": text for path, text in translated.files.items()}
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)
         wanted = paths(own, project.names("launch"))
         texts = {path: content for path in wanted if (content := project.text(path)) is not None}
         keys, present = project.keys(), folders(project.path)
-        entry = node_entry(planned, texts, used, launch=settings.launch, keys=keys, folders=present)
+        entry = node_entry(planned, texts, launch=settings.launch, keys=keys, folders=present)
         entry = entry._replace(added={**files, **entry.added})
     edited = project.accepted(entry.edits)
     result = None if edited is None else project.write(entry.added, edited)

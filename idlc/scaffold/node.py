@@ -8,11 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from idlc.model import derive, ir
-from idlc.project.templates import Code
+from idlc.project.templates import Code, code
 from idlc.scaffold import roles, samples, spec
 from idlc.scaffold.samples import Page
 from idlc.scaffold.spec import Placed, Plan
-from idlc.scaffold.templates import Templates
 
 #: Names that a module of a node uses itself, whatever its roles.
 _TAKEN = (
@@ -121,7 +120,7 @@ class NodeView(NamedTuple):
     once: bool
 
 
-def render(planned: Plan, templates: Templates) -> str:
+def render(planned: Plan) -> str:
     """Return the text of a node's module."""
     node = planned.node
     page = Page(planned.messages, clock=CLOCK, taken=_TAKEN, own=node.package)
@@ -148,7 +147,7 @@ def render(planned: Plan, templates: Templates) -> str:
         lifecycle=node.lifecycle,
         once=planned.once,
     )
-    return templates.render("node/module.py.jinja", node=view)
+    return code().get_template("node/module.py.jinja").render(node=view)
 
 
 def _part(placed: Placed, page: Page, spelled_out: Iterable[str] = ()) -> Part:
@@ -293,7 +292,7 @@ class TestView(NamedTuple):
     ends: bool
 
 
-def render_test(planned: Plan, templates: Templates) -> str:
+def render_test(planned: Plan) -> str:
     """Return the text of a node's test."""
     node = planned.node
     parts, imports = _tested(planned)
@@ -310,7 +309,7 @@ def render_test(planned: Plan, templates: Templates) -> str:
         once=planned.once,
         ends=planned.once and len(planned.asking) == 1,
     )
-    return templates.render("node/test.py.jinja", test=view)
+    return code().get_template("node/test.py.jinja").render(test=view)
 
 
 def _resolved(endpoint: roles.Endpoint, node: str) -> str:

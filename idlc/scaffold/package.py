@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 from xml.sax.saxutils import escape, quoteattr
 
+from idlc.check.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
@@ -15,9 +16,8 @@ from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
-from idlc.project.templates import Code, Text
-from idlc.scaffold.changes import Project, Result, Settings, rendering, templates
-from idlc.scaffold.templates import Templates
+from idlc.project.templates import Code, Text, code
+from idlc.scaffold.changes import Project, Result, Settings
 
 VERSION = "0.1.0"
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
@@ -95,13 +95,13 @@ def check_package_name(name: str) -> str:
     return name
 
 
-def package_files(package: Package, templates: Templates) -> dict[str, str]:
+def package_files(package: Package) -> dict[str, str]:
     """Return the texts of a new package's files by their paths in its folder."""
     listed = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
     files = {}
     for path in listed:
         template = _TEMPLATES.get((package.build_type, path), path.rpartition("/")[2].lstrip("."))
-        text = rendered(f"package/{template}.jinja", package, templates)
+        text = rendered(f"package/{template}.jinja", package)
         files[path.replace("NAME", package.name)] = text
     text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
     files["LICENSE"] = text.replace("(c) HOLDER", f"(c) {package.maintainer}")
@@ -111,7 +111,7 @@ def package_files(package: Package, templates: Templates) -> dict[str, str]:
     return files
 
 
-def rendered(template: str, package: Package, templates: Templates) -> str:
+def rendered(template: str, package: Package) -> str:
     """Return the text of one of a package's files."""
     view = PackageView(
         name=Code(package.name),
@@ -127,12 +127,12 @@ def rendered(template: str, package: Package, templates: Templates) -> str:
         py_email=Code(repr(package.email)),
         depends=tuple(map(Code, package.depends)),
     )
-    return templates.render(template, package=view)
+    return code().get_template(template).render(package=view)
 
 
-def rendered_for(name: str, template: str, templates: Templates) -> str:
+def rendered_for(name: str, template: str) -> str:
     """Return the text of a file of which only the package's name matters."""
-    return rendered(template, Package(name, "", "", "", LICENSES[0]), templates)
+    return rendered(template, Package(name, "", "", "", LICENSES[0]))
 
 
 #: The choices that package.xml and setup.py repeat.
@@ -156,14 +156,10 @@ def package(
     """
     name = requested.name if folder in ("", ".") else f"{folder}/{requested.name}"
     project = Project(name, settings, report)
-    used = templates(settings, report)
-    if report.had_errors:
-        return None
-    files: dict[str, str] = {}
-    with rendering(requested.name, report):
+    with stage("scaffold", requested.name):
         available = catalog.packages(scope(load_settings(settings.root, report)).distro)
         depends = tuple(name for name in requested.depends if name in available)  # Humble lacks one
-        files = package_files(requested._replace(depends=depends), used)
+        files = package_files(requested._replace(depends=depends))
     if not any(project.names(kind) for kind in ir.KINDS):
         files |= starters or {}
     elif "starters" in chosen:

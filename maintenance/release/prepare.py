@@ -21,7 +21,6 @@ PASTED = {
         "pip install '.[ros]'": "pip install 'idlc[ros]'",
     },
     "docs/ci.md": {**_GITHUB, **_GITLAB, **_PRE_COMMIT},
-    "docs/contributing/templates.md": {**_GITHUB, **_GITLAB, **_PRE_COMMIT},
     "templates/ci/github.yml.jinja": _GITHUB,
     "templates/ci/gitlab.yml.jinja": _GITLAB,
     "templates/ci/pre_commit.yaml.jinja": _PRE_COMMIT,

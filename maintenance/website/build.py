@@ -1,4 +1,4 @@
-"""Documents, rules, pictures and an example of `idlc docs` → the site."""
+"""Documents, rules, templates, pictures and an example of `idlc docs` → the site."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from maintenance.website import colours, dialect, interfaces, landing, playground, rules, sources
+from maintenance.website import (
+    colours,
+    dialect,
+    interfaces,
+    landing,
+    playground,
+    rules,
+    sources,
+    templates,
+)
 
 HERE = Path(__file__).parent
 #: The head of a page that the search leaves out.
@@ -27,7 +36,8 @@ def build(out: Path) -> None:
         files = {**sources.files(), **rules.pages()}
         for place in sources.unsearched(files):
             files[place] = NOT_SEARCHED + files[place]
-        _write(work / "docs", {**files, landing.PLACE: landing.page()})
+        added = {landing.PLACE: landing.page(), templates.PLACE: NOT_SEARCHED + templates.page()}
+        _write(work / "docs", {**files, **added})
         shutil.copytree(HERE / "assets", work / "docs" / "assets")
         shutil.copytree(HERE / "theme", work / "theme")
         interfaces.write(work / "docs")
@@ -59,12 +69,13 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _navigation(files: Mapping[str, bytes]) -> str:
-    """Return the navigation as a value in TOML: the sections of docs/index.md, and the example."""
+    """Return the navigation as a value in TOML: the sections of docs/index.md, and more."""
     sections = [("Home", landing.PLACE), ("All pages", sources.place(sources.START))]
     sections += sources.navigation(files)
     look_up = dict(sections)["Reference"]
     look_up.append(("Playground", playground.PLACE))
     look_up.append(("The interfaces of ROS 2", f"{interfaces.PLACE}/index.md"))
+    dict(sections)["Contributing"].append(("Templates", templates.PLACE))
     return _list(sections)
 
 

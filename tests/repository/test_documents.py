@@ -1,8 +1,7 @@
 """The reference documents say what is: commands, settings, the API of generated classes, links.
 
-`IDLC_REFRESH=docs/command-line pytest tests/repository/test_documents.py` rewrites that page,
-`IDLC_REFRESH=docs/templates` the generated part of docs/contributing/templates.md,
-and fails.
+`IDLC_REFRESH=docs/command-line pytest tests/repository/test_documents.py` rewrites that page, and
+fails.
 """
 
 import json
@@ -20,7 +19,7 @@ from idlc.diagnostics.codes import CODES
 from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Config
-from tests.support import command_line_page, programs, refresh, template_page
+from tests.support import command_line_page, programs, refresh
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 
@@ -36,18 +35,6 @@ def test_the_commands_are_as_their_help_says():
     current = command_line_page.written(text)
     if refresh.wanted("docs/command-line"):
         command_line_page.PAGE.write_text(current, encoding="utf-8")
-        refresh.refreshed()
-    assert current == text
-
-
-# templates
-
-
-def test_every_template_is_shown_with_what_it_writes(tmp_path, monkeypatch):
-    text = template_page.PAGE.read_text(encoding="utf-8")
-    current = template_page.written(text, tmp_path, monkeypatch)
-    if refresh.wanted("docs/templates"):
-        template_page.PAGE.write_text(current, encoding="utf-8")
         refresh.refreshed()
     assert current == text
 

@@ -16,6 +16,7 @@ import pytest
 from catkin_pkg.package import parse_package
 
 from idlc.cli.main import main
+from idlc.scaffold.roles import ROLES
 from tests.support import refresh
 from tests.support.paths import GOLDEN
 from tests.support.tools import tool
@@ -70,6 +71,11 @@ def test_golden_tree(case, tmp_path, monkeypatch):
     assert sorted(found) == sorted(expected)
     for path, text in expected.items():
         assert found[path] == text, path
+
+
+def test_each_role_has_a_golden_tree():
+    commands = "".join((case / "commands").read_text(encoding="utf-8") for case in CASES)
+    assert [role.name for role in ROLES if f"{role.option} " not in commands] == []
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -2,12 +2,10 @@
 
 import pytest
 
-from idlc.diagnostics.source import Source
 from idlc.project.edits import Edited, Refused
 from idlc.scaffold import new_node, spec
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.spec import Plan, plan
-from idlc.scaffold.templates import Templates
 
 SETUP = """\
 from setuptools import setup
@@ -28,7 +26,7 @@ def heart(*, lifecycle: bool = False) -> Plan:
 
 
 def entered(texts, **options) -> new_node.Entry:
-    return new_node.node_entry(heart(**options), texts, Templates())
+    return new_node.node_entry(heart(**options), texts)
 
 
 def test_a_package_gets_what_its_nodes_share_once():
@@ -74,11 +72,9 @@ def test_an_empty_launch_file_stays_as_the_user_left_it():
     assert "is not edited" in note
 
 
-def test_no_template_is_rendered_for_a_file_that_is_there():
-    broken = Source("conftest.py.jinja", "{{ package.nothing }}")
-    templates = Templates({"package/conftest.py.jinja": broken})
+def test_a_file_that_is_there_stays():
     texts = {**TEXTS, "test/conftest.py": "# mine\n"}
-    assert "test/conftest.py" not in new_node.node_entry(heart(), texts, templates).added
+    assert "test/conftest.py" not in entered(texts).added
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from urllib.parse import parse_qs, unquote
 import pytest
 
 from idlc.diagnostics.codes import CODES
-from maintenance.website import colours, sources
+from maintenance.website import colours, sources, templates
 from maintenance.website.build import build
 from maintenance.website.dialect import translated
 from tests.support.paths import DOCS, GOLDEN, ROOT
@@ -45,6 +45,12 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def pages(site):
     return {path: Page(path) for path in site.rglob("*.html") if path.name != "404.html"}
+
+
+def test_each_template_is_shown_with_what_it_writes(site):
+    page = (site / templates.PLACE).with_suffix(".html").read_text(encoding="utf-8")
+    shown = re.findall(r"(?s)<h3 id=[^>]*>([^<]*)<.*?<code", page)
+    assert shown == templates.names()
 
 
 def test_every_link_leads_somewhere(site, pages):

@@ -1,28 +1,41 @@
-"""The part of docs/contributing/templates.md that shows templates beside what they write."""
+"""The page of templates: each file in templates/, beside what commands write by it."""
 
 from __future__ import annotations
 
-import re
+import os
+import sys
+import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import jinja2
-import pytest
 from jinja2.runtime import Macro
 
 from idlc.cli.main import main
 from idlc.project.templates import code, environment, html
+from idlc.recordings.containers.mcap_writer import ChunkWriter, channel, schema
+from idlc.recordings.containers.records import CHANNEL_OP, SCHEMA_OP
 from idlc.scaffold.init import SERVICES
-from tests.support import recorded_text
-from tests.support.files import write
-from tests.support.paths import DOCS, ROOT
+from maintenance.website.sources import ROOT
 
-PAGE = DOCS / "contributing" / "templates.md"
+PLACE = "contributing/templates.md"
 TEMPLATES = ROOT / "templates"
-_PART = re.compile(r"(?<=<!-- templates -->\n).*?(?=<!-- end -->)", re.DOTALL)
+_HEAD = """\
+# Templates
 
-FILES = {
+This page shows every file in `templates/` with an output. Python computes and escapes the values;
+the template places them. The page [Style](style.md) lists what a template may contain. For a part
+of other templates, the page shows the first outputs of the part. `make site` writes this page.
+
+The outputs are for these interfaces:
+
+"""
+_LEVEL = "uint8 height\n"
+_FILES = {
     "demo/package.xml": '<package format="3">\n  <name>demo</name>\n'
     "  <depend>std_msgs</depend>\n</package>\n",
     "demo/msg/Drive.msg": "# How fast to drive.\nfloat64 speed 0.5  # forward [m/s]\n"
@@ -36,18 +49,18 @@ FILES = {
     "more/action/Turn.action": "float64 angle\n---\n---\nfloat64 left\n",
 }
 #: Lines of further outputs of one template that are shown.
-MOST_LINES = 120
-PERSON = ("--maintainer", "Ada", "--email", "ada@example.com")
+_MOST_LINES = 120
+_PERSON = ("--maintainer", "Ada", "--email", "ada@example.com")
 #: Commands and the folder that each runs in. A template shows what it wrote in the first of them.
-COMMANDS = [
+_COMMANDS = [
     (".", ("gen", "demo", "-o", "out/demo")),
     (".", ("gen", "more", "-o", "out/more", "--vendor-deps")),
     (".", ("gen", "demo", "-o", "light/demo", "--runtime", "installed")),
     (".", ("gen", "demo", "--ament", "prefix")),
     (".", ("gen", "bare", "--package", "bare", "--ament", "prefix")),
     (".", ("docs", "demo", "more", "-o", "site")),
-    (".", ("scaffold", "package", "robot", *PERSON)),
-    (".", ("scaffold", "package", "--interfaces", "robot_msgs", "Drive", *PERSON)),
+    (".", ("scaffold", "package", "robot", *_PERSON)),
+    (".", ("scaffold", "package", "--interfaces", "robot_msgs", "Drive", *_PERSON)),
     ("robot", ("scaffold", "interface", "msg", "Level", "uint8 level")),
     (
         "robot",
@@ -89,60 +102,78 @@ COMMANDS = [
 ]
 
 
-def written(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Return the page with its generated part made anew; commands run in an empty folder."""
-    outputs = _outputs(folder, monkeypatch)
-    sections = "\n".join(line for path in _names() for line in _section(path, outputs))
-    text, count = _PART.subn(lambda _: f"\n{sections}\n", text)
-    assert count == 1
-    return text
+def page() -> bytes:
+    """Return the page; the commands run in an empty folder."""
+    interfaces = "\n".join(
+        f"# {path}\n{text}" for path, text in _FILES.items() if not path.endswith(".xml")
+    )
+    outputs = _outputs()
+    sections = "\n".join(line for path in names() for line in _section(path, outputs))
+    return f"{_HEAD}```text\n{interfaces}```\n\n## The templates\n\n{sections}".encode()
 
 
-def _names() -> list[str]:
+def names() -> list[str]:
     """Return the names of all files of templates, in the order of the page."""
     paths = (path for path in TEMPLATES.rglob("*") if path.is_file())
     return sorted(path.relative_to(TEMPLATES).as_posix() for path in paths)
 
 
-def _outputs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[int, list[str]]]:
+def _outputs() -> dict[str, dict[int, list[str]]]:
     """Return the texts that each template wrote, by the number of the command."""
     outputs: dict[str, dict[int, list[str]]] = {}
     started: list[tuple[str, ...]] = []
+    with ExitStack() as undo:
+        folder = Path(undo.enter_context(tempfile.TemporaryDirectory())).resolve()
 
-    def note(name: str, text: str) -> None:
-        text = text.replace(str(folder), "/ws")
-        texts = outputs.setdefault(name, {}).setdefault(len(started) - 1, [])
-        if text.strip() and text not in texts:
-            texts.append(text)
+        def note(name: str, text: str) -> None:
+            text = text.replace(str(folder), "/ws")
+            texts = outputs.setdefault(name, {}).setdefault(len(started) - 1, [])
+            if text.strip() and text not in texts:
+                texts.append(text)
 
-    _record(note, monkeypatch)
-    # the page is one, whether ROS 2 with its comments is installed or not
-    monkeypatch.setattr("sys.prefix", str(folder / "nowhere"))
-    for path, text in FILES.items():
-        write(folder / path, text)
-    recorded_text.write(folder / "rec.mcap", "@ /level bare/msg/Level\nuint8 height\n")
-    for place, words in COMMANDS:
-        started.append(words)
-        monkeypatch.chdir(folder / place)
-        assert main(list(words)) == 0, words
+        _record(note, undo)
+        # the page is one, whether ROS 2 with its comments is installed or not
+        undo.enter_context(mock.patch.dict(os.environ, AMENT_PREFIX_PATH=""))
+        undo.enter_context(mock.patch.object(sys, "prefix", str(folder / "nowhere")))
+        undo.callback(os.chdir, Path.cwd())
+        for path, text in _FILES.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text, encoding="utf-8")
+        _write_recording(folder / "rec.mcap")
+        for place, words in _COMMANDS:
+            started.append(words)
+            os.chdir(folder / place)
+            with redirect_stdout(StringIO()):
+                failed = main(list(words))
+            if failed:
+                raise SystemExit(f"idlc {' '.join(words)} failed, see above")
     return outputs
 
 
-def _record(note: Callable[[str, str], None], monkeypatch: pytest.MonkeyPatch) -> None:
+def _write_recording(path: Path) -> None:
+    with path.open("wb") as file:
+        writer = ChunkWriter(file)
+        writer.append(SCHEMA_OP, schema(1, "bare/msg/Level", "ros2msg", _LEVEL))
+        writer.append(CHANNEL_OP, channel(1, 1, b"/level", b"cdr", {}))
+        writer.close()
+
+
+def _record(note: Callable[[str, str], None], undo: ExitStack) -> None:
     """Have templates, and the macros of templates, note what they write."""
     for each in (environment(), code(), html()):
         for name in each.list_templates(extensions=["jinja"]):
             template = each.get_template(name)
-            monkeypatch.setattr(template, "root_render_func", _noting(name, template, note))
-    invoke = Macro._invoke
+            noting = _noting(name, template, note)
+            undo.enter_context(mock.patch.object(template, "root_render_func", noting))
+    invoke = Macro._invoke  # noqa: SLF001 (what each call of a macro goes through)
 
-    def noting(self: Macro, arguments: list[Any], autoescape: bool) -> str:
+    def noting_macro(self: Macro, arguments: list[Any], autoescape: bool) -> str:
         text = invoke(self, arguments, autoescape)
         path = Path(self._func.__code__.co_filename)
         note(path.relative_to(TEMPLATES).as_posix(), str(text))
         return text
 
-    monkeypatch.setattr(Macro, "_invoke", noting)
+    undo.enter_context(mock.patch.object(Macro, "_invoke", noting_macro))
 
 
 def _noting(
@@ -164,19 +195,20 @@ def _section(name: str, outputs: dict[str, dict[int, list[str]]]) -> Iterator[st
     yield ""
     commands = {number: texts for number, texts in outputs.get(name, {}).items() if texts}
     if not name.endswith(".jinja") or commands == {} or commands[min(commands)] == [text]:
-        assert "{{" not in text, f"no command writes {name}"
+        if "{{" in text:
+            raise SystemExit(f"no command in {__name__} writes {name}")
         yield "It is written as it is:"
         yield ""
         yield from _block(_language(name), text)
         return
     number = min(commands)
     yield from _block("jinja", text)
-    yield f"`idlc {' '.join(COMMANDS[number][1])}` writes:"
+    yield f"`idlc {' '.join(_COMMANDS[number][1])}` writes:"
     yield ""
     lines = 0
     for output in commands[number]:
         lines += output.count("\n") + 1
-        if lines <= MOST_LINES or output is commands[number][0]:
+        if lines <= _MOST_LINES or output is commands[number][0]:
             yield from _block(_language(name.removesuffix(".jinja")), output)
 
 
