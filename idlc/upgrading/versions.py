@@ -8,7 +8,7 @@ from typing import Any
 from idlc.check.compiler import Compiler
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.model import ir
+from idlc.model import catalog, derive, ir
 from idlc.model.distros import NEWEST
 from idlc.model.from_description import model_of_description
 from idlc.project.library import Library, Texts
@@ -75,11 +75,20 @@ def _parts(structure: Structure) -> Iterator[Structure]:
             continue  # a class of rosidl, which has no description
 
 
+#: The packages of the types that services and actions imply.
+_IMPLIED = {
+    *("builtin_interfaces", "unique_identifier_msgs"),
+    *(package for packages in derive.IMPLICIT_PACKAGES.values() for package in packages),
+}
+
+
 class _Texts(Library):
-    """Nothing but texts."""
+    """Texts, and the standard types that services and actions imply."""
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface."""
+        if name not in self.texts and name.package in _IMPLIED:
+            return catalog.source(name, NEWEST)
         return self.texts.get(name)
 
 

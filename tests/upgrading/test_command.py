@@ -14,9 +14,11 @@ from mcap.writer import Writer
 import idlc
 from idlc.cli.main import main
 from idlc.runtime.typeinfo import type_hash
+from idlc.upgrading.library import UpgradeError
 from idlc.upgrading.recordings import definition_of
 from idlc.upgrading.versions import version_of
 from tests.support import programs
+from tests.support.files import write
 from tests.support.paths import ROOT
 
 OLD = {
@@ -422,3 +424,25 @@ def test_a_revision_is_a_version(old, tmp_path, monkeypatch, capsys):
     assert main(words) == 0, capsys.readouterr().err
     new = idlc.load(write_package(tmp_path / "new", WIDER))
     assert messages_of(tmp_path / "out" / "a.mcap", new.Drive)[2].gear == 3
+
+
+def test_sections_of_services_and_actions_are_converted(tmp_path):
+    texts = {
+        "srv/Ask.srv": (
+            "string name\n---\nint8 count\n",
+            "string name\nbool loud\n---\nint16 count\n",
+        ),
+        "action/Go.action": ("int8 goal\n---\n---\n", "int16 goal\nbool soon true\n---\n---\n"),
+    }
+    versions = []
+    for number in (0, 1):
+        for path, pair in texts.items():
+            write(tmp_path / f"{number}/kit_msgs/{path}", pair[number])
+        versions.append(idlc.load(tmp_path / f"{number}/kit_msgs"))
+    old, new = versions
+    request = idlc.upgrade(old.Ask.Request, new.Ask.Request)
+    assert request.message(old.Ask.Request(name="Ada")) == new.Ask.Request(name="Ada", loud=False)
+    goal = idlc.upgrade(old.Go.Goal, new.Go.Goal)
+    assert goal.message(old.Go.Goal(goal=3)) == new.Go.Goal(goal=3, soon=True)
+    with pytest.raises(UpgradeError, match=r"Ask_Response.* needs rules .*: count: "):
+        idlc.upgrade(new.Ask.Response, old.Ask.Response)
