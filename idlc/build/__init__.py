@@ -1,4 +1,4 @@
-"""The functions that setup.py and setuptools call, so that a build compiles interfaces.
+"""The functions that setuptools calls, so that a build compiles interfaces.
 
 setuptools imports this module in every build, so it imports little.
 """
@@ -25,16 +25,31 @@ def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  #
 
     def run_commands() -> None:
         del distribution.run_commands
-        name = str(distribution.get_name())  # setuptools 78 has its own str for pyproject.toml's
-        compiled = compile_interfaces(name, type(distribution))
-        distribution.__class__ = compiled.get("distclass", type(distribution))
-        if hasattr(distribution, "set_defaults"):  # from setuptools 61 on
-            distribution.set_defaults()
-        generated = getattr(distribution, "generated", ())
-        distribution.packages = sorted({*(distribution.packages or ()), *generated})
+        if "--dry-run" not in sys.argv:
+            _compile(distribution)
         distribution.run_commands()
 
     distribution.run_commands = run_commands
+
+
+def _compile(distribution: Any) -> None:
+    """Bring the classes up to date, and have the commands install what rosidl installs beside them.
+
+    These are the interfaces, their descriptions, libraries for C++ tools and the entries in ROS 2's
+    index. They replace what `data_files` lists for the same places. Works in the folder of the
+    setup.py that is run, and writes only classes there, and only where they changed. A rejected
+    interface ends the build with a report.
+    """
+    from idlc.build.setup_command import compiled_class
+
+    name = str(distribution.get_name())  # setuptools 78 has its own str for pyproject.toml's
+    working_folder, source = Path.cwd(), Path("setup.py").resolve().parent
+    os.chdir(source)
+    try:
+        with without_options():
+            distribution.__class__ = compiled_class(name, type(distribution))
+    finally:
+        os.chdir(working_folder)
 
 
 def compile_library_at_build(distribution: Any) -> None:
@@ -43,7 +58,7 @@ def compile_library_at_build(distribution: Any) -> None:
     setuptools calls this function, by its entry point, in every build of an environment with idlc.
     It has an effect if pyproject.toml names idlc in `requires` and has a table `[tool.idlc]`.
     """
-    if hasattr(distribution, "generated") or getattr(distribution, "idlc_interfaces", False):
+    if getattr(distribution, "idlc_interfaces", False):
         return  # setup.py compiles them
     try:
         text = Path("pyproject.toml").read_text(encoding="utf-8")
@@ -73,27 +88,3 @@ def compile_library_at_build(distribution: Any) -> None:
 
 _TABLE = re.compile(r"""\btool["']?\s*\.\s*["']?idlc\b|\bidlc["']?\s*[.=](?!=)""")
 _REQUIREMENT = re.compile(r"\s*idlc(?![\w.-])", re.IGNORECASE)
-
-
-def compile_interfaces(package: str, base: type | None = None) -> dict[str, type]:
-    """Bring the package's classes up to date, and install what rosidl installs beside them.
-
-    Returns further arguments for setup(), `setup(..., **compiled)`: with them it installs the
-    interfaces, their descriptions, libraries for C++ tools and the entries in ROS 2's index. These
-    replace what `data_files` lists for the same places. `base` is the class of distributions to
-    extend, setuptools' own by default.
-
-    Works in the folder of the setup.py that is run, and writes only classes there, and only where
-    they changed. A rejected interface ends the build with a report.
-    """
-    if "--dry-run" in sys.argv:
-        return {}  # colcon asks setup.py for the package's name whatever it is to do, to test too
-    from idlc.build.setup_command import compiled_class
-
-    working_folder, source = Path.cwd(), Path("setup.py").resolve().parent
-    os.chdir(source)
-    try:
-        with without_options():
-            return {"distclass": compiled_class(package, base)}
-    finally:
-        os.chdir(working_folder)

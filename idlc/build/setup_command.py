@@ -9,7 +9,6 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from importlib import import_module
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
@@ -30,11 +29,6 @@ from idlc.project.settings import load_settings, scope
 
 #: The commands of setup.py that pip runs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
-_BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
-_NOT_INSTALLED = """\
-{package}: `packages` in the call of setup() omits {absent}, so the build would not install the \
-interface classes; write `packages=find_packages(exclude=['test'])`, or run \
-`idlc check --fix`"""
 _COMMAND = re.compile(r"\s*([\w.-]+)\s*=")
 _LAUNCHER = """\
 #!/bin/sh
@@ -45,17 +39,17 @@ exec "$(dirname "$0")/../../bin/{name}" "$@"
 _DataFile: TypeAlias = str | tuple[str, Iterable[str]]
 
 
-def compiled_class(package: str, base: type | None) -> type:
-    """Compile the package in the working folder; return a class for setup(distclass=...).
+def compiled_class(package: str, base: Any) -> type:
+    """Compile the package in the working folder; return the class of its distribution.
 
-    `base` is the class of distributions to extend, setuptools' own by default.
+    `base` is the class of distributions to extend.
     """
     report = Report()
     settings = load_settings(Root.here(), report)
     where = scope(settings, package)
     inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
     if not inputs:
-        return distribution_class(package, {}, base=base)
+        return distribution_class(package, base, {})
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
     runtime, vendoring = settings.runtime, settings.vendoring
     gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
@@ -72,31 +66,28 @@ def compiled_class(package: str, base: type | None) -> type:
     modules = (PurePosixPath(package, path) for path in (lock.outputs if lock else ()))
     folders = {module.parent for module in modules if module.suffix == ".py"}
     generated = tuple(sorted(".".join(folder.parts) for folder in folders))
-    return distribution_class(package, files, generated, libraries.build_tag, base)
+    return distribution_class(package, base, files, generated, libraries.build_tag)
 
 
 def distribution_class(
     package: str,
+    base: Any,
     files: Mapping[str, bytes],
     packages: Iterable[str] = (),
     build_tag: str = "",
-    base: type | None = None,
 ) -> type:
-    """Return a class for setup(distclass=...) that installs files, by their paths in a prefix.
+    """Return a class of distributions that installs files, by their paths in a prefix.
 
     They replace what `data_files` lists for the same paths. A package with interfaces whose files
-    have no entries in ROS 2's index gets none from `data_files` either. The build stops unless
-    setup() was given all Python `packages` that were generated. `build_tag` is for the names of
-    wheels.
+    have no entries in ROS 2's index gets none from `data_files` either. The Python `packages` that
+    were generated are installed, whether setup() lists them or not. `build_tag` is for the names
+    of wheels.
     """
-    extended: Any = base or import_module("setuptools").Distribution
     index = {f"{prefixes.INDEX}/{kind}/{package}" for kind in ("packages", "rosidl_interfaces")}
 
     def run_commands(self: Any) -> None:
         getattr(self, "set_defaults", lambda: None)()  # looks for packages that nothing names
-        absent = sorted({*packages}.difference(self.packages or ()))
-        if absent and _BUILDS & {*self.commands}:
-            raise SystemExit(_NOT_INSTALLED.format(package=package, absent=", ".join(absent)))
+        self.packages = sorted({*(self.packages or ()), *packages})
         place = Path(self.get_option_dict("build").get("build_base", ("", "build"))[1], "idlc")
         self.sources = list(self.data_files or ())
         listed, added = _merged(self.sources, files, index if files else set())
@@ -117,19 +108,19 @@ def distribution_class(
             raise SystemExit(f"{package}: cannot write to `{place}`: {reason(error)}") from None
         self.data_files = installed + listed
         self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
-        extended.run_commands(self)
+        base.run_commands(self)
 
     def run_command(self: Any, command: str) -> None:
         installed = self.data_files
         if command == "egg_info" and self.sources is not None:  # lists what is in an sdist
             self.data_files = self.sources
-        extended.run_command(self, command)
+        base.run_command(self, command)
         self.data_files = installed
 
     # editable installations leave data files out, because they ask for them by this other name
-    added = {"has_data": extended.has_data_files, "sources": None, "generated": tuple(packages)}
+    added = {"has_data": base.has_data_files, "sources": None}
     methods = {"run_commands": run_commands, "run_command": run_command}
-    return type("Distribution", (extended,), {**methods, **added})
+    return type("Distribution", (base,), {**methods, **added})
 
 
 def _merged(

@@ -20,7 +20,7 @@ from idlc.check.compiler import models_of, stage
 from idlc.check.package.facts import folders
 from idlc.check.package.installation import check_setup
 from idlc.check.package.python_packages import layout
-from idlc.check.package.setup_edits import COMPILE, KEYWORD, append_element
+from idlc.check.package.setup_edits import KEYWORD, append_element
 from idlc.check.package.setup_py import BOM, Setup
 from idlc.check.run import check_all, checkers
 from idlc.check.select import selection
@@ -360,7 +360,7 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
     setup = Setup(Source(SETUP, text))
     outcome: Outcome = Edited(text)
     passed = {keyword.arg for call in setup.calls for keyword in call.keywords}
-    if not {KEYWORD} & {*setup.arguments, *passed} and not [*setup.calls_of(COMPILE)]:
+    if not {KEYWORD} & {*setup.arguments, *passed}:
         outcome = Refused("there are no calls of setup()", whole.rstrip(), "to its end")
         if setup.calls:
             why = f"there are {len(setup.calls)} calls of setup()"

@@ -13,9 +13,10 @@ from email.parser import Parser
 
 import pytest
 from packaging.utils import parse_wheel_filename
+from setuptools import Distribution
 
 from idlc import backend
-from idlc.build import compile_interfaces
+from idlc.build import compile_at_build
 from idlc.cli.main import main
 from idlc.generate.native.layouts import LAYOUTS
 from idlc.project import prefixes
@@ -539,8 +540,16 @@ def test_a_package_may_refer_to_others_and_leave_files_out(source, tmp_path):
     assert not any(name.startswith("base_msgs/") for name in files)
 
 
+def compiled(_):
+    """Build as setup.py of demo_msgs in the working folder does."""
+    distribution = Distribution({"name": "demo_msgs"})
+    distribution.commands = []
+    compile_at_build(distribution, "idlc_interfaces", True)
+    distribution.run_commands()
+
+
 @pytest.mark.parametrize("package", ["far_msgs", "near_msgs"])
-@pytest.mark.parametrize("build", [built, lambda _: compile_interfaces("demo_msgs")])
+@pytest.mark.parametrize("build", [built, compiled])
 def test_a_build_says_where_to_name_folders_of_packages(
     build, package, source, tmp_path, capfd, monkeypatch
 ):

@@ -8,8 +8,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from setuptools import Distribution
 
-from idlc.build import compile_interfaces
+from idlc.build import compile_at_build
 from idlc.cli.main import main
 from idlc.runtime import PROTOCOL
 from idlc.version import RUNTIME, __version__
@@ -290,7 +291,10 @@ def test_setup_py_compiles_in_the_mode_of_the_package(place, tmp_path, monkeypat
     else:
         write(folder, {"pyproject.toml": '[tool.idlc]\nruntime = "installed"\n'})
     monkeypatch.setattr(sys, "argv", ["setup.py", "--version"])
-    assert compile_interfaces("demo")
+    distribution = Distribution({"name": "demo", "packages": ["demo"]})
+    distribution.commands = []
+    compile_at_build(distribution, "idlc_interfaces", True)
+    distribution.run_commands()
     assert (folder / "demo/_idlc.py").is_file()
     assert not (folder / "demo/_idlc").exists()
 
@@ -304,11 +308,10 @@ MANIFEST = """\
 """
 SETUP = """\
 from glob import glob
-from idlc.build import compile_interfaces
 from setuptools import find_packages, setup
 
 setup(
-    **compile_interfaces('demo'),
+    idlc_interfaces=True,
     name='demo',
     packages=find_packages(exclude=['test']),
     data_files=[

@@ -227,65 +227,6 @@ def test_what_is_built_has_its_messages(name, way, package, capsys, tmp_path):
     assert "msg/Wind.msg" in index.read_text()
 
 
-@pytest.mark.long
-def test_a_build_stops_before_it_installs_no_classes(package, tmp_path):
-    compiling = PLAIN.replace("setup(\n", "setup(\n    **compile_interfaces('demo'),\n")
-    compiling = compiling.replace("[package_name],", "sum([[package_name]], []),")
-    compiling = f"from idlc.build import compile_interfaces\n{compiling}"
-    folder = package(compiling).parent
-    status, printed = built(folder, tmp_path / "installed")
-    assert status != 0
-    assert "`packages` in the call of setup() omits demo._idlc, " in printed
-    assert "demo.msg" in printed
-
-
-#: What `idlc scaffold package` wrote before.
-SCAFFOLDED_BEFORE = """\
-from glob import glob
-import sys
-
-from setuptools import find_packages, setup
-
-package_name = 'demo'
-index = ['resource/' + package_name]  # ROS 2 finds the package by it
-interfaces = glob('resource/rosidl_interfaces/*')
-
-try:
-    from idlc.build import compile_interfaces
-except ImportError:
-    compiled = {}  # what was compiled last is installed, without libraries for C++ tools
-    if glob('msg/*.msg') or glob('srv/*.srv') or glob('action/*.action'):
-        index = interfaces = []  # `ros2 bag record` would stop at it
-        print(package_name + ' is not registered with ROS 2: idlc is missing', file=sys.stderr)
-else:
-    compiled = compile_interfaces(package_name)
-
-setup(
-    **compiled,
-    name=package_name,
-    version='0.1.0',
-    packages=find_packages(exclude=['test']),
-    package_data={'': ['idlc.lock', 'py.typed']},
-    data_files=[
-        ('share/ament_index/resource_index/packages', index),
-        ('share/ament_index/resource_index/rosidl_interfaces', interfaces),
-        ('share/' + package_name, ['package.xml']),
-        ('share/' + package_name + '/launch', glob('launch/*launch.*')),
-        ('share/' + package_name + '/msg', glob('msg/*.msg')),
-        ('share/' + package_name + '/srv', glob('srv/*.srv')),
-        ('share/' + package_name + '/action', glob('action/*.action')),
-    ],
-)
-"""
-
-
-def test_what_was_scaffolded_before_is_complete(package, capsys):
-    path = package(SCAFFOLDED_BEFORE)
-    idlc(capsys, "check", "--fix")
-    assert idlc(capsys, "check").startswith("no problems")
-    assert path.read_text() == SCAFFOLDED_BEFORE
-
-
 HEAD = "from setuptools import setup\n"
 #: What would never end, or grow without bounds, if each name were followed as often as it is used.
 HOSTILE = {

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import TypeAlias
 
-from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of, span_of, start_of
+from idlc.check.package.setup_py import Setup, parse, range_of, span_of, start_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit
 from idlc.diagnostics.source import Source, Span
@@ -245,9 +245,8 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
     return spread if items and spread not in refused else None
 
 
-#: The argument of setup() for which idlc compiles interfaces, and the function that did so before.
+#: The argument of setup() for which idlc compiles interfaces.
 KEYWORD = "idlc_interfaces"
-COMPILE = "compile_interfaces"
 
 
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
@@ -256,13 +255,7 @@ def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
     if not index:
         return
     asked = setup.arguments.get(KEYWORD)
-    # a statement that only calls the function drops its result
-    dropped = {id(node.value) for node in setup.nodes if isinstance(node, ast.Expr)}
-    calls = (node for node in setup.nodes if name_of_call(node) == COMPILE)
-    if asked is None:
-        installs = any(id(call) not in dropped for call in calls)
-    else:
-        installs = not isinstance(asked, ast.Constant) or bool(asked.value)
+    installs = bool(asked.value) if isinstance(asked, ast.Constant) else asked is not None
     if not installs:
         edits = () if asked else argument(setup, f"{KEYWORD}=True")
         yield codes.NO_LIBRARY_INSTALLED.at(

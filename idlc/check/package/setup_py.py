@@ -138,7 +138,7 @@ class Setup:
         for keyword in self.call.keywords if self.call else ():
             if keyword.arg:
                 self.arguments[keyword.arg] = keyword.value
-            elif not self._is_compiled(keyword.value):
+            else:
                 items = self.pairs(keyword.value)
                 self.whole &= items is not None
                 self.arguments |= items or {}
@@ -150,11 +150,6 @@ class Setup:
         for node in self.nodes:
             if isinstance(node, ast.Call) and name_of_call(node) in names:
                 yield node
-
-    def _is_compiled(self, node: ast.expr) -> bool:
-        """Return whether arguments come from `compile_interfaces`, directly or by a variable."""
-        values = self._bound.get(node.id, []) if isinstance(node, ast.Name) else [node]
-        return any(name_of_call(value) == "compile_interfaces" for value in values)
 
     @cached_property
     def _parents(self) -> dict[int, ast.AST]:
