@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -15,10 +15,7 @@ from idlc.cli import completion
 from idlc.cli.scaffold import common, finish
 from idlc.model import ir
 from idlc.scaffold import spec
-from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, Endpoint, Role, qos_preset
-
-if TYPE_CHECKING:
-    from idlc.scaffold.translator import Request
+from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, Endpoint, Role
 
 DONE = "done"
 PARAMETER = "parameter"
@@ -96,7 +93,6 @@ Example, within a package:
 \b
   idlc scaffold node talker --publisher std_msgs/String:chatter@2 --qos latched
   idlc scaffold node listener --subscriber std_msgs/String:chatter --param verbose:bool=true
-  idlc scaffold node drive_translator --translate git:v1.0 . --topic Drive:drive:drive_v2
 """
 
 
@@ -111,7 +107,7 @@ class NodeCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Assign each quality of service to its endpoint, then parse as usual."""
         if not ctx.resilient_parsing:
-            names = {"topics", *(role.name for role in ROLES if role.kind)}
+            names = {role.name for role in ROLES if role.kind}
             counts: Counter[str] = Counter()
             last: tuple[str, int] | None = None
             owners = ctx.meta[_OWNERS] = []
@@ -129,22 +125,6 @@ class NodeCommand(click.Command):
 
 #: The key of the endpoints with a --qos in the context: for each, its role and its index.
 _OWNERS = "idlc.qos"
-
-
-def _translator(name: str, others: list[str], arguments: Mapping[str, Any]) -> Request:
-    """Return the translation that is asked for; raise ValueError if it is incomplete."""
-    from idlc.scaffold.translator import Request, topic
-
-    if arguments["versions"] is None or not arguments["topics"]:
-        raise ValueError("use --translate OLD NEW together with --topic TYPE:NAME:NEW_NAME")
-    if others:
-        raise ValueError("a translator has no other endpoints; create another node for them")
-    presets = _presets(arguments)
-    topics = tuple(
-        topic(text, name, qos_preset(presets.get(("topics", n), DEFAULT_QOS.name)))
-        for n, text in enumerate(arguments["topics"])
-    )
-    return Request(arguments["versions"], topics, arguments["rules"])
 
 
 def _presets(arguments: Mapping[str, Any]) -> dict[tuple[str, int], str]:
@@ -168,31 +148,6 @@ def _role_options(function: Any) -> Any:
 @click.command("node", cls=NodeCommand, epilog=EPILOG)
 @click.argument("name", metavar="NAME")
 @_role_options
-@click.option(
-    "--translate",
-    "versions",
-    metavar="OLD NEW",
-    nargs=2,
-    help="Translate from one version of interfaces to another. OLD and NEW are package folders or "
-    "distributions (distro:NAME). If either is a package folder, the other can be a git revision "
-    "of this folder (git:REF).",
-)
-@click.option(
-    "--topic",
-    "topics",
-    metavar="TYPE:NAME:NEW_NAME",
-    multiple=True,
-    help="With --translate: a topic or service. NAME is its name for the old version, and NEW_NAME "
-    "its name for the new version.",
-)
-@click.option(
-    "--rules",
-    metavar="PATH",
-    multiple=True,
-    type=click.Path(),
-    help="With --translate: copy the rules from this file or folder into the node. `idlc upgrade "
-    "--write-rules` writes rules.",
-)
 @click.option(
     "--param", "parameters", metavar="NAME:TYPE=DEFAULT", multiple=True, help="Declare a parameter."
 )
@@ -221,13 +176,9 @@ def command(name: str, **arguments: Any) -> int:
     shared = ("dry_run", "force", "include", "launch")
     settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle")
-    translator = None
     try:
         spec.check_name(name)
-        if any(arguments[option] for option in ("versions", "topics", "rules")):
-            translator = _translator(name, [*filter(arguments.get, described)], arguments)
-            requested = spec.Node(name, "")
-        elif not any(arguments[option] for option in described) and interactive():
+        if not any(arguments[option] for option in described) and interactive():
             requested = ask(name, lambda role, type_: changes.check(role, type_, settings))
         else:
             presets = _presets(arguments)
@@ -242,7 +193,7 @@ def command(name: str, **arguments: Any) -> int:
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
-    result = new_node.node(requested, settings, report, translator)
+    result = new_node.node(requested, settings, report)
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
     python = Path(sys.executable).name
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)

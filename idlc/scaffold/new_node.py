@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from idlc.check.compiler import compile_package, stage
 from idlc.check.package.facts import folders
@@ -18,17 +18,12 @@ from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.project.prefixes import distribution, python_folders
 from idlc.project.settings import load_settings
-from idlc.project.settings import scope as settings_scope
-from idlc.project.templates import code
 from idlc.scaffold import changes, spec
-from idlc.scaffold.changes import FileOutcome, Project, Result, Settings
+from idlc.scaffold.changes import Project, Result, Settings
 from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
 from idlc.scaffold.spec import Plan, plan
-
-if TYPE_CHECKING:
-    from idlc.scaffold.translator import Request, Translated
 
 MANIFEST = "package.xml"
 SETUP = "setup.py"
@@ -109,43 +104,22 @@ def node_entry(
     return Entry({**added, path: started.text}, edits)
 
 
-def node(
-    requested: spec.Node,
-    settings: Settings,
-    report: Report,
-    translator: Request | None = None,
-) -> Result | None:
+def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
     project = changes.find_package(settings, report)
     if project is None:
         return None
     own, name = project.package, requested.name
-    translated = translator and _translated(translator, name, project, settings, report)
-    if translated is not None:
-        requested = requested._replace(endpoints=translated.endpoints)
     load_settings(settings.root, report)  # reports what is wrong with them
     planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
         return None
-    if translated is not None:
-        planned = planned.translating(translated.translations)
     entry = Entry({}, {})
     with stage("scaffold", name):
         files = {
             f"{own}/{name}.py": render(planned),
             f"test/test_{name}.py": render_test(planned),
         }
-        if translated is not None:
-            conversion = (
-                code()
-                .get_template("node/conversion.py.jinja")
-                .render(conversion=translated.conversion)
-            )
-            files[f"{own}/{name}_conversion.py"] = conversion
-            files[f"{own}/{translated.home}"] = (
-                code().get_template("node/versions.py.jinja").render()
-            )
-            files |= {f"{own}/{path}": text for path, text in translated.files.items()}
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)
         wanted = paths(own, project.names("launch"))
@@ -158,12 +132,6 @@ def node(
     if result is None:
         return None
     notes = [f"`{project.shown(path)}` {text}" for path, text in entry.notes]
-    if translated is not None:
-        result = result._replace(done=_summarized(result.done, f"{own}/{translated.types}"))
-        module = project.shown(f"{own}/{name}_conversion.py")
-        notes += [f"`{each}` in `{module}` raises: complete it" for each in translated.open]
-        if "find_packages" not in texts.get(SETUP, "find_packages"):
-            notes.append(f"`{project.shown(SETUP)}` lists packages: use `find_packages()`")
     absent = [package for package in planned.packages if not python_folders(package)]
     if absent and python_folders("rclpy"):
         listed = ", ".join(f"`{package}`" for package in absent)
@@ -174,24 +142,6 @@ def node(
     missing = not project.has(f"{own}/_type_data.py")
     after = project.generation() if missing and compiled else ()
     return result._replace(notes=tuple(notes), following=after)
-
-
-def _translated(
-    request: Request, node: str, project: Project, settings: Settings, report: Report
-) -> Translated | None:
-    from idlc.scaffold.translator import translate
-
-    scope = settings_scope(load_settings(settings.root, report), include=settings.include)
-    return translate(node, project.package, request, scope, report)
-
-
-def _summarized(done: Iterable[FileOutcome], folder: str) -> tuple[FileOutcome, ...]:
-    """Return outcomes with those of the files in a folder as the folder's."""
-    summary = (
-        FileOutcome(folder, each.what) if each.path.startswith(f"{folder}/") else each
-        for each in done
-    )
-    return tuple(dict.fromkeys(summary))
 
 
 def _planned(requested: spec.Node, project: Project, report: Report) -> Plan | None:

@@ -67,7 +67,6 @@ class Part(NamedTuple):
     patience: Code
     sample: Mapping[str, samples.Sample]
     log: Mapping[str, Code]
-    translation: spec.Translation | None = None
 
 
 class ParameterView(NamedTuple):
@@ -152,7 +151,7 @@ def render(planned: Plan) -> str:
 
 def _part(placed: Placed, page: Page, spelled_out: Iterable[str] = ()) -> Part:
     """Return an endpoint as its node or its test sees it, with values for some sections."""
-    endpoint, word, interface, translation = placed
+    endpoint, word, interface = placed
     messages = derive.sections(interface) if interface else ()
     sections = dict(zip(_VARIABLES[endpoint.role.kind], messages, strict=True))
     sample = {name: samples.sample(sections[name], page) for name in spelled_out}
@@ -171,7 +170,6 @@ def _part(placed: Placed, page: Page, spelled_out: Iterable[str] = ()) -> Part:
         patience=Code(repr(round(PATIENCE + 3 * (endpoint.period or 0.0), 1))),
         sample=sample,
         log={name: samples.logged(section, name) for name, section in sections.items()},
-        translation=translation,
     )
 
 
@@ -198,7 +196,7 @@ def _parameter(parameter: spec.Parameter) -> ParameterView:
 def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
     """Yield the requests that a node sends."""
     alone = len(planned.asking) == 1
-    for endpoint, word, interface, _ in planned.asking:
+    for endpoint, word, interface in planned.asking:
         request = endpoint.role.request
         assert request is not None
         assert interface is not None

@@ -12,11 +12,10 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
-from idlc.project.templates import Code
 from idlc.scaffold.roles import DEFAULT_QOS, ROLES, Endpoint, Role, qos_preset
 
 #: Names that a module of a node cannot have in its package.
-TAKEN = frozenset({"msg", "srv", "action", "versions"})
+TAKEN = frozenset({"msg", "srv", "action"})
 _NODE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*")
 
@@ -115,27 +114,12 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
     return value
 
 
-class Translation(NamedTuple):
-    """The names of a translated topic or service in the module of a node.
-
-    `convert` is the function from old to new messages or requests, `back` that from new responses
-    to old ones, empty for a topic. `new_name` is a literal.
-    """
-
-    old: Code
-    new: Code
-    convert: Code
-    back: Code
-    new_name: Code
-
-
 class Placed(NamedTuple):
     """An endpoint with its interface, if its role has one, and a word for its names."""
 
     endpoint: Endpoint
     word: str
     interface: ir.Interface | None
-    translation: Translation | None = None
 
 
 class Plan(NamedTuple):
@@ -144,11 +128,6 @@ class Plan(NamedTuple):
     node: Node
     endpoints: tuple[Placed, ...]
     messages: Mapping[ir.TypeName, ir.Message]
-
-    def translating(self, translations: Iterable[Translation]) -> Plan:
-        """Return the plan with a translation for each endpoint."""
-        pairs = zip(self.endpoints, translations, strict=True)
-        return self._replace(endpoints=tuple(p._replace(translation=names) for p, names in pairs))
 
     @property
     def asking(self) -> tuple[Placed, ...]:

@@ -72,7 +72,7 @@ def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) 
             files[name] = _file(part)
     if report.had_errors:
         return []
-    others = {file.path: file.text for part in pairs.values() for file in type_files(part)}
+    others = {file.path: file.text for part in pairs.values() for file in _type_files(part)}
     if files:
         others |= {"__init__.py": '"""Rules that upgrade recordings."""\n'}
     every = {path: text.encode() for path, text in {**files, **others}.items()}
@@ -178,27 +178,25 @@ def _annotation(plan: Plan, type_: ir.FieldType) -> tuple[str, tuple[str, ...]]:
     return f"{'Iterable' if is_number else 'list'}[{name}]", lines
 
 
-def type_files(plan: Plan) -> Iterator[RenderedFile]:
+def _type_files(plan: Plan) -> Iterator[RenderedFile]:
     """Yield the classes of the versions that the rules of a plan name, as packages."""
     yield RenderedFile(f"{TYPES}/__init__.py", '"""The classes of recorded versions."""\n')
     yield RenderedFile(
         f"{TYPES}/_idlc.py", code().get_template("upgrade/runtime.py.jinja").render()
     )
     for version in {version.key: version for version in (plan.old, plan.new)}.values():
-        yield from home_files(version.key.short.lower(), _needed(version))
+        yield from _home_files(version.key.short.lower(), _needed(version))
 
 
-def home_files(
-    name: str, models: Iterable[Model], *, codecs: bool = False
-) -> Iterator[RenderedFile]:
-    """Yield the packages of a version in a folder of this name, perhaps with codecs."""
+def _home_files(name: str, models: Iterable[Model]) -> Iterator[RenderedFile]:
+    """Yield the packages of a version in a folder of this name, without codecs."""
     home = f"{TYPES}/{name}"
     title = '"""A version of a type, and all that it refers to."""\n'
     yield RenderedFile(f"{home}/__init__.py", title)
     for model in models:
         yield RenderedFile(f"{home}/{model.package}/__init__.py", "")
         for file in interface_files(model, _AROUND):
-            if codecs or "__codec" not in file.path:
+            if "__codec" not in file.path:
                 yield RenderedFile(f"{home}/{model.package}/{file.path}", file.text)
 
 

@@ -40,7 +40,6 @@ _FILES = {
     "  <depend>std_msgs</depend>\n</package>\n",
     "demo/msg/Drive.msg": "# How fast to drive.\nfloat64 speed 0.5  # forward [m/s]\n"
     "string[] names\nuint8 FAST=1\n",
-    "old/demo/msg/Drive.msg": "float32 speed\n",
     "bare/msg/Level.msg": "uint8 level\n",
     "more/package.xml": '<package format="3">\n  <name>more</name>\n'
     "  <depend>std_msgs</depend>\n</package>\n",
@@ -91,13 +90,6 @@ _COMMANDS = [
         ),
     ),
     (".", ("upgrade", "rec.mcap", "--to", "bare", "--write-rules", "bare/upgrade")),
-    (
-        "robot",
-        (
-            *("scaffold", "node", "bridge", "--translate", "../old/demo", "../demo"),
-            *("--topic", "demo/Drive:drive:drive_v2"),
-        ),
-    ),
     *[("robot", ("init", "--ci", service, "--yes")) for service in SERVICES],
 ]
 

@@ -15,8 +15,7 @@ import pytest
 import idlc
 from idlc.cli.main import main
 from idlc.robot.offer import OFFERED
-from tests.robot.nodes import LONG, node_at, spin_until
-from tests.support.files import write
+from tests.robot.nodes import LONG, node_at
 from tests.support.paths import EXAMPLE, GOLDEN, ROOT
 from tests.support.waiting import wait_for
 
@@ -252,7 +251,6 @@ def test_scaffolded_nodes_use_only_offered_names():
 SCAFFOLDED = """
 idlc scaffold node listener --subscriber Command:command --qos latched
 idlc scaffold node writer --publisher std_msgs/String:words@20
-idlc scaffold node translator --translate ../old/my_msgs ../new/my_msgs --topic my_msgs/Drive:a:b
 idlc gen
 """
 
@@ -261,8 +259,6 @@ idlc gen
 def package(tmp_path_factory):
     """A package with a node of each kind, except lifecycle nodes."""
     folder = tmp_path_factory.mktemp("scaffolded")
-    write(folder / "old/my_msgs/msg/Drive.msg", "float64 speed\n")
-    write(folder / "new/my_msgs/msg/Drive.msg", "float64 speed\nstring note 'new'\n")
     commands = (GOLDEN / "scaffold/nodes/commands").read_text(encoding="utf-8") + SCAFFOLDED
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -320,17 +316,3 @@ def test_scaffolded_services_and_actions(start, package):
     ship.process.send_signal(signal.SIGTERM)
     assert ship.ends() == 130, ship.output
     station.until("dock: cancelled")
-
-
-@pytest.mark.long
-def test_scaffolded_translators(start, package, router):
-    translator = start("demo/translator.py", cwd=package)
-    folders = (package.parent / version / "my_msgs" for version in ("old", "new"))
-    old, new = (idlc.load(folder)["my_msgs/msg/Drive"] for folder in folders)
-    with node_at(router, "observer") as node:
-        received = []
-        node.create_subscription(new, "b", received.append, 10)
-        publisher = node.create_publisher(old, "a", 10)
-        spin_until(publisher.get_subscription_count, node)
-        spin_until(lambda: publisher.publish(old(speed=1.5)) or received, node)
-        assert received[0] == new(speed=1.5, note="new"), translator.output

@@ -23,8 +23,8 @@ from tests.support.tools import tool
 
 FOLDER = GOLDEN / "scaffold"
 CASES = sorted(path.parent for path in FOLDER.glob("*/commands"))
-#: Caches, and the classes that come with a translator, which golden/gen shows.
-_UNREAD = {"__pycache__", ".mypy_cache", ".ruff_cache", "types"}
+#: Caches.
+_UNREAD = {"__pycache__", ".mypy_cache", ".ruff_cache"}
 
 
 def tree(folder: Path) -> dict[str, str]:
@@ -164,9 +164,6 @@ def test_files_keep_their_mode(package):
     assert (package / "setup.py").stat().st_mode & 0o777 == 0o755
 
 
-TRANSLATE = ["--translate", "distro:humble", "distro:jazzy", "--topic"]
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -194,19 +191,6 @@ TRANSLATE = ["--translate", "distro:humble", "distro:jazzy", "--topic"]
         (["node", "a", "--publisher", "String:a"], "or `std_msgs/String`?"),
         (["node", "a", "--publisher", "std_srvs/SetBool:a"], "service: use --service or --client"),
         (["node", "a", "--client", "std_msgs/String:a"], "message: use --publisher or --subscri"),
-        (["node", "a", "--translate", ".", "."], "together with"),
-        (["node", "a", "--topic", "std_msgs/Bool:a:b"], "together with"),
-        (
-            ["node", "a", *TRANSLATE, "std_msgs/Bool:a"],
-            "misread each other's messages",
-        ),
-        (["node", "a", *TRANSLATE, "std_msgs/Bool:a:/a"], "such as `std_msgs/Bool:a:a_v2`"),
-        (["node", "a", *TRANSLATE, "std_msgs/Bool"], "is not TYPE:NAME:NEW_NAME"),
-        (["node", "a", *TRANSLATE, "std_msgs/Bool:a:b"], "is equal in both versions"),
-        (["node", "a", *TRANSLATE, "std_srvs/SetBool:a:b"], "is equal in both versions"),
-        (["node", "a", *TRANSLATE, "std_msgs/Bol:a:b"], "no such message or service in `distro:hu"),
-        (["node", "a", *TRANSLATE, "std_msgs/Bool:a:b", "--timer", "1"], "no other endpoints"),
-        (["node", "versions", "--timer", "1"], "has this name"),
         (["package", "Demo"], "is not a package name\n  = hint: use lower-case letters"),
         (["package", "test"], "is the name of a folder or module"),
         (["package", "launch"], "is the name of a folder or module"),

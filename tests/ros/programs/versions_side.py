@@ -8,7 +8,7 @@ import sys
 import time
 
 import rclpy
-from my_msgs.msg import Drive, Wheel
+from my_msgs.msg import Drive
 from my_msgs.srv import Ask
 
 #: Seconds for which it waits for a response.
@@ -19,7 +19,7 @@ received = []
 def receive(message):
     received.append(message)
     if len(received) == 1:
-        print("message:", message.to_dict(), flush=True)
+        print("message:", message.velocity, round(message.angle, 6), message.gear, flush=True)
 
 
 def answer(request, response):
@@ -36,7 +36,7 @@ if sys.argv[1] == "new":
     rclpy.spin(node)
 publisher = node.create_publisher(Drive, "drive", 10)
 client = node.create_client(Ask, "ask")
-message = Drive(speed=-3, raw=[1, 2], pair=[0.5, 2.5], wheels=[Wheel(radius=0.25, name="left")])
+message = Drive(speed=3, angle=180.0)
 response, count = None, 0
 while not count:
     client.wait_for_service()

@@ -1,1 +1,0 @@
-"""Nodes and interfaces of demo."""
