@@ -7,6 +7,7 @@ import pytest
 from idlc.cli.main import main
 from tests.end_to_end.test_change_a_message import TEXT, follow
 from tests.support.nodes import nodes
+from tests.support.waiting import read_line
 
 SPIN = "rclpy.spin(node)\n"
 SERVICES = [
@@ -41,11 +42,11 @@ def test_nodes_of_both_versions_understand_each_other(folder, ros_environment, p
         "FASTDDS_DEFAULT_PROFILES_FILE": "fast_dds.xml",
     }
     new = program("versions_side.py", "new", path=folder / "path/new")
-    assert new.stdout.readline() == "ready\n", new.communicate()
+    assert read_line(new.stdout) == "ready\n", new.communicate()
     with nodes(folder / "work", tmp_path, environment) as start:
         relay = start("relay")
         old = program("versions_side.py", "old", path=folder / "path/old")
-        out, complaints = old.communicate(timeout=60)
+        out, complaints = old.communicate()
         assert old.returncode == 0, (complaints, relay.output)
         new.kill()  # rclpy can miss SIGTERM just before it waits
         received, _ = new.communicate()
