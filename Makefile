@@ -44,7 +44,7 @@ DEMO_OUT := build/demo
 VSCODE := build/vscode
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website -m 'not ros'
-BROWSER_TESTS := tests/documents/test_docs_browser.py tests/website/test_website_browser.py \
+BROWSER_TESTS := tests/tasks/test_docs_browser.py tests/website/test_website_browser.py \
     tests/website/test_playground_browser.py tests/website/test_accessibility.py
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)

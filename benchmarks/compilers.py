@@ -21,10 +21,10 @@ ROSIDL_FILES = 30
 
 def gen(package: Path, out: Path) -> None:
     from idlc.diagnostics.report import Report
-    from idlc.generate.gen import GenOptions
-    from idlc.generate.gen import gen as gen_gen
     from idlc.project.root import Root
     from idlc.project.settings import Scope
+    from idlc.tasks.gen import GenOptions
+    from idlc.tasks.gen import gen as gen_gen
 
     paths, include = (str(package),), (str(package.parent),)
     options = GenOptions(paths, Scope(Root.here(), package.name, include), str(out / package.name))

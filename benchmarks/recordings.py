@@ -119,7 +119,7 @@ def written_db3(path: Path, share: int) -> Path:
 
 
 def by_idlc(path: str, topic: str) -> int:
-    from idlc.recordings.recording import Recording
+    from idlc.api.recording import Recording
 
     with Recording(path) as recording:
         return recording[topic].to_arrow().num_rows

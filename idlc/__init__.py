@@ -6,9 +6,9 @@ from idlc.version import __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from idlc.api.recording import Recording
     from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
     from idlc.recordings.load import load
-    from idlc.recordings.recording import Recording
     from idlc.upgrading.library import upgrade
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
 #: What programs use, and the modules that are imported when they ask for it.
 _MODULES = {
     "Batch": "recordings.batches",
-    "Recording": "recordings.recording",
+    "Recording": "api.recording",
     "delimited": "recordings.batches",
     "load": "recordings.load",
     "split_delimited": "recordings.batches",

@@ -12,7 +12,6 @@ import msgspec
 from idlc.check.compiler import models_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared
 from idlc.project.files import is_folder, read_bytes
 from idlc.project.find import list_files, no_interfaces
@@ -21,6 +20,7 @@ from idlc.project.lock import load_lock
 from idlc.project.prefixes import INDEX, Distribution
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, Config, TableLocation, load_settings, scope
+from idlc.tasks.gen import GenOptions, gen
 
 
 class Options(NamedTuple):

@@ -17,7 +17,6 @@ from idlc.build.content import generate, refuse_beside, required_prefixes
 from idlc.build.hooks import require_runtime
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.generate.gen import GenOptions
 from idlc.generate.package import NUMPY
 from idlc.model.distros import DEFAULT
 from idlc.model.names import is_module_name
@@ -25,6 +24,7 @@ from idlc.project.find import list_files
 from idlc.project.lock import FILE
 from idlc.project.root import Root
 from idlc.project.settings import SETTINGS_FILE, TableLocation, load_settings, scope
+from idlc.tasks.gen import GenOptions
 
 #: Editable installations leave the project's folder on the path, where the classes are not.
 _FINDER = '''\

@@ -16,7 +16,6 @@ from idlc.check.compiler import models_of
 from idlc.check.package.facts import home_of
 from idlc.cli import output
 from idlc.diagnostics.report import Report
-from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import libraries_of, shared
 from idlc.project import prefixes
 from idlc.project.atomic import write_whole
@@ -26,6 +25,7 @@ from idlc.project.inputs import packages
 from idlc.project.lock import load_lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
+from idlc.tasks.gen import GenOptions, gen
 
 #: The commands of setup.py that pip runs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})

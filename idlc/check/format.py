@@ -9,7 +9,7 @@ from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.distros import NEWEST
 from idlc.model.ir import meaning
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 
 #: Prefixes of the codes of syntax errors, and of files that are too large.
 _UNREADABLE = ("IDL1", "IDL6")

@@ -11,10 +11,11 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, first_few
 from idlc.diagnostics.source import Span
 from idlc.language.escapes import plain_meaning
-from idlc.model import catalog, ir, lower_types
+from idlc.model import catalog, ir
 from idlc.model.comments import brackets
 from idlc.model.link import Model, own_fields, own_sections
-from idlc.model.lower_values import BACKSLASH_HINT, FLOAT32_MAX
+from idlc.model.lowering import lower_types
+from idlc.model.lowering.lower_values import BACKSLASH_HINT, FLOAT32_MAX
 
 
 def constants_and_defaults(model: Model) -> Iterator[Diagnostic]:

@@ -11,8 +11,7 @@ from itertools import islice
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, first_few
 from idlc.diagnostics.source import Span
-from idlc.generate.python import enums
-from idlc.model import derive, ir
+from idlc.model import derive, enums, ir
 from idlc.model.comments import brackets
 from idlc.model.link import Model, own_fields, own_sections
 

@@ -11,10 +11,10 @@ import click
 from idlc.cli import options
 
 if TYPE_CHECKING:
-    from idlc.compare.breaking import Verdict
-    from idlc.compare.recording import RecordedVerdict
-    from idlc.compare.running import GraphVerdict
     from idlc.diagnostics.report import Report
+    from idlc.tasks.breaking.files import Verdict
+    from idlc.tasks.breaking.graph import GraphVerdict
+    from idlc.tasks.breaking.recordings import RecordedVerdict
 GRAPH = "graph"
 PATIENCE = 5.0
 
@@ -32,10 +32,10 @@ def _summary(
     verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...], report: Report
 ) -> str:
     """Return the last line of the text: changes, consequence, omissions and the next version."""
-    from idlc.compare.breaking import Verdict
-    from idlc.compare.recording import RecordedVerdict
     from idlc.diagnostics.report import first_few
     from idlc.diagnostics.terminal import counted
+    from idlc.tasks.breaking.files import Verdict
+    from idlc.tasks.breaking.recordings import RecordedVerdict
 
     broken = {level: number for level, number in verdict.levels.items() if number}
     text = "no breaking changes"
@@ -146,11 +146,11 @@ def command(
     """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli import output
     from idlc.compare import packages
-    from idlc.compare.breaking import GIT, BreakingOptions, breaking
     from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
     from idlc.project.find import is_address
     from idlc.project.settings import scope, settings_here
+    from idlc.tasks.breaking.files import GIT, BreakingOptions, breaking
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)
@@ -182,12 +182,12 @@ def command(
             today=datetime.datetime.now().astimezone().date().isoformat(),
         )
         if recordings:
-            from idlc.compare.recording import compare_with_recordings
+            from idlc.tasks.breaking.recordings import compare_with_recordings
 
             verdict = compare_with_recordings(comparison, recordings, report)
             output.notes(report, sys.stderr)
         elif is_running:
-            from idlc.compare.running import compare_with_graph
+            from idlc.tasks.breaking.graph import compare_with_graph
 
             patience = timeout or PATIENCE
             verdict = compare_with_graph(comparison, patience, report, has_paths=bool(paths))

@@ -78,8 +78,8 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
-    from idlc.recordings.export import ColumnsOptions, columns
     from idlc.recordings.find import expand, split_recordings
+    from idlc.tasks.columns import ColumnsOptions, columns
 
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))

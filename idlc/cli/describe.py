@@ -26,7 +26,7 @@ def command(subject: str, scope: Scope, report: Report) -> None:
     """
     import json
 
-    from idlc.documents.show import describe
+    from idlc.tasks.show import describe
 
     content = describe(subject, scope, report)
     if content is not None:

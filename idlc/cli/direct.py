@@ -25,19 +25,19 @@ def check_paths(
 
     `select` and `ignore` are lists of rules with commas.
     """
-    from idlc.check.run import CheckOptions, CheckResult, check
     from idlc.check.select import selection
     from idlc.cli import output
     from idlc.diagnostics import terminal
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
     from idlc.project.settings import scope, settings_here
+    from idlc.tasks.check import CheckOptions, CheckResult, check
 
     settings, report = settings_here()
     chosen = selection(settings, report).with_lists(select, ignore)
     checked = CheckResult(())
     if prefix is not None:
-        from idlc.check.prefix import check_prefix
+        from idlc.tasks.check_prefix import check_prefix
 
         checked = check_prefix(prefix, settings.root, report)
     elif not report.had_errors:

@@ -25,7 +25,7 @@ def command(paths: tuple[str, ...], out: str, scope: Scope, report: Report) -> s
     `idlc gen`.
     """
     from idlc.diagnostics.terminal import counted
-    from idlc.documents.docs import docs
+    from idlc.tasks.docs.pages import docs
 
     pages = docs(paths or scope.paths or (".",), out, scope, report)
     return f"{counted(pages, 'page')} written; open {out}/index.html\n" if pages else ""

@@ -23,9 +23,9 @@ def command(style: str, scope: Scope, report: Report) -> None:  # noqa: ARG001 -
     Each line begins with `ok` or `warn`, and a hint follows each warning. Attach the
     output of `--format json` to bug reports.
     """
-    from idlc.check.doctor import examine
     from idlc.cli import output
     from idlc.diagnostics.text import one_line
+    from idlc.tasks.doctor import examine
 
     paint = output.painter(sys.stdout)
     for finding in examine(scope, output.program):

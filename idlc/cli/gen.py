@@ -15,10 +15,10 @@ from idlc.cli import completion, options
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import Paint
-    from idlc.generate.gen import GenOptions
     from idlc.generate.package import Generated
     from idlc.project.find import Stamp
     from idlc.project.root import Root
+    from idlc.tasks.gen import GenOptions
 
 #: The seconds between two looks at the files.
 INTERVAL = 0.25
@@ -29,7 +29,7 @@ def once(request: GenOptions, style: str) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import summary
-    from idlc.generate.gen import gen
+    from idlc.tasks.gen import gen
 
     report = Report()
     packages = gen(request, report)
@@ -81,10 +81,10 @@ def _set_up_below(root: Root) -> Iterator[str]:
     """Yield the folders of packages that `idlc gen` compiles without arguments."""
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.text import one_line
-    from idlc.generate.gen import GenOptions, in_package, with_settings
     from idlc.project.find import list_files
     from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
+    from idlc.tasks.gen import GenOptions, in_package, with_settings
 
     for folder in list_files((".",), root, Report()).packages:
         settings = load_settings(Root.at(folder), Report())
@@ -200,10 +200,10 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     share. To use these packages, run `source PREFIX/setup.bash`. No build is necessary.
     """
     from idlc.cli import output
-    from idlc.generate.gen import GenOptions, in_package, with_settings
     from idlc.project.find import is_path
     from idlc.project.settings import scope, settings_here
     from idlc.recordings.find import split_recordings
+    from idlc.tasks.gen import GenOptions, in_package, with_settings
 
     settings, report = settings_here()
     if report.had_errors:

@@ -32,7 +32,7 @@ def command(subjects: tuple[str, ...], scope: Scope, report: Report) -> None:
     TYPE is a name such as std_msgs/msg/Header. PATH is a file or folder, as in `idlc gen`.
     """
     from idlc.cli import output
-    from idlc.documents.show import hashes
+    from idlc.tasks.show import hashes
 
     paint = output.painter(sys.stdout)
     for value, name in hashes(subjects, scope, report):

@@ -88,10 +88,10 @@ class InterfaceItem(pytest.Item):
     def runtest(self) -> None:
         """Fail with the errors that idlc reports for the file."""
         from idlc.check import select
-        from idlc.check.run import CheckOptions, check
         from idlc.diagnostics.report import Severity
         from idlc.diagnostics.terminal import text
         from idlc.project.settings import scope, settings_here
+        from idlc.tasks.check import CheckOptions, check
 
         settings, report = settings_here()
         selection = select.selection(settings, report)

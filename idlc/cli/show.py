@@ -13,10 +13,10 @@ from idlc.cli import completion, options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
-    from idlc.documents.show import TopicFacts
     from idlc.project.settings import Scope
     from idlc.robot.live.overview import Connection
     from idlc.robot.qos import QoSProfile
+    from idlc.tasks.show import TopicFacts
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8
@@ -157,9 +157,9 @@ def command(
     services and actions, and the nodes that use them. It also reports incompatible endpoints.
     """
     from idlc.cli import output
-    from idlc.documents import show
     from idlc.project.find import is_address
     from idlc.recordings.find import is_recording
+    from idlc.tasks import show
 
     if not is_recording(subject, scope.root):
         if topics:

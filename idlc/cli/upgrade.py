@@ -12,8 +12,8 @@ from idlc.cli import options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Span
+    from idlc.tasks.upgrade.recordings import Result, TopicPlan, UpgradeOptions
     from idlc.upgrading.plan import Finding
-    from idlc.upgrading.recordings import Result, TopicPlan, UpgradeOptions
 
 
 def _place(span: Span | None) -> str:
@@ -150,7 +150,7 @@ def command(
     from idlc.cli import output
     from idlc.project.settings import scope, settings_here
     from idlc.recordings.find import expand
-    from idlc.upgrading.recordings import Result, UpgradeOptions, upgrade_recordings
+    from idlc.tasks.upgrade.recordings import Result, UpgradeOptions, upgrade_recordings
 
     settings, report = settings_here()
     if out is None and not arguments["dry_run"] and arguments["write_rules"] is None:

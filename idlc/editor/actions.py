@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from idlc.check.format import laid_out
 from idlc.check.package.manifest import dependency
-from idlc.check.run import keep_layout
 from idlc.check.select import REMARK
 from idlc.diagnostics.report import Edit, Report, Severity, apply, first_few
 from idlc.diagnostics.source import Span
@@ -20,10 +19,11 @@ from idlc.editor.protocol import INVALID_PARAMS, REQUEST_FAILED, RequestError
 from idlc.editor.rename import can_move_files, rename_interface
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import in_folder
+from idlc.tasks.check import keep_layout
 
 if TYPE_CHECKING:
-    from idlc.generate.gen import Run
     from idlc.project.inputs import Inputs
+    from idlc.tasks.gen import Run
 
 _FIX, _FIX_ALL = "quickfix", "source.fixAll.idlc"
 #: Hints that name the text to write instead.
@@ -207,7 +207,7 @@ def execute(state: ServerState, params: parts.Command) -> None:
 
 def _generation(state: ServerState, uri: str) -> tuple[Run | None, Inputs | None, str]:
     """Return the run that a document is an input of, its package, and its name in that."""
-    from idlc.generate.gen import run_for
+    from idlc.tasks.gen import run_for
 
     path = state.path(uri)
     workspace = state.workspace_of(path) if path else None

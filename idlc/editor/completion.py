@@ -26,7 +26,7 @@ from idlc.language import tree
 from idlc.language.definition import parse_definition
 from idlc.model import ir, names
 from idlc.model.comments import deprecation
-from idlc.model.lower_types import STRINGS
+from idlc.model.lowering.lower_types import STRINGS
 
 #: Numbers that people take for bounds.
 BOUNDS = ("1", "3", "6", "9", "16", "32", "36", "64", "128", "256", "1024")

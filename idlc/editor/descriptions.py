@@ -9,7 +9,6 @@ from idlc.compare.changes import levels_of
 from idlc.compare.packages import compare
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.terminal import counted
-from idlc.documents.show import outline
 from idlc.editor.documents import TOP, is_built_in
 from idlc.editor.elements import elements, section_names, spot_at, users
 from idlc.editor.parts import DocumentParams, Lens, Position, PositionParams, Range, RangeParams
@@ -18,6 +17,7 @@ from idlc.editor.workspace import Snapshot
 from idlc.model import derive, ir
 from idlc.model.comments import deprecation
 from idlc.model.ir import is_range, spell, spell_value
+from idlc.tasks.show import outline
 from idlc.wire.layout import Placed, layout
 
 #: Lines of a message that are shown.

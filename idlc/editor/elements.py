@@ -18,7 +18,7 @@ from idlc.language import tree
 from idlc.language.definition import parse_definition
 from idlc.language.parse import parse
 from idlc.model import derive, ir
-from idlc.model.lower import SECTIONS
+from idlc.model.lowering.lower import SECTIONS
 
 _ANNOTATION = "idlc.rename"
 

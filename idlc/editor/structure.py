@@ -16,7 +16,7 @@ from idlc.language import tree
 from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.ir import spell
-from idlc.model.lower_types import STRINGS
+from idlc.model.lowering.lower_types import STRINGS
 
 _NAMESPACE, _FIELD, _INTERFACE, _CONSTANT, _STRUCT = 3, 8, 11, 14, 23
 _KINDS = {"msg": _STRUCT, "srv": _INTERFACE, "action": _INTERFACE}

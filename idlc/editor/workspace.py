@@ -19,7 +19,6 @@ import msgspec
 
 from idlc.check import select
 from idlc.check.compiler import internal_error
-from idlc.check.run import check_all, checkers
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
 from idlc.model import ir
@@ -29,14 +28,15 @@ from idlc.project.find import RULES, DiskSnapshot, InterfaceFile, Listing, list_
 from idlc.project.inputs import Inputs, output_folders
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
+from idlc.tasks.check import check_all, checkers
 
 if TYPE_CHECKING:
-    from idlc.compare.breaking import Baseline, Side
     from idlc.diagnostics.report import Diagnostic
     from idlc.diagnostics.source import Source
     from idlc.model.link import Model
     from idlc.project.library import Library
     from idlc.project.package_xml import Facts
+    from idlc.tasks.breaking.files import Baseline, Side
 
 _BUG = "this is a bug in idlc, please report it"
 #: Files that a check of a package may read beside its interfaces.
@@ -285,7 +285,7 @@ class Workspace:
     def baseline(self) -> Baseline:
         """The version to compare with: that of the options, or the one of pyproject.toml."""
         if self._baseline is None:
-            from idlc.compare.breaking import Baseline
+            from idlc.tasks.breaking.files import Baseline
 
             against = self._options.against
             self._baseline = Baseline(self.folder, against, self._settings, self._scope)

@@ -26,7 +26,7 @@ from idlc.model.describe import (
 from idlc.model.distros import NEWEST
 from idlc.model.ir import spell
 from idlc.model.link import Model, circles, link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _PRIMITIVES = {

@@ -13,10 +13,11 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean, including, package_hint
 from idlc.language.parse import parse_any
-from idlc.model import catalog, derive, ir, lower_types, names
+from idlc.model import catalog, derive, ir, names
 from idlc.model.distros import Distro, titles
-from idlc.model.lower import lower
-from idlc.model.lower_types import STRINGS
+from idlc.model.lowering import lower_types
+from idlc.model.lowering.lower import lower
+from idlc.model.lowering.lower_types import STRINGS
 
 if TYPE_CHECKING:
     from idlc.model.describe import Describer

@@ -9,7 +9,7 @@ import msgspec
 
 from idlc.check.compiler import derived_names
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Label, Report, Severity, first_few
+from idlc.diagnostics.report import Diagnostic, Label, Report, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.generate.target import borrowed
@@ -22,22 +22,6 @@ from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_typ
 if TYPE_CHECKING:
     from idlc.model.link import Model
 from idlc.recordings.types import Version, contradictions, read_topics, topics_of, versions
-
-
-def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
-    """Report problems in the type definitions stored in recordings."""
-    local = LocalTypes(scope, report)
-    for path in paths:
-        recording = read_topics(path, scope.root, report, check=True)
-        groups = versions(recording.topics) if recording else []
-        for message, hint in recording.unread if recording else ():
-            problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
-            report.add(msgspec.structs.replace(problem, severity=Severity.WARNING))
-        check_versions(groups, report)
-        for version in groups:
-            types = recorded_types(version, local, report)
-            report.extend(contradicted(types))
-            report.extend(types.errors)
 
 
 def check_versions(groups: Sequence[Version], report: Report) -> None:

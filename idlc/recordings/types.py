@@ -19,7 +19,7 @@ from idlc.model import derive, ir
 from idlc.model.describe import Describer
 from idlc.model.ir import content
 from idlc.model.link import Model
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from idlc.project import inputs
 from idlc.project.find import is_address
 from idlc.project.library import Library, Texts

@@ -22,12 +22,10 @@ from idlc.check.package.installation import check_setup
 from idlc.check.package.python_packages import layout
 from idlc.check.package.setup_edits import KEYWORD, append_element
 from idlc.check.package.setup_py import BOM, Setup
-from idlc.check.run import check_all, checkers
 from idlc.check.select import selection
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source, Span
-from idlc.generate.gen import GenOptions, gen, in_package, with_settings
 from idlc.generate.package import NUMPY, Generated
 from idlc.generate.python.fields import number_info
 from idlc.model import derive, ir
@@ -45,6 +43,8 @@ from idlc.scaffold.changes import Project, Result, Settings, marked
 from idlc.scaffold.interface import implied_packages, starter
 from idlc.scaffold.layouts import SETUP, Layout, package_of
 from idlc.scaffold.package import LICENSES, Package, package_files
+from idlc.tasks.check import check_all, checkers
+from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
 
 #: The folder of generated classes in a library.
 _ROS = "ros"

@@ -19,13 +19,13 @@ from idlc.check.compiler import compile_package
 from idlc.compare.packages import compare
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.documents.show import shown
 from idlc.editor.server import Server
 from idlc.generate.python.render import module_views, template
 from idlc.model import derive, ir, python_names
 from idlc.model.link import Model
 from idlc.project.library import Library
 from idlc.project.root import Root
+from idlc.tasks.show import shown
 from maintenance.website import colours
 
 PACKAGE = "demo_msgs"

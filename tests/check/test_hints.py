@@ -11,7 +11,7 @@ from idlc.diagnostics.text import closest, package_hint
 from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 
 
 def errors(text, kind="msg"):

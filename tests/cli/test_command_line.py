@@ -442,7 +442,7 @@ def test_ctrl_c_ends_with_the_status_that_shells_expect(monkeypatch, capsys):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("idlc.check.run.list_files", interrupt)
+    monkeypatch.setattr("idlc.tasks.check.list_files", interrupt)
     assert main(["check", "."]) == 130
     assert capsys.readouterr().err.strip() == "interrupted"
 

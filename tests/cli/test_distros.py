@@ -23,7 +23,7 @@ from idlc.model import catalog, ir
 from idlc.model.distros import BY_NAME, DISTROS, NEWEST
 from idlc.model.ir import meaning
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from idlc.project import lock
 from idlc.project.library import Library
 from idlc.project.root import Root

@@ -8,7 +8,7 @@ from idlc.diagnostics.source import Source
 from idlc.editor import completion
 from idlc.language.parse import parse
 from idlc.model.ir import PRIMITIVES, TypeName
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.support.editor import at
 
 MANIFEST = """\

@@ -10,7 +10,7 @@ import yaml
 
 from idlc.editor.workspace import Settings
 from idlc.model.ir import PRIMITIVES
-from idlc.model.lower_types import STRINGS
+from idlc.model.lowering.lower_types import STRINGS
 from idlc.project.find import KINDS
 from idlc.version import __version__
 from tests.support.paths import DOCS, ROOT

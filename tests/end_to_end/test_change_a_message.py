@@ -9,7 +9,7 @@ from idlc.cli.main import main
 from tests.support.files import write
 from tests.support.paths import DOCS
 from tests.support.tools import tool
-from tests.upgrading.test_command import write_recording
+from tests.tasks.test_upgrade import write_recording
 
 TEXT = (DOCS / "change-a-message.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(text|sh)([^\n]*)\n(.*?)```", TEXT, re.DOTALL)

@@ -9,10 +9,10 @@ import pytest
 
 from idlc.diagnostics.report import Report
 from idlc.generate import target
-from idlc.generate.gen import GenOptions, gen
 from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.tasks.gen import GenOptions, gen
 
 PACKAGE = Path(target.__file__).parents[1]
 MAKERS = [path for path in target._MAKERS if path.is_dir()]

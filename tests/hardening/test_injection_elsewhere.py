@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from idlc.cli import gen
-from tests.documents.test_docs import Page
 from tests.hardening.test_injection import FILE_NAMES, PLACES, colourful
 from tests.support.hostile import PAYLOADS, assert_harmless, assert_untouched, on_a_terminal, run
 from tests.support.paths import ROOT
 from tests.support.rounds import FUZZING
+from tests.tasks.test_docs import Page
 
 __all__ = ["colourful"]  # a fixture
 SHELL = shutil.which("sh") or "sh"

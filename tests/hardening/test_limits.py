@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import idlc.model.link
-import idlc.model.lower
+import idlc.model.lowering.lower
 import idlc.project.inputs
 from idlc.cli.main import main
 from idlc.wire.layout import MAX_DEPTH
@@ -155,8 +155,8 @@ def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command
         read[os.path.relpath(path)] += 1
         return read_bytes_(path, *rest)
 
-    lower_, read_bytes_ = idlc.model.lower.lower, idlc.project.files.read_bytes
-    for module in ("idlc.model.lower.lower", "idlc.model.link.lower"):
+    lower_, read_bytes_ = idlc.model.lowering.lower.lower, idlc.project.files.read_bytes
+    for module in ("idlc.model.lowering.lower.lower", "idlc.model.link.lower"):
         monkeypatch.setattr(module, lower)
     monkeypatch.setattr("idlc.project.files.read_bytes", read_bytes)
     assert main([command[0], "ws", *command[1:]]) == 0

@@ -12,7 +12,7 @@ from idlc.language.format import format_file
 from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.ir import meaning
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.support import rosidl_view
 from tests.support.examples import example, given, settings, st
 from tests.support.inventions import Inventor

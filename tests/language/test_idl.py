@@ -12,7 +12,7 @@ from idlc.generate.idl import idl
 from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
 from idlc.model.distros import DISTROS
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.support import idl_view
 from tests.support.examples import given, st
 

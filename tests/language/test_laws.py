@@ -10,9 +10,9 @@ from idlc.diagnostics.source import Source
 from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
-from idlc.model.lower_types import Fault
-from idlc.model.lower_values import scalar
+from idlc.model.lowering.lower import lower
+from idlc.model.lowering.lower_types import Fault
+from idlc.model.lowering.lower_values import scalar
 from tests.support.examples import example, given, st
 
 WORDS = [

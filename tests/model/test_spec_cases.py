@@ -8,7 +8,7 @@ from idlc.diagnostics.report import Report, Severity
 from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.support import rosidl_view
 from tests.support.paths import SPEC
 

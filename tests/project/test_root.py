@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from idlc.check.run import CheckOptions, check
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
+from idlc.tasks.check import CheckOptions, check
 from tests.support.waiting import LIMIT, join
 
 COUNT = 20

@@ -9,12 +9,12 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.documents.schemas import mcap
 from idlc.generate.idl import file_text, idl
+from idlc.generate.schemas import mcap
 from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic

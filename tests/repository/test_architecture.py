@@ -49,7 +49,7 @@ READS_ITS_OWN = {"idlc.language.definition", "idlc.language.idl", "idlc.model.ca
 PRINTS = {
     "idlc.build.setup_command": "a build that pip runs has no other way to say why it stops",
     "idlc.build.hooks": "the same",
-    "idlc.recordings.export": "a table goes to standard output where `-o -` says so",
+    "idlc.tasks.columns": "a table goes to standard output where `-o -` says so",
     "idlc.robot.__main__": "it is a command line of its own",
     "idlc.robot.nodes.logger": "nodes log to standard error, as in ROS 2",
 }

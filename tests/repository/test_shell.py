@@ -24,7 +24,7 @@ HOSTILE = {
 #: Without tests/support/shell.py, each fails for one of these.
 TESTS = (
     "tests/cli/test_check.py::test_a_diff_shows_what_fix_would_write_and_writes_nothing",
-    "tests/compare/test_places.py::test_what_was_removed_is_shown_where_it_was",
+    "tests/tasks/test_places.py::test_what_was_removed_is_shown_where_it_was",
     "tests/robot/test_node_programs.py::test_two_programs_meet_at_a_router",
 )
 

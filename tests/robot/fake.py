@@ -6,7 +6,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from idlc.diagnostics.report import Report
-from idlc.documents.show import requested_models
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.load import load
@@ -14,6 +13,7 @@ from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import action_names
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import open_session
+from idlc.tasks.show import requested_models
 
 FILES = {
     "msg/Wheel.msg": "# one of them\nfloat64 speed 0.5  # [m/s]\nuint8[3] code\n",

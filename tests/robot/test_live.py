@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from idlc.api.recording import Recording
 from idlc.cli.main import main
-from idlc.recordings.recording import Recording
 from idlc.robot.keys import Kind
 from idlc.robot.live.recorder import Recorder
 from idlc.robot.qos import DurabilityPolicy, QoSProfile

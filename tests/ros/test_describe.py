@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
-from idlc.documents.show import describe
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.tasks.show import describe
 
 INSTALLED = [
     path

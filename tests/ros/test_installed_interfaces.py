@@ -14,7 +14,7 @@ from idlc.generate.idl import idl
 from idlc.language.format import format_file
 from idlc.language.parse import parse
 from idlc.model import ir
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.language.test_format import assert_only_the_layout_changes
 
 SHARE = Path(sys.prefix) / "share"

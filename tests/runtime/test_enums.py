@@ -16,7 +16,7 @@ import yaml
 
 from idlc.check import style
 from idlc.cli.main import main
-from idlc.generate.python import enums
+from idlc.model import enums
 from tests.support import generated
 from tests.support.files import write_all
 

@@ -7,7 +7,7 @@ from idlc.diagnostics.source import Source
 from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.support import reference_cdr
 
 TYPES = (

@@ -14,7 +14,7 @@ from idlc.language.parse import parse
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 from tests.support.paths import GOLDEN
 
 RECORDED = GOLDEN / "rosidl" / "interfaces"

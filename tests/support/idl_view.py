@@ -8,7 +8,7 @@ from idlc.language.escapes import through_idl
 from idlc.language.parse import parse_any
 from idlc.model import derive, ir
 from idlc.model.ir import meaning
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 
 
 def read(text, name, path=""):

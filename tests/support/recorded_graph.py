@@ -2,8 +2,8 @@
 
 from contextlib import contextmanager
 
-from idlc.compare.graph import Endpoint
-from idlc.compare.running import Answer
+from idlc.robot.live.graph import Endpoint
+from idlc.tasks.breaking.graph import Answer
 
 ROLES = {
     "publisher": ("topic", True),
@@ -67,9 +67,9 @@ def take_the_place(monkeypatch, graph):
         yield graph
 
     if graph is None:
-        monkeypatch.setattr("idlc.compare.running.import_module", _missing)
+        monkeypatch.setattr("idlc.tasks.breaking.graph.import_module", _missing)
     else:
-        monkeypatch.setattr("idlc.compare.running.join_graph", joined)
+        monkeypatch.setattr("idlc.tasks.breaking.graph.join_graph", joined)
 
 
 def _missing(name):

@@ -17,7 +17,7 @@ from idlc.diagnostics.report import Report
 from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 
 _NEXT = re.compile(r"^--- (MSG|IDL|SRV|ACTION) (\S+)$", re.MULTILINE)
 

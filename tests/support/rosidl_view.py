@@ -12,7 +12,7 @@ from idlc.language.parse import parse
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import BY_NAME
 from idlc.model.link import Model, link
-from idlc.model.lower import lower
+from idlc.model.lowering.lower import lower
 
 
 class Siblings:

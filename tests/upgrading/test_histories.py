@@ -15,8 +15,8 @@ from idlc.cli.main import main
 from idlc.model import catalog, ir
 from idlc.model.distros import BY_NAME
 from idlc.runtime.typeinfo import structure_of, type_hash
+from idlc.tasks.upgrade.recordings import definition_of
 from idlc.upgrading.plan import make_plan
-from idlc.upgrading.recordings import definition_of
 from idlc.upgrading.versions import version_of, version_of_texts
 
 NAMES = ("humble", "jazzy", "lyrical")

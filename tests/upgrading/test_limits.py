@@ -11,7 +11,7 @@ from idlc.model import ir
 from idlc.upgrading import versions
 from idlc.upgrading.plan import Plan, make_plan
 from idlc.upgrading.versions import version_of_texts
-from tests.upgrading.test_command import write_package
+from tests.tasks.test_upgrade import write_package
 
 DEPTH = 40
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import msgspec
 
-from idlc.generate.python import enums, fields, literals
+from idlc.generate.python import fields, literals
 from idlc.generate.python.fields import Docstring, FieldView, Naming
 from idlc.generate.python.imports import References
-from idlc.model import ir, python_names
+from idlc.model import enums, ir, python_names
 from idlc.project.templates import Code, Text
 
 

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.generate.python import enums
-from idlc.model import derive, ir, link, python_names
+from idlc.model import derive, enums, ir, link, python_names
 from idlc.project.templates import Code, Text
 from idlc.wire.layout import Messages
 

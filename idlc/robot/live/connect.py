@@ -11,12 +11,12 @@ from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple
 
-from idlc.compare.graph import Entity as Noun
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import did_you_mean, one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.live.graph import Entity as Noun
 from idlc.robot.names import action_part
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import Session, open_session

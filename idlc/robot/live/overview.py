@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator
 from itertools import islice, product
 from typing import NamedTuple
 
-from idlc.compare.graph import Entity as Noun
 from idlc.diagnostics.text import near_pairs
 from idlc.recordings.definitions import interface_of, type_name
 from idlc.recordings.types import LocalTypes
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.live.connect import place_of
+from idlc.robot.live.graph import Entity as Noun
 from idlc.robot.qos import QoSProfile, incompatible_policies
 
 #: What every node has; the table leaves these services out.

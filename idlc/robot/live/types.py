@@ -13,12 +13,11 @@ from itertools import chain, product
 from typing import Any, TypeAlias
 
 from idlc.check.compiler import Compiler
-from idlc.compare.graph import Answer, Question, answer_of
 from idlc.diagnostics.report import Report, first_few
-from idlc.documents.schemas import mcap
+from idlc.generate.schemas import mcap
 from idlc.model import ir
 from idlc.model.from_description import DescriptionError, model_of_description, model_of_sources
-from idlc.model.lower import SECTIONS
+from idlc.model.lowering.lower import SECTIONS
 from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -33,6 +32,7 @@ from idlc.recordings.definitions import (
 from idlc.recordings.memory import class_in, home_of
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.live.connect import call, connected, place_of, robot_entities
+from idlc.robot.live.graph import Answer, Question, answer_of
 from idlc.robot.session import Session
 
 #: Seconds that idlc waits for all replies of a robot.

@@ -16,8 +16,19 @@ from itertools import chain
 from typing import Any, NamedTuple, TypeAlias, get_args
 
 from idlc.check.compiler import Compiler, stage
-from idlc.compare.breaking import BreakingOptions, error_free_models, judge
-from idlc.compare.graph import (
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.model import ir
+from idlc.model.from_description import DescriptionError, reported_model
+from idlc.model.link import Model
+from idlc.project import inputs
+from idlc.project.find import is_address, list_files, no_interfaces
+from idlc.project.library import Library
+from idlc.project.settings import Scope
+from idlc.robot.keys import Entity as RobotEntity
+from idlc.robot.keys import Kind
+from idlc.robot.live.connect import TOPICS, connected, place_of, robot_entities
+from idlc.robot.live.graph import (
     Answer,
     Endpoint,
     Entity,
@@ -34,20 +45,9 @@ from idlc.compare.graph import (
     several_versions,
     version_changes,
 )
-from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
-from idlc.model import ir
-from idlc.model.from_description import DescriptionError, reported_model
-from idlc.model.link import Model
-from idlc.project import inputs
-from idlc.project.find import is_address, list_files, no_interfaces
-from idlc.project.library import Library
-from idlc.project.settings import Scope
-from idlc.robot.keys import Entity as RobotEntity
-from idlc.robot.keys import Kind
-from idlc.robot.live.connect import TOPICS, connected, place_of, robot_entities
 from idlc.robot.live.types import ask
 from idlc.robot.session import Session
+from idlc.tasks.breaking.files import BreakingOptions, error_free_models, judge
 from idlc.wire.layout import oversized
 
 #: A graph that never comes to rest is watched for this many times the patience.

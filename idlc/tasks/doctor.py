@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.check.prefix import check_prefix
-from idlc.check.run import CheckOptions, check
 from idlc.check.select import Selection
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
@@ -23,6 +21,8 @@ from idlc.project.lock import load_lock
 from idlc.project.package_xml import declared_version
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.tasks.check import CheckOptions, check
+from idlc.tasks.check_prefix import check_prefix
 from idlc.version import __version__
 
 #: Where ROS 2's installers put a distribution, each with a `setup.bash`.

@@ -20,9 +20,10 @@ from idlc.diagnostics.text import including
 from idlc.language.escapes import inside_literal
 from idlc.language.idl import IdlFile
 from idlc.language.tree import OPTIONAL, Fault, Piece, piece
-from idlc.model import ir, lower_types, lower_values, names
-from idlc.model.lower_types import STRINGS, as_parsed, positive
-from idlc.model.lower_values import MAX_ELEMENTS
+from idlc.model import ir, names
+from idlc.model.lowering import lower_types, lower_values
+from idlc.model.lowering.lower_types import STRINGS, as_parsed, positive
+from idlc.model.lowering.lower_values import MAX_ELEMENTS
 
 #: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
 _PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from idlc.check.compiler import Compiler, sources_of
-from idlc.compare.breaking import GIT
 from idlc.compare.distribution import PREFIX, is_distro
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
@@ -20,6 +19,7 @@ from idlc.project.find import InterfaceFile, find
 from idlc.project.git import checked_out
 from idlc.project.library import Library, Texts
 from idlc.project.settings import Scope
+from idlc.tasks.breaking.files import GIT
 from idlc.wire.layout import oversized
 
 

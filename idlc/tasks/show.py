@@ -240,8 +240,7 @@ def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
 
 def shown(interface: ir.Interface, model: Model, style: str) -> str:
     """Return an interface in a format."""
-    from idlc.documents import schemas
-    from idlc.generate import idl
+    from idlc.generate import idl, schemas
 
     match style:
         case "json":

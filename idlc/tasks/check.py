@@ -124,7 +124,7 @@ def _with_recordings(
     recordings: Sequence[str], others: Sequence[str], options: CheckOptions, report: Report
 ) -> CheckResult:
     """Report the problems of recordings, and of other paths if there are any."""
-    from idlc.recordings.packages import check_recordings
+    from idlc.tasks.check_recordings import check_recordings
 
     problems = Report()
     check_recordings(recordings, options.scope, problems)

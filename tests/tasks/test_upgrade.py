@@ -14,8 +14,8 @@ from mcap.writer import Writer
 import idlc
 from idlc.cli.main import main
 from idlc.runtime.typeinfo import type_hash
+from idlc.tasks.upgrade.recordings import definition_of
 from idlc.upgrading.library import UpgradeError
-from idlc.upgrading.recordings import definition_of
 from idlc.upgrading.versions import version_of
 from tests.support import programs
 from tests.support.files import write

@@ -14,8 +14,6 @@ from idlc.check.compiler import sound_models, stage
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import printable
-from idlc.documents.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
-from idlc.generate.gen import is_name, named_packages
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -27,6 +25,8 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.templates import RenderedFile, html, verbatim
 from idlc.project.write import apply, owned_files, plan
+from idlc.tasks.docs.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
+from idlc.tasks.gen import is_name, named_packages
 
 
 class About(NamedTuple):

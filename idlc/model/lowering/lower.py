@@ -14,11 +14,12 @@ from idlc.diagnostics.source import Span
 from idlc.language import tree
 from idlc.language.escapes import EscapeError, through_idl
 from idlc.language.tree import Fault
-from idlc.model import ir, lower_types
+from idlc.model import ir
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.distros import DEFAULT, Distro
-from idlc.model.lower_types import STRINGS, as_parsed, fault_at, lower_type
-from idlc.model.lower_values import default, scalar
+from idlc.model.lowering import lower_types
+from idlc.model.lowering.lower_types import STRINGS, as_parsed, fault_at, lower_type
+from idlc.model.lowering.lower_values import default, scalar
 
 if TYPE_CHECKING:
     from idlc.language import idl
@@ -267,7 +268,7 @@ def lower(
             for structure, own in zip(structures, lines, strict=False)
         ]
     else:
-        from idlc.model.lower_idl import lower_idl  # only recordings hold IDL
+        from idlc.model.lowering.lower_idl import lower_idl  # only recordings hold IDL
 
         parts = lower_idl(file, structures, report)
     parts = _without_moved_constants(parts, report)

@@ -13,11 +13,10 @@ from typing import Any, NamedTuple
 import msgspec
 
 from idlc.check.compiler import stage
-from idlc.compare.breaking import GIT
 from idlc.compare.distribution import PREFIX
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
-from idlc.documents.schemas import MCAP_LINE, mcap
+from idlc.generate.schemas import MCAP_LINE, mcap
 from idlc.model import ir
 from idlc.project.files import is_folder
 from idlc.project.find import RULES
@@ -35,11 +34,12 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
+from idlc.tasks.breaking.files import GIT
+from idlc.tasks.upgrade.targets import Target, compiled, target_of
 from idlc.upgrading.convert import Payloads, RunRules
 from idlc.upgrading.library import Runner, UpgradeError
 from idlc.upgrading.plan import Finding, Plan, Version, make_plan
 from idlc.upgrading.rules import Known, Rules, read_rules, rule_files
-from idlc.upgrading.targets import Target, compiled, target_of
 
 #: Called with a recording, and how much of it is done.
 Progress = Callable[[str, int, int], None]

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import msgspec
 
+from idlc.api.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model.ir import DUMMY_FIELD
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.recordings.preview import Preview
-from idlc.recordings.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.recordings.types import BORROWED, NAMED
 
 if TYPE_CHECKING:

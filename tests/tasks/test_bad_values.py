@@ -15,7 +15,7 @@ from tests.recordings.test_hostile_containers import mutated, sources
 from tests.support import db3_mutations, mcap_mutations
 from tests.support.paths import ROOT
 from tests.support.rounds import SEED, rounds
-from tests.upgrading.test_command import PAIR, key_of, write_package, write_recording
+from tests.tasks.test_upgrade import PAIR, key_of, write_package, write_recording
 
 OLD = {"Drive": "Wheel wheel\nWheel[] wheels\n", "Wheel": "int8 size\n"}
 NEW = {

@@ -6,7 +6,6 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from idlc.check.compiler import stage
-from idlc.compare.breaking import BreakingOptions, error_free_models, judge
 from idlc.compare.changes import Change
 from idlc.compare.packages import Comparison, compare
 from idlc.diagnostics import codes
@@ -16,6 +15,7 @@ from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import find
 from idlc.recordings.types import NAMED, LocalTypes, recorded_types, topics_of, versions
+from idlc.tasks.breaking.files import BreakingOptions, error_free_models, judge
 
 
 class RecordedVerdict(NamedTuple):

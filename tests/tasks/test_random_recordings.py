@@ -16,7 +16,7 @@ from rosbags.rosbag2 import Writer as BagWriter
 import idlc
 from idlc.cli.main import main
 from idlc.recordings.rewrite import Conversion
-from idlc.upgrading.recordings import definition_of
+from idlc.tasks.upgrade.recordings import definition_of
 from idlc.upgrading.versions import version_of
 from tests.recordings import test_rewrite
 from tests.support import recordings as made

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.check.compiler import models_of, stage
-from idlc.check.run import CheckResult
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.native import library as native
@@ -19,6 +18,7 @@ from idlc.project.files import is_file, read_bytes
 from idlc.project.find import list_files
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.tasks.check import CheckResult
 
 if TYPE_CHECKING:
     from idlc.model.link import Model

@@ -6,7 +6,7 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
-from idlc.generate.gen import run_for
+from idlc.tasks.gen import run_for
 from tests.support import recorded_text
 from tests.support.files import write
 from tests.support.generated import class_of, importable

@@ -1,0 +1,1 @@
+"""What programs get from `import idlc` to read recordings and convert messages."""

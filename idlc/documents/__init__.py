@@ -1,1 +1,0 @@
-"""Interfaces for readers: `idlc docs`, `show`, and schemas for other tools."""

@@ -1,0 +1,1 @@
+"""`idlc breaking`: against files, recordings and a running graph."""

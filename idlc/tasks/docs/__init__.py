@@ -1,0 +1,1 @@
+"""`idlc docs`: pages about packages."""

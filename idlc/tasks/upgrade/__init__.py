@@ -1,0 +1,1 @@
+"""`idlc upgrade`: recordings of earlier versions."""
