@@ -6,9 +6,9 @@ from idlc.version import __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from idlc.api.load import load
     from idlc.api.recording import Recording
     from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
-    from idlc.recordings.load import load
     from idlc.upgrading.library import upgrade
 
 __all__ = [
@@ -27,7 +27,7 @@ _MODULES = {
     "Batch": "recordings.batches",
     "Recording": "api.recording",
     "delimited": "recordings.batches",
-    "load": "recordings.load",
+    "load": "api.load",
     "split_delimited": "recordings.batches",
     "split_mcap_chunk": "recordings.batches",
     "upgrade": "upgrading.library",

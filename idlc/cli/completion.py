@@ -34,17 +34,17 @@ def types_and_paths(
 
 def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer the topics of the recordings that were typed."""
+    from idlc.api.sources import read_source
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.recordings.find import split_recordings
-    from idlc.recordings.types import read_topics
 
     typed: Any = context.params.get("paths") or (context.params.get("subject"),)
     # arguments before an option without its value are not parsed
     paths = [path for path in (*typed, *context.args) if path]
     root = Root.here()
     words = split_recordings(paths, root)[0]
-    recordings = filter(None, (read_topics(path, root, Report()) for path in words))
+    recordings = filter(None, (read_source(path, root, Report()) for path in words))
     names = {topic.topic.name for recording in recordings for topic in recording.topics}
     return sorted(name for name in names if name.startswith(word))
 

@@ -33,7 +33,15 @@ from idlc.recordings.memory import (
     keep_as_named,
 )
 from idlc.recordings.packages import check_versions
-from idlc.recordings.types import LocalTypes, RecordedTypes, recorded_types, topics_of, versions
+from idlc.recordings.types import (
+    LocalTypes,
+    Reader,
+    RecordedTypes,
+    read_topics,
+    recorded_types,
+    topics_of,
+    versions,
+)
 from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import Structure, Types, structure_of
 
@@ -94,27 +102,31 @@ def _raise_errors(report: Report) -> None:
         raise CompileError("\n" + "\n".join(terminal.text(report)))
 
 
-def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> LoadedPackages:
-    """Compile interfaces, and return their classes.
-
-    `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
-    package that is known here. `include` are folders in which other packages are looked for first.
-    The classes can be pickled, and read wherever idlc is installed; type checkers do not know them,
-    so programs are better off with `idlc gen`.
-    """
+def loaded(
+    what: str,
+    *,
+    include: Iterable[str] = (),
+    distro: str | None = None,
+    read: Reader = read_topics,
+) -> LoadedPackages:
+    """Return the classes of what `idlc.load` names; `read` reads recordings."""
     report = Report()
-    models, names = _models_of(str(what), tuple(include), distro, report)
+    models, names = _models_of(str(what), tuple(include), distro, report, read)
     _raise_errors(report)
     return LoadedPackages(models, names)
 
 
 def _models_of(
-    what: str, include: tuple[str, ...], distro: str | None, report: Report
+    what: str,
+    include: tuple[str, ...],
+    distro: str | None,
+    report: Report,
+    read: Reader = read_topics,
 ) -> tuple[Models, Iterable[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
     where = scope(Config(root=Root.here()), None, include, distro=distro)
     if is_recording(what, where.root):
-        groups = versions(topics_of([what], (), where.root, report) or ())
+        groups = versions(topics_of(read, [what], (), where.root, report) or ())
         check_versions(groups, report)
         if len(groups) != 1:
             return {}, ()

@@ -21,7 +21,7 @@ from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_typ
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
-from idlc.recordings.types import Version, contradictions, read_topics, topics_of, versions
+from idlc.recordings.types import Reader, Version, contradictions, topics_of, versions
 
 
 def check_versions(groups: Sequence[Version], report: Report) -> None:
@@ -49,12 +49,12 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
 
 
 def recorded_models(
-    paths: Sequence[str], scope: Scope, report: Report
+    read: Reader, paths: Sequence[str], scope: Scope, report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
     """Yield the models of recordings, without faulty interfaces, and the names of their types."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read_topics(path, scope.root, report)
+        recording = read(path, scope.root, report)
         for version in versions(recording.topics) if recording else ():
             types = recorded_types(version, local, report)
             for model in types.models.values():
@@ -63,13 +63,19 @@ def recorded_models(
 
 
 def recorded_packages(
-    paths: Sequence[str], topics_wanted: Sequence[str], scope: Scope, report: Report, *, whole: bool
+    read: Reader,
+    paths: Sequence[str],
+    topics_wanted: Sequence[str],
+    scope: Scope,
+    report: Report,
+    *,
+    whole: bool,
 ) -> tuple[list[inputs.Inputs], Texts]:
     """Return the packages of recorded types with all that these need, and their definitions.
 
     `whole` packages are for a prefix, where they hide those of the same name in others.
     """
-    topics = topics_of(paths, topics_wanted, scope.root, report)
+    topics = topics_of(read, paths, topics_wanted, scope.root, report)
     if topics is None:
         return [], {}
     groups = versions(topics)

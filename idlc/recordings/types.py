@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import msgspec
 
@@ -21,7 +21,6 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
-from idlc.project.find import is_address
 from idlc.project.library import Library, Texts
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -43,6 +42,10 @@ class RecordingTopics(NamedTuple):
     unread: tuple[UnreadTopic, ...] = ()
 
 
+#: Returns the topics of a recording by its path, and maybe those of a robot by its address.
+Reader: TypeAlias = "Callable[[str, Root, Report], RecordingTopics | None]"
+
+
 class Version(msgspec.Struct):
     """Topics whose definitions do not contradict each other, and these definitions."""
 
@@ -58,11 +61,6 @@ def read_topics(
     Reports name it by `path`, as the user wrote it. With `check`, topics that cannot be read are in
     `unread`.
     """
-    if is_address(path):
-        from idlc.robot.live.types import read_robot
-
-        robot = read_robot(path, report)
-        return None if robot is None else RecordingTopics(robot)
     place = root.path(path) if is_local(path) else path
     if not is_there(place):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
@@ -81,13 +79,13 @@ def read_topics(
 
 
 def topics_of(
-    paths: Sequence[str], selected: Sequence[str], root: Root, report: Report
+    read: Reader, paths: Sequence[str], selected: Sequence[str], root: Root, report: Report
 ) -> list[RecordedDefinition] | None:
-    """Return the topics of recordings, or the selected ones; `None` after an error.
+    """Return the topics of what `read` reads, or the selected ones; `None` after an error.
 
     Reports IDL655 for a topic that is in none of them.
     """
-    recordings = [read_topics(path, root, report) for path in paths]
+    recordings = [read(path, root, report) for path in paths]
     if None in recordings:
         return None
     topics = [topic for recording in recordings if recording for topic in recording.topics]

@@ -6,18 +6,19 @@ from collections.abc import Sequence
 
 import msgspec
 
+from idlc.api.sources import read_source
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
 from idlc.project.settings import Scope
 from idlc.recordings.packages import check_versions, contradicted
-from idlc.recordings.types import LocalTypes, read_topics, recorded_types, versions
+from idlc.recordings.types import LocalTypes, recorded_types, versions
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
     """Report problems in the type definitions stored in recordings."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read_topics(path, scope.root, report, check=True)
+        recording = read_source(path, scope.root, report, check=True)
         groups = versions(recording.topics) if recording else []
         for message, hint in recording.unread if recording else ():
             problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)

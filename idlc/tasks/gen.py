@@ -111,10 +111,16 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
     texts: Texts = {}
     if recordings and not report.had_errors:
+        from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_packages
 
         recorded, texts = recorded_packages(
-            recordings, options.topics, options.scope, report, whole=bool(options.ament)
+            read_source,
+            recordings,
+            options.topics,
+            options.scope,
+            report,
+            whole=bool(options.ament),
         )
         named += recorded
     if report.had_errors:

@@ -82,9 +82,10 @@ def requested_models(
             report.extend(problems)
     recordings, paths = split_recordings(paths, scope.root)
     if recordings:
+        from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_models
 
-        yield from recorded_models(recordings, scope, report)
+        yield from recorded_models(read_source, recordings, scope, report)
     if paths:
         problems = Report()
         files = find(paths, scope.root, problems, scope.exclude)
@@ -134,9 +135,10 @@ class TopicFacts(NamedTuple):
 
 def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
-    from idlc.recordings.types import LocalTypes, read_topics, recorded_types, versions
+    from idlc.api.sources import read_source
+    from idlc.recordings.types import LocalTypes, recorded_types, versions
 
-    recording = read_topics(path, scope.root, report, check=True)
+    recording = read_source(path, scope.root, report, check=True)
     report.notes += [topic.message for topic in recording.unread] if recording else []
     local = LocalTypes(scope, report)
     facts = []
@@ -164,9 +166,10 @@ def definitions(
     path: str, selected: Sequence[str], style: str, scope: Scope, report: Report
 ) -> Iterator[str]:
     """Yield the interfaces of topics, each once, as text in a format."""
+    from idlc.api.sources import read_source
     from idlc.recordings.types import LocalTypes, recorded_types, topics_of, versions
 
-    recorded = topics_of([path], selected, scope.root, report)
+    recorded = topics_of(read_source, [path], selected, scope.root, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
         types = recorded_types(version, local, report)

@@ -5,10 +5,10 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from idlc.api.load import load
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
 from idlc.project.settings import Scope
-from idlc.recordings.load import load
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import action_names
 from idlc.robot.qos import QoSProfile

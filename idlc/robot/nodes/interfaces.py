@@ -101,6 +101,6 @@ def standard(name: str) -> Interface:
 @cache
 def _package(name: str) -> Any:
     """Return a package of the catalogue; its types share their classes."""
-    from idlc.recordings.load import load
+    from idlc.recordings.load import loaded
 
-    return load(name)
+    return loaded(name)

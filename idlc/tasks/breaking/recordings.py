@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from idlc.api.sources import read_source
 from idlc.check.compiler import stage
 from idlc.compare.changes import Change
 from idlc.compare.packages import Comparison, compare
@@ -44,7 +45,7 @@ def compare_with_recordings(
     problems = Report()
     packages = inputs.packages(files, options.scope, problems)
     report.extend(problems)
-    topics = topics_of(recordings, (), options.scope.root, report)
+    topics = topics_of(read_source, recordings, (), options.scope.root, report)
     if topics is None or report.had_errors:
         return None
     local = _LocalVersions(packages, options, report)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from idlc.api.sources import read_source
 from idlc.check.compiler import stage
 from idlc.compare.distribution import PREFIX
 from idlc.diagnostics import codes
@@ -99,7 +100,7 @@ def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progre
         local = _local(options, opened, report)
         named = _read(rule_files(options.rules, options.scope.root), options.scope.root, report)
         if options.topics:
-            topics_of(options.recordings, options.topics, options.scope.root, report)
+            topics_of(read_source, options.recordings, options.topics, options.scope.root, report)
         if target is None or local is None or report.had_errors:
             return result
         found = _found(target, named, options.scope.root)
@@ -158,7 +159,7 @@ def _plans(
     report: Report,
 ) -> Iterator[TopicPlan]:
     """Yield the plan of each topic of a recording whose type is another one in the target."""
-    topics = topics_of([recording], (), options.scope.root, report)
+    topics = topics_of(read_source, [recording], (), options.scope.root, report)
     if topics is None:
         return
     selected = set(options.topics)
