@@ -8,8 +8,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from idlc.api.load import load
     from idlc.api.recording import Recording
+    from idlc.api.upgrade import upgrade
     from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
-    from idlc.upgrading.library import upgrade
 
 __all__ = [
     "Batch",
@@ -30,7 +30,7 @@ _MODULES = {
     "load": "api.load",
     "split_delimited": "recordings.batches",
     "split_mcap_chunk": "recordings.batches",
-    "upgrade": "upgrading.library",
+    "upgrade": "api.upgrade",
 }
 
 

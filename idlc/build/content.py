@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.check.compiler import models_of
+from idlc.compiler.compiler import models_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared

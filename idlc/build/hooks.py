@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from idlc.check.package.manifest import names_runtime
+from idlc.check.manifest import names_runtime
 from idlc.cli import output
 from idlc.cli.exit_status import status_of
 from idlc.diagnostics import codes

@@ -12,11 +12,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
-from idlc.check.compiler import models_of
-from idlc.check.package.facts import home_of
 from idlc.cli import output
+from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
 from idlc.generate.prefix import libraries_of, shared
+from idlc.packaging.facts import home_of
 from idlc.project import prefixes
 from idlc.project.atomic import write_whole
 from idlc.project.files import is_file, read_bytes, reason

@@ -145,12 +145,13 @@ def command(
     versions. It also compares these versions with your files and your installed packages.
     """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli import output
-    from idlc.compare import packages
-    from idlc.compare.changes import LEVELS
-    from idlc.compare.distribution import is_distro
     from idlc.project.find import is_address
+    from idlc.project.git import GIT
     from idlc.project.settings import scope, settings_here
-    from idlc.tasks.breaking.files import GIT, BreakingOptions, breaking
+    from idlc.tasks.breaking.files import BreakingOptions, breaking
+    from idlc.versions import packages
+    from idlc.versions.changes import LEVELS
+    from idlc.versions.distribution import is_distro
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)

@@ -67,8 +67,8 @@ def _discard_output() -> None:
 
 def _internal(error: Exception) -> int:
     """Show an unexpected exception as IDL901."""
-    from idlc.check.compiler import internal_error
     from idlc.cli import output
+    from idlc.compiler.compiler import internal_error
     from idlc.diagnostics.report import Report
 
     if os.environ.get("IDLC_DEBUG") == "1":

@@ -35,9 +35,8 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
     as in `idlc check`.
     """
-    from idlc.check.compiler import stage
-    from idlc.check.format import laid_out
     from idlc.cli import output
+    from idlc.compiler.compiler import stage
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
     from idlc.model import ir
@@ -45,6 +44,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     from idlc.project.find import find
     from idlc.project.settings import scope, settings_here
     from idlc.project.write import rewrite
+    from idlc.tasks.fmt import laid_out
 
     settings, report = settings_here()
     write = not (check or diff)

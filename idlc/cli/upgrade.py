@@ -13,7 +13,7 @@ from idlc.cli import options
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Span
     from idlc.tasks.upgrade.recordings import Result, TopicPlan, UpgradeOptions
-    from idlc.upgrading.plan import Finding
+    from idlc.versions.conversion import Finding
 
 
 def _place(span: Span | None) -> str:

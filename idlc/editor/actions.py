@@ -7,8 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from idlc.check.format import laid_out
-from idlc.check.package.manifest import dependency
+from idlc.check.manifest import dependency
 from idlc.check.select import REMARK
 from idlc.diagnostics.report import Edit, Report, Severity, apply, first_few
 from idlc.diagnostics.source import Span
@@ -20,6 +19,7 @@ from idlc.editor.rename import can_move_files, rename_interface
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import in_folder
 from idlc.tasks.check import keep_layout
+from idlc.tasks.fmt import laid_out
 
 if TYPE_CHECKING:
     from idlc.project.inputs import Inputs

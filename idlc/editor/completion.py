@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.check.package.manifest import dependency
+from idlc.check.manifest import dependency
 from idlc.check.style import QUANTITIES, expects_unit
 from idlc.diagnostics.codes import CODES
 from idlc.diagnostics.report import Severity

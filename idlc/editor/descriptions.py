@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from idlc.compare.changes import levels_of
-from idlc.compare.packages import compare
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.terminal import counted
 from idlc.editor.documents import TOP, is_built_in
@@ -18,6 +16,8 @@ from idlc.model import derive, ir
 from idlc.model.comments import deprecation
 from idlc.model.ir import is_range, spell, spell_value
 from idlc.tasks.show import outline
+from idlc.versions.changes import levels_of
+from idlc.versions.packages import compare
 from idlc.wire.layout import Placed, layout
 
 #: Lines of a message that are shown.

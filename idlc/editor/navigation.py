@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from idlc.check.package.manifest import declaration
+from idlc.check.manifest import declaration
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.editor.documents import TOP

@@ -9,9 +9,6 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check.package.cmake import calls
-from idlc.compare.changes import Change, levels_of
-from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
@@ -22,8 +19,11 @@ from idlc.editor.parts import PositionParams, RenameFilesParams, RenameParams, T
 from idlc.editor.protocol import REQUEST_FAILED, RequestError
 from idlc.editor.state import InterfaceContext, Renaming, ServerState
 from idlc.model import derive, ir, names
+from idlc.packaging.cmake import calls
 from idlc.project.files import is_file
 from idlc.project.root import Root
+from idlc.versions.changes import Change, levels_of
+from idlc.versions.packages import compare, renamed_interface
 
 #: The file that lists the interface files of a package.
 BUILD = "CMakeLists.txt"

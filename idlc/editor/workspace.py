@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from idlc.check import select
-from idlc.check.compiler import internal_error
+from idlc.compiler.compiler import internal_error
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
 from idlc.model import ir
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
     from idlc.diagnostics.source import Source
     from idlc.model.link import Model
+    from idlc.packaging.facts import Facts
     from idlc.project.library import Library
-    from idlc.project.package_xml import Facts
     from idlc.tasks.breaking.files import Baseline, Side
 
 _BUG = "this is a bug in idlc, please report it"

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from msgspec import UNSET
 
-from idlc.check.compiler import derived_names, stage
+from idlc.compiler.compiler import derived_names, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.generate.target import Target, dependencies
+from idlc.generate.target import Target
+from idlc.generate.up_to_date import dependencies
 from idlc.model import derive, ir
 from idlc.model.distros import Distro
 from idlc.model.link import Model

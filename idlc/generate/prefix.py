@@ -8,14 +8,14 @@ from pathlib import Path
 from shlex import quote
 from typing import NamedTuple
 
-from idlc.check.compiler import stage
+from idlc.compiler.compiler import stage
 from idlc.diagnostics.report import Report
-from idlc.generate.idl import file_text, idl
 from idlc.generate.native.elf import Machine
 from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS, Layout
 from idlc.generate.native.library import MACHINES, libraries
 from idlc.generate.target import Output, Target
+from idlc.model.idl_text import file_text, idl
 from idlc.model.link import Model
 from idlc.project import prefixes, write
 from idlc.project.library import Library

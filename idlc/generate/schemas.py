@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from idlc.generate.idl import file_text
 from idlc.model import derive, ir
 from idlc.model.comments import deprecation
 from idlc.model.ir import spell
-from idlc.model.link import Model
+from idlc.model.link import Model, held
 
 Json = dict[str, object]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-#: The line between messages in an MCAP schema of encoding `ros2msg`.
-MCAP_LINE = "=" * 80
 
 
 def facts(interface: ir.Interface, model: Model) -> Json:
     """Return all facts about an interface and the messages that it uses."""
-    used = [model.messages[name] for name in _used(interface, model)]
+    used = [model.messages[name] for name in held(interface, model)]
     return {
         "name": str(interface.name),
         "hash": model.describer.hash(str(interface.name)) if model.distro.has_hashes else None,
@@ -53,22 +50,10 @@ def _structure(message: ir.Message) -> Json:
     }
 
 
-def _used(interface: ir.Interface, model: Model) -> list[ir.TypeName]:
-    """Return the names of all messages that an interface holds, once each, in order of use."""
-    queue = list(derive.sections(interface))
-    used: dict[ir.TypeName, None] = {}
-    for message in queue:
-        for target in message.references:
-            if target not in used:
-                used[target] = None
-                queue.append(model.messages[target])
-    return list(used)
-
-
 def json_schema(interface: ir.Interface, model: Model) -> Json:
     """Return the JSON Schema of the result of `to_dict()`; a service has one for each part."""
     parts = derive.sections(interface)
-    used = _used(interface, model)
+    used = held(interface, model)
     definitions = {str(name): _object(model.messages[name]) for name in used}
     head: Json = {"$schema": DIALECT, "title": str(interface.name)}
     if len(parts) == 1:
@@ -126,13 +111,3 @@ def _value(type_: ir.FieldType) -> Json:
             return {"type": "integer", "minimum": type_.info.low, "maximum": type_.info.high}
         case ir.Unknown():
             return {}
-
-
-def mcap(interface: ir.Interface, model: Model) -> str:
-    """Return a message's MCAP schema of encoding `ros2msg`: its text and nested messages' texts."""
-    text = file_text(interface)
-    for name in _used(interface, model):
-        line_end = "" if not text or text.endswith("\n") else "\n"
-        text += f"{line_end}{MCAP_LINE}\nMSG: {name.package}/{name.name}\n"
-        text += file_text(model.interfaces[name])
-    return text if not text or text.endswith("\n") else f"{text}\n"

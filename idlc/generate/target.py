@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,159 +13,28 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.model import catalog, ir
-from idlc.model.ir import TypeName
+from idlc.generate.up_to_date import (
+    _carries_this_runtime,
+    _dependency,
+    _newest_maker,
+    _outputs_stand,
+)
 from idlc.model.link import Model
 from idlc.project import inputs, prefixes, write
 from idlc.project.files import is_file, is_folder
-from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
-from idlc.project.inputs import accept_name, by_home, output_folders, separate_homes
 from idlc.project.library import Library
 from idlc.project.lock import (
     FILE,
     Lock,
     Runtime,
-    Tree,
     Vendoring,
     digest,
     encode,
     load_lock,
-    meaning,
 )
-from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
-from idlc.project.settings import Scope
 from idlc.project.write import Change, Plan, plan
 from idlc.version import __version__
-
-
-def requested_packages(
-    paths: Sequence[str], named: Sequence[inputs.Inputs], out: str, scope: Scope, report: Report
-) -> tuple[inputs.Inputs, ...]:
-    """Return the packages at paths, and the named ones; empty after a problem.
-
-    Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
-    """
-    files = find(paths, scope.root, report, scope.exclude) if paths else ()
-    packages = list(named)
-    for package in named:
-        accept_name(package.package, "the command line", report)
-    if files and not report.had_errors:
-        packages += _from_files(files, "" if packages else out, scope, report)
-    usage = [diagnostic for diagnostic in report if diagnostic.code in codes.USAGE]
-    return () if usage else inputs.without_duplicates(packages, scope.root, report)
-
-
-def _from_files(
-    files: tuple[InterfaceFile, ...], out: str, scope: Scope, report: Report
-) -> tuple[inputs.Inputs, ...]:
-    """Return files by package: as one, by default with the name of the folder `out`."""
-    root = scope.root
-    homes = by_home(files, root)
-    apart = [] if scope.package else separate_homes(homes, root)
-    loose = [home for home in apart if not root.manifest(home)]
-    if any(set(home.parents) & set(apart) for home in loose):
-        names = first_few((f"`{root.shown(home)}`" for home in apart), 5)
-        report.add(
-            codes.SEVERAL_PACKAGES.of(
-                root.shown(apart[0]),
-                f"these folders can be one package or {len(apart)} packages: {names}",
-                hint="use --package NAME for one package, or add a package.xml to each folder",
-            )
-        )
-        return ()
-    if apart or not out:
-        packages = inputs.packages(files, scope, report)
-        folders = (package.home for package in packages)
-        origins = ["package.xml" if root.manifest(folder) else "its folder" for folder in folders]
-    else:
-        home, name, origins = min(homes), scope.package, ["--package"]
-        declared = next((path for home in homes if (path := root.manifest(home))), None)
-        if name is None and declared:
-            name, origins = declared_name(declared, root, report), ["package.xml"]
-        if name is None:
-            name, origins = root.absolute(out).name, ["the folder given with -o"]
-            if catalog.is_standard(name) and home.name != name:
-                report.add(
-                    codes.UNIMPORTABLE_PACKAGE.of(
-                        "",
-                        f"`{name}` (from {origins[0]}) would hide the ROS 2 package",
-                        hint=f"choose another folder, or confirm the name with `--package {name}`",
-                    )
-                )
-            # other commands cannot know that name
-            if name != home.name and root.absolute(out).parent not in output_folders(home, root):
-                report.notes.append(
-                    f"the package is named `{name}`, after the output folder; other commands "
-                    f"need `--package {name}`, or a package.xml next to the interfaces"
-                )
-        packages = (inputs.load(name, files, home, root, report),)
-    if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
-        report.add(
-            codes.FOREIGN_FILE.of(
-                out,
-                f"`{out}` contains interface files; idlc does not write generated code among them",
-                hint="choose another folder with -o",
-            )
-        )
-    for package, origin in zip(packages, origins, strict=True):
-        accept_name(package.package, origin, report)
-    return packages
-
-
-def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:
-    """Return types of one package, found in a library, as its input."""
-    names = sorted(types)
-    home = library.home(names[0].package)
-    return inputs.Inputs(
-        names[0].package,
-        tuple(_borrowed(name, library) for name in names),
-        (home,) if home else (),
-        borrowed=True,
-    )
-
-
-def completed(
-    packages: Collection[inputs.Inputs], needed: AbstractSet[ir.TypeName], library: Library
-) -> list[inputs.Inputs]:
-    """Return packages with the needed interfaces that partial packages lack; empty for none.
-
-    Packages import the ones that are written beside them.
-    """
-    extended = []
-    for package in packages:
-        missing = {name for name in needed if name.package == package.package} - package.names
-        more = (_borrowed(name, library) for name in missing if package.borrowed)
-        files = sorted((*package.files, *more), key=lambda each: each.file.key)
-        extended.append(msgspec.structs.replace(package, files=tuple(files)))
-    return [] if extended == [*packages] else extended
-
-
-def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
-    """Return the .idl files of a package without a .msg, .srv or .action file beside, sorted."""
-    unread = []
-    for folder in folders:
-        for kind in KINDS:
-            inside = folder / kind[1:]
-            try:
-                names = {entry.name for entry in os.scandir(inside)}
-            except OSError:
-                continue
-            unread += [
-                f"{kind[1:]}/{name}"
-                for name in names
-                if name.endswith(".idl")
-                and f"{name.removesuffix('.idl')}{kind}" not in names
-                and not exclude.has(str(inside / name))
-            ]
-    return sorted(unread)
-
-
-def _borrowed(name: ir.TypeName, library: Library) -> inputs.Input:
-    source = library.source(name)
-    assert source is not None, name
-    file = InterfaceFile(Path(source.path), source.path, name.kind, name.name, str(name), Path())
-    return inputs.Input(file, source.text.encode())
 
 
 def folder_targets(
@@ -190,67 +58,6 @@ def folder_targets(
         base = out.rstrip("/") or out
         targets = [Target(f"{base}/{name}", name, output) for name in names]
     return tuple(targets) if all(target.usable() for target in targets) else ()
-
-
-_PACKAGE = Path(__file__).parents[1]
-#: The sources of idlc that affect the output: a change counts although the version stays.
-_ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
-_MAKERS = (
-    *(_PACKAGE / room for room in _ROOMS),
-    _PACKAGE / "templates",
-    _PACKAGE.parent / "templates",
-)
-
-
-def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:
-    """Return the digests by which interfaces of other packages are recorded."""
-    return {str(name): _dependency(str(name), library) for name in names}
-
-
-def _dependency(name: str, library: Library) -> str:
-    try:
-        parsed = TypeName.parse(name)
-    except ValueError:
-        return ""
-    source = library.source(parsed)
-    return meaning(source.text, parsed.package) if source else ""
-
-
-def _outputs_stand(out: Path, lock: Lock) -> bool:
-    tree = Tree(out)
-    contents = ((tree.read(path), expected) for path, expected in lock.outputs.items())
-    return all(
-        isinstance(content, bytes) and digest(content) == expected for content, expected in contents
-    )
-
-
-def _carries_this_runtime(lock: Lock) -> bool:
-    """Return whether the copy of the runtime is this idlc's, or there is none.
-
-    Its version does not say so: those of two builds between two releases are equal.
-    """
-    copy = {
-        path.rpartition("_idlc/")[2]: content
-        for path, content in lock.outputs.items()
-        if "/_idlc/" in f"/{path}"
-    }
-    return not copy or copy == _runtime()
-
-
-@lru_cache(maxsize=1)
-def _runtime() -> dict[str, str]:
-    runtime = _PACKAGE / "runtime"
-    return {
-        path.relative_to(runtime).as_posix(): digest(path.read_bytes())
-        for path in runtime.rglob("*.py")
-    }
-
-
-@lru_cache(maxsize=1)
-def _newest_maker() -> int:
-    """Return the time at which idlc was last changed: by a developer, or installed."""
-    files = (path for folder in _MAKERS for path in folder.rglob("*.*") if path.suffix != ".pyc")
-    return max(path.stat().st_mtime_ns for path in files)
 
 
 class Output(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
-from idlc.check.compiler import Compiler
+from idlc.compiler.compiler import Compiler
 from idlc.diagnostics.report import Report
 from idlc.generate.package import Package, as_inputs, package_of
 from idlc.generate.target import Target

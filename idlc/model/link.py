@@ -458,3 +458,15 @@ def own_sections(model: Model) -> Iterable[ir.Message]:
 def own_fields(model: Model) -> Iterable[ir.Field]:
     """Return every field of the model's own files."""
     return (field for message in own_sections(model) for field in message.fields)
+
+
+def held(interface: ir.Interface, model: Model) -> list[ir.TypeName]:
+    """Return the names of all messages that an interface holds, once each, in order of use."""
+    queue = list(derive.sections(interface))
+    used: dict[ir.TypeName, None] = {}
+    for message in queue:
+        for target in message.references:
+            if target not in used:
+                used[target] = None
+                queue.append(model.messages[target])
+    return list(used)

@@ -57,6 +57,9 @@ _DAMAGED = "`git fsck` lists missing or damaged objects"
 _BAD = ("fatal: ", "error: ")
 
 
+GIT = "git:"
+
+
 class GitError(Exception):
     """Git could not answer; the text is the reason, and `hint` the remedy.
 

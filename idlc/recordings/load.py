@@ -9,15 +9,15 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from idlc.check.compiler import Compiler, library_for, sources_of
+from idlc.compiler.compiler import Compiler, library_for, sources_of
 from idlc.diagnostics.report import Report
-from idlc.generate.target import requested_packages
-from idlc.generate.types import content
 from idlc.model import ir
 from idlc.model.distros import Distro
 from idlc.model.python_names import class_
+from idlc.model.type_data import content
 from idlc.project.find import is_path
 from idlc.project.library import resolve
+from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.recordings.containers.container import Topic

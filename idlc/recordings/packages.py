@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from idlc.check.compiler import derived_names
+from idlc.compiler.compiler import derived_names
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
-from idlc.generate.target import borrowed
 from idlc.model import ir
 from idlc.project import inputs, prefixes
 from idlc.project.library import Texts
+from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import msgspec
 
-from idlc.check.compiler import Compiler
+from idlc.compiler.compiler import Compiler
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source

@@ -9,13 +9,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from idlc.check.package.facts import home_of
-from idlc.check.package.setup_edits import wrap_lines
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
-from idlc.project.edits import Edited, Outcome
+from idlc.packaging.facts import home_of
+from idlc.packaging.outcome import Edited, Outcome
+from idlc.packaging.setup_edits import wrap_lines
 from idlc.project.files import entries, read_source
 from idlc.project.library import Library
 from idlc.project.lock import Tree, digest

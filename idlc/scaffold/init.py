@@ -16,13 +16,9 @@ from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
-from idlc.check.compiler import models_of, stage
-from idlc.check.package.facts import folders
-from idlc.check.package.installation import check_setup
-from idlc.check.package.python_packages import layout
-from idlc.check.package.setup_edits import KEYWORD, append_element
-from idlc.check.package.setup_py import BOM, Setup
+from idlc.check.installation import check_setup
 from idlc.check.select import selection
+from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source, Span
@@ -30,8 +26,13 @@ from idlc.generate.package import NUMPY, Generated
 from idlc.generate.python.fields import number_info
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.project import git, package_xml
-from idlc.project.edits import Edited, Outcome, Refused
+from idlc.packaging import dependencies
+from idlc.packaging.facts import folders
+from idlc.packaging.layout import layout
+from idlc.packaging.outcome import Edited, Outcome, Refused
+from idlc.packaging.setup_edits import KEYWORD, append_element
+from idlc.packaging.setup_py import BOM, Setup
+from idlc.project import git
 from idlc.project.files import is_file, is_folder, read_bytes
 from idlc.project.find import list_files, no_interfaces
 from idlc.project.inputs import Inputs, packages
@@ -322,7 +323,7 @@ def _ament_python(
     """Wire interfaces into setup.py and package.xml; return what idlc cannot see."""
     name = layout.name
     manifest = draft.text(MANIFEST) or ""
-    edited = package_xml.add_dependencies(manifest, depends=implied_packages(model), group=True)
+    edited = dependencies.add_dependencies(manifest, depends=implied_packages(model), group=True)
     draft.put(
         MANIFEST, edited, "the package has interfaces, and depends on the packages that they use"
     )

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
-from idlc.check.compiler import compile_package, stage
-from idlc.check.package.cmake import calls
-from idlc.check.package.cmake_lists import dependency_edit
-from idlc.check.package.facts import folders
+from idlc.check.cmake_lists import dependency_edit
+from idlc.check.installation import check_setup
+from idlc.compiler.compiler import compile_package, stage
 from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir, names
 from idlc.model.link import Model
-from idlc.project import package_xml
-from idlc.project.edits import Edited, Outcome, Refused
+from idlc.packaging import dependencies
+from idlc.packaging.cmake import calls
+from idlc.packaging.facts import folders
+from idlc.packaging.outcome import Edited, Outcome, Refused
 from idlc.project.settings import load_settings
 from idlc.scaffold.changes import Result, Settings, find_package
-from idlc.scaffold.edits import setup_py
 from idlc.scaffold.package import rendered_for
 
 SEPARATOR = "---"
@@ -147,14 +147,14 @@ def interface(
             added[TEST] = rendered_for(own, "package/test_interfaces.py.jinja")
     needed, tests = implied_packages(model), ["python3-pytest"] if TEST in added else []
     manifest = project.text(MANIFEST) or ""
-    declared = package_xml.add_dependencies(manifest, depends=needed, tests=tests, group=True)
+    declared = dependencies.add_dependencies(manifest, depends=needed, tests=tests, group=True)
     edits: dict[str, Outcome] = {MANIFEST: declared}
     keys, setup = {*project.keys(), path}, project.text(SETUP)
     cmake = project.text(CMAKE)
     if cmake is not None:
         edits[CMAKE] = add_cmake_dependencies(cmake, needed)
     elif setup is not None:
-        wired = setup_py.add_interfaces(setup, own, keys, folders(project.path))
+        wired = add_interfaces(setup, own, keys, folders(project.path))
         edits[SETUP] = Edited(wired)
     edited = project.accepted(edits)
     if edited is None:
@@ -164,3 +164,14 @@ def interface(
     result = project.write(added, edited)
     after = project.generation() if cmake is None else ()
     return result and result._replace(following=after)
+
+
+def add_interfaces(
+    text: str, package: str, keys: Iterable[str], folders: Mapping[str, bool]
+) -> str:
+    """Return a setup.py that installs interfaces, their classes and libraries for C++ tools.
+
+    Computed values stay; `idlc check` and the build report missing ones then.
+    """
+    problems = check_setup(Source("setup.py", text), package, {key: key for key in keys}, folders)
+    return apply(text, (edit for problem in problems for edit in problem.edits))[0]

@@ -12,11 +12,11 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 import msgspec
 
-from idlc.check.package.facts import home_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.model.names import is_module_name, why_not_package
+from idlc.packaging.facts import home_of
 from idlc.project.files import entries, is_file
 from idlc.project.find import CLOSING, KIND_FOLDERS, list_files
 from idlc.project.package_xml import declared_name, read_statements

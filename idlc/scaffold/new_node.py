@@ -9,18 +9,17 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from idlc.check.compiler import compile_package, stage
-from idlc.check.package.facts import folders
+from idlc.compiler.compiler import compile_package, stage
 from idlc.diagnostics.report import Report
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DEFAULT
-from idlc.project import package_xml
-from idlc.project.edits import Edited, Outcome, Refused, Script
+from idlc.packaging import dependencies, entry_points, launch_py
+from idlc.packaging.facts import folders
+from idlc.packaging.outcome import Edited, Outcome, Refused, Script
 from idlc.project.prefixes import distribution, python_folders
 from idlc.project.settings import load_settings
-from idlc.scaffold import changes, spec
+from idlc.scaffold import changes, interface, spec
 from idlc.scaffold.changes import Project, Result, Settings
-from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
 from idlc.scaffold.spec import Plan, plan
@@ -71,10 +70,10 @@ def node_entry(
     described = {name: texts[name] for name in SETUP_FILES if name in texts}
     if (own := tuple(keys)) and SETUP in described:
         text = described[SETUP]
-        described[SETUP] = setup_py.add_interfaces(text, node.package, own, folders)
-    path, outcome = setup_py.add_console_script(described, script)
+        described[SETUP] = interface.add_interfaces(text, node.package, own, folders)
+    path, outcome = entry_points.add_console_script(described, script)
     launch = launch and not planned.once
-    manifest = package_xml.add_dependencies(
+    manifest = dependencies.add_dependencies(
         texts.get(MANIFEST, ""),
         depends=planned.packages,
         tests=test_packages(planned),
@@ -100,7 +99,7 @@ def node_entry(
         return Entry(added, {**edits, path: started})
     before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
     if SETUP in texts and isinstance(before, Edited):
-        edits[SETUP] = setup_py.add_launch(before.text, node.package, path)
+        edits[SETUP] = entry_points.add_launch(before.text, node.package, path)
     return Entry({**added, path: started.text}, edits)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 from xml.sax.saxutils import escape, quoteattr
 
-from idlc.check.compiler import stage
+from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
@@ -215,7 +215,7 @@ def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) ->
 
 def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Choice]:
     """Yield what a setup.py says of each choice, and the argument to write in its place."""
-    from idlc.check.package.setup_py import Setup, span_of
+    from idlc.packaging.setup_py import Setup, span_of
 
     setup = Setup(source)
     for field in _CHOICES:

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check.compiler import Compiler, library_for, stage
-from idlc.check.package import cmake_lists
-from idlc.check.package.facts import facts
-from idlc.check.registry import IncrementalFindings, advise, check_package
+from idlc.check import cmake_lists
+from idlc.check.registry import advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
+from idlc.compiler.compiler import Compiler, library_for, stage
+from idlc.compiler.verdicts import IncrementalFindings
 from idlc.diagnostics.report import Diagnostic, Report, merge, without_overruled
 from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
+from idlc.packaging.facts import Facts, facts
 from idlc.project import inputs
 from idlc.project.files import is_folder
 from idlc.project.find import KINDS, RULES, list_files, no_interfaces
-from idlc.project.package_xml import Facts
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
@@ -139,7 +139,7 @@ def _with_recordings(
 def keep_layout(name: str, old: str, new: str) -> str:
     """Return an edited file in its old layout: `idlc fmt`'s, or without long lines."""
     if name.endswith("setup.py"):
-        from idlc.check.package.setup_edits import wrap_lines
+        from idlc.packaging.setup_edits import wrap_lines
 
         return wrap_lines(old, new)
     from idlc.language.format import format_file
@@ -191,7 +191,7 @@ class Checker:
                 with stage("check package", package.package):
                     check_package(surroundings, models[-1], report)
             if any(is_folder(folder / RULES) for folder in package.folders):
-                from idlc.upgrading.coverage import rule_folders, rule_problems
+                from idlc.versions.coverage import rule_folders, rule_problems
 
                 with stage("check rules", package.package):
                     folders = rule_folders(package.folders)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idlc.check.compiler import models_of, stage
+from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.native import library as native

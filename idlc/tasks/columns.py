@@ -24,8 +24,8 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model.ir import DUMMY_FIELD
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
-from idlc.recordings.preview import Preview
 from idlc.recordings.types import BORROWED, NAMED
+from idlc.tasks.preview import Preview
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -8,22 +8,18 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.check.compiler import Compiler, library_for
-from idlc.check.package.facts import home_of
+from idlc.compiler.compiler import Compiler, library_for
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.package import Generated, generated, up_to_date, with_needs
 from idlc.generate.target import (
     Output,
     Target,
-    borrowed,
-    completed,
     folder_targets,
-    requested_packages,
-    unread_idl,
 )
 from idlc.generate.vendoring import leftovers, planned
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
+from idlc.packaging.facts import home_of
 from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
@@ -31,6 +27,12 @@ from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, Texts, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
+from idlc.project.requests import (
+    borrowed,
+    completed,
+    requested_packages,
+    unread_idl,
+)
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
 from idlc.recordings.find import split_recordings

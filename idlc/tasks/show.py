@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.check.compiler import compile_package, derived_names, sound_models, stage
+from idlc.compiler.compiler import compile_package, derived_names, sound_models, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.language.tree import OPTIONAL
@@ -243,17 +243,19 @@ def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
 
 def shown(interface: ir.Interface, model: Model, style: str) -> str:
     """Return an interface in a format."""
-    from idlc.generate import idl, schemas
+    from idlc.generate import schemas
+    from idlc.model import idl_text
+    from idlc.recordings import definition_text
 
     match style:
         case "json":
             return json.dumps(schemas.facts(interface, model)) + "\n"
         case "ros2idl":
-            return idl.idl(interface)
+            return idl_text.idl(interface)
         case "jsonschema":
             return json.dumps(schemas.json_schema(interface, model), indent=2) + "\n"
         case "mcap":
-            return schemas.mcap(interface, model)
+            return definition_text.mcap(interface, model)
     has_hashes = model.distro.has_hashes
     head = [f"# {model.describer.hash(str(interface.name))}"] if has_hashes else []
     lines = (f"# {interface.name}", *head, "", *outline(interface, model))

@@ -15,8 +15,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from idlc.check.compiler import compile_package
-from idlc.compare.packages import compare
+from idlc.compiler.compiler import compile_package
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.editor.server import Server
@@ -26,6 +25,7 @@ from idlc.model.link import Model
 from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.tasks.show import shown
+from idlc.versions.packages import compare
 from maintenance.website import colours
 
 PACKAGE = "demo_msgs"

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from idlc.check import registry
+from idlc.compiler import verdicts
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import closest, package_hint
@@ -22,7 +22,7 @@ def errors(text, kind="msg"):
         lower(parse(Source(f"{name}.{one}", text)), ir.TypeName("pkg", one, name), report)
         for name, (one, text) in files.items()
     ]
-    registry.check(link("pkg", own, catalog, report), report)
+    verdicts.check(link("pkg", own, catalog, report), report)
     return [
         one
         for one in report

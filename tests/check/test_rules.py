@@ -5,8 +5,9 @@ import re
 
 import pytest
 
-from idlc.check import names, portability, registry, style
+from idlc.check import portability, registry, style
 from idlc.cli.main import main
+from idlc.compiler import name_rules, verdicts
 from idlc.diagnostics import codes
 from idlc.diagnostics.explain import page
 from idlc.diagnostics.report import Severity
@@ -51,9 +52,9 @@ def test_a_terminal_gets_each_page_without_its_markup(monkeypatch, capsys):
 def test_every_rule_is_registered():
     rules = {
         rule
-        for module in (names, portability, style)
+        for module in (name_rules, portability, style)
         for name, rule in vars(module).items()
         if not name.startswith("_") and getattr(rule, "__module__", "") == module.__name__
         if [*inspect.signature(rule).parameters] == ["model"]
     }
-    assert rules == {*registry._OF_PACKAGES, *registry._VERDICTS, *registry._ADVICE}
+    assert rules == {*verdicts._OF_PACKAGES, *verdicts._VERDICTS, *registry._ADVICE}

@@ -10,11 +10,11 @@ import click
 import pytest
 
 import idlc
-from idlc.check.compiler import compile_package, derived_names
 from idlc.check.registry import advise
 from idlc.cli import completion
 from idlc.cli.check import command as check
 from idlc.cli.main import main
+from idlc.compiler.compiler import compile_package, derived_names
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.format import format_file

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.generate import target
+from idlc.generate import target, up_to_date
 from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.tasks.gen import GenOptions, gen
 
 PACKAGE = Path(target.__file__).parents[1]
-MAKERS = [path for path in target._MAKERS if path.is_dir()]
+MAKERS = [path for path in up_to_date._MAKERS if path.is_dir()]
 FOLDERS = [
     folder.relative_to(maker.parent)
     for maker in MAKERS
@@ -25,7 +25,7 @@ FOLDERS = [
 
 
 def test_the_rooms_that_count_exist():
-    assert all((PACKAGE / room).is_dir() for room in target._ROOMS)
+    assert all((PACKAGE / room).is_dir() for room in up_to_date._ROOMS)
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=str)
@@ -33,13 +33,13 @@ def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
     for maker in MAKERS:
         shutil.copytree(maker, tmp_path / maker.name, dirs_exist_ok=True)
     monkeypatch.setattr(target, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
-    target._newest_maker.cache_clear()
-    before = target._newest_maker()
+    up_to_date._newest_maker.cache_clear()
+    before = up_to_date._newest_maker()
     file = next(path for path in (tmp_path / folder).iterdir() if path.is_file())
     os.utime(file, ns=(before + 1, before + 1))
-    target._newest_maker.cache_clear()
-    assert target._newest_maker() == before + 1
-    target._newest_maker.cache_clear()
+    up_to_date._newest_maker.cache_clear()
+    assert up_to_date._newest_maker() == before + 1
+    up_to_date._newest_maker.cache_clear()
 
 
 def written(folder: Path, package: str) -> tuple[int, list[str]]:

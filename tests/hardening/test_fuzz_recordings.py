@@ -18,7 +18,7 @@ import pytest
 import idlc
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
-from idlc.generate.idl import idl
+from idlc.model.idl_text import idl
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic, open_recording

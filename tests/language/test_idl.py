@@ -8,10 +8,10 @@ import pytest
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.generate.idl import idl
 from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
 from idlc.model.distros import DISTROS
+from idlc.model.idl_text import idl
 from idlc.model.lowering.lower import lower
 from tests.support import idl_view
 from tests.support.examples import given, st

@@ -8,9 +8,9 @@ import json
 import re
 
 from idlc.diagnostics.codes import CODES
-from idlc.generate.idl import idl
 from idlc.model import derive, ir
 from idlc.model.describe import individual
+from idlc.model.idl_text import idl
 from idlc.model.names import snake_case
 from tests.support import language_book, refresh, rosidl_view
 from tests.support.generated import model_of

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from idlc.check import registry
+from idlc.compiler import verdicts
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.parse import parse
@@ -56,7 +56,7 @@ def test_any_text_is_read_without_loss_and_judged_without_a_crash(text, kind):
 
     report = Report()
     interface = lower(file, ir.TypeName("pkg", kind, "X"), report)
-    registry.check(link("pkg", [interface], catalog, report), report)
+    verdicts.check(link("pkg", [interface], catalog, report), report)
     for problem in report:
         if problem.span is not None and problem.span.source is source:
             assert 0 <= problem.span.start <= problem.span.end <= len(text)
@@ -117,7 +117,7 @@ def problems(kind="msg", package="demo", **texts):
         lower(parse(Source(f"{name}.{kind}", text)), ir.TypeName(package, kind, name), report)
         for name, text in texts.items()
     ]
-    registry.check(link(package, own, catalog, report), report)
+    verdicts.check(link(package, own, catalog, report), report)
     return [(p.code, p.span.source.position(p.span.start) if p.span else None) for p in report]
 
 

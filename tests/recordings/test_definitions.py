@@ -9,15 +9,15 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.generate.idl import file_text, idl
-from idlc.generate.schemas import mcap
 from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
+from idlc.model.idl_text import file_text, idl
 from idlc.model.link import link
 from idlc.model.lowering.lower import lower
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
+from idlc.recordings.definition_text import mcap
 from idlc.recordings.definitions import read_definition, type_name
 from idlc.recordings.types import LocalTypes, contradictions, recorded_types, versions
 from tests.support import idl_view, recorded_text

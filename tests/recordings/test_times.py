@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import idlc
-from idlc.api.recording import moment
+from idlc.recordings.times import moment
 from tests.support import recordings as made
 
 START = 1_700_000_000_000_000_000

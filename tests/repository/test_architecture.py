@@ -335,7 +335,7 @@ def test_checking_a_file_imports_little(tmp_path):
     needless |= {"numpy", "pkgutil", "rich", "shutil", "subprocess", "tempfile", "tomllib"}
     assert needless & found == set()
     own = {name for name in found if name.partition(".")[0] == "idlc"}
-    assert "idlc.check.package.manifest" in own
+    assert "idlc.check.manifest" in own
     assert "idlc.scaffold" not in own
     assert len(own) <= 82, "what a run without problems does not need can wait"
 

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.main import main
-from idlc.compare.packages import Allowance
 from idlc.diagnostics.codes import CODES
 from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Config
+from idlc.versions.packages import Allowance
 from tests.support import command_line_page, programs, refresh
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT

@@ -10,10 +10,10 @@ from rosidl_parser.parser import parse_idl_string
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.generate.idl import idl
 from idlc.language.format import format_file
 from idlc.language.parse import parse
 from idlc.model import ir
+from idlc.model.idl_text import idl
 from idlc.model.lowering.lower import lower
 from tests.language.test_format import assert_only_the_layout_changes
 

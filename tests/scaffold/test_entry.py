@@ -2,7 +2,7 @@
 
 import pytest
 
-from idlc.project.edits import Edited, Refused
+from idlc.packaging.outcome import Edited, Refused
 from idlc.scaffold import new_node, spec
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.spec import Plan, plan

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from idlc.project import package_xml
-from idlc.project.edits import Edited, Outcome, Script
-from idlc.scaffold.edits import launch_py, setup_py
+from idlc.packaging import dependencies, entry_points, launch_py
+from idlc.packaging.outcome import Edited, Outcome, Script
 
 TALKER = Script("talker", "demo.talker:main")
 
@@ -50,7 +49,7 @@ def python(data: bytes, edit: Callable[[str], Outcome]) -> None:
 
 def setup_file(data: bytes, _: Path) -> None:
     """A setup.py gets a console script."""
-    python(data, lambda text: setup_py.add_to_setup(text, TALKER))
+    python(data, lambda text: entry_points.add_to_setup(text, TALKER))
 
 
 def launch_file(data: bytes, _: Path) -> None:
@@ -60,7 +59,7 @@ def launch_file(data: bytes, _: Path) -> None:
 
 def setup_cfg(data: bytes, _: Path) -> None:
     """A setup.cfg gets a console script: a line or two more, the others as they were."""
-    found = edited(data, lambda text: setup_py.add_to_cfg(text, TALKER))
+    found = edited(data, lambda text: entry_points.add_to_cfg(text, TALKER))
     if found:
         before, after = (Counter(text.splitlines()) for text in found)
         assert sum((before - after).values()) <= 1
@@ -71,7 +70,7 @@ def manifest(data: bytes, _: Path) -> None:
     """A package.xml gets dependencies, and keeps every element and every other character."""
 
     def edit(text: str) -> Outcome:
-        return package_xml.add_dependencies(
+        return dependencies.add_dependencies(
             text, depends=("rclpy", "b&c"), tests=("pytest",), group=True
         )
 

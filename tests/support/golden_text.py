@@ -33,7 +33,7 @@ _SECTION = re.compile(r"^-- (.+) --\n", re.MULTILINE)
 STAGES = {
     "parse": "idlc.language.parse.parse",
     "link": "idlc.model.link.link",
-    "check": "idlc.check.registry.check",
+    "check": "idlc.compiler.verdicts.check",
     "render": "idlc.generate.python.render.render_package",
 }
 

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from idlc.check.compiler import models_of
+from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
 from idlc.generate.native.library import MACHINES, libraries
 from idlc.project.find import list_files

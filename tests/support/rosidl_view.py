@@ -4,7 +4,7 @@ A case has `kind`, `pkg`, `name`, `siblings` (path to text), and its text as `te
 `bytes_hex`; `distro` if that is not Jazzy.
 """
 
-from idlc.check import registry
+from idlc.compiler import verdicts
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.escapes import through_idl
@@ -56,7 +56,7 @@ def compile_case(case) -> tuple[Model | None, Report]:
     source = Source(f"{case['name']}.{case['kind']}", text)
     interface = lower(parse(source), name, report, BY_NAME[case.get("distro", "jazzy")])
     model = link(case["pkg"], [interface], Siblings(case), report)
-    registry.check(model, report)
+    verdicts.check(model, report)
     return model, report
 
 

@@ -6,8 +6,8 @@ import shutil
 
 import pytest
 
-from idlc.check.compiler import models_of
 from idlc.cli.main import main
+from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
 from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS

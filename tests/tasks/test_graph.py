@@ -11,8 +11,8 @@ from itertools import pairwise
 import pytest
 
 from idlc.cli.main import main
-from idlc.compare.packages import compare
 from idlc.model.from_description import DescriptionError, model_of_description
+from idlc.versions.packages import compare
 from idlc.wire.layout import oversized
 from tests.support import generated
 from tests.support.evolution import Evolution, compile_texts

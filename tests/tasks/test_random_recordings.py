@@ -17,7 +17,7 @@ import idlc
 from idlc.cli.main import main
 from idlc.recordings.rewrite import Conversion
 from idlc.tasks.upgrade.recordings import definition_of
-from idlc.upgrading.versions import version_of
+from idlc.versions.classes import version_of
 from tests.recordings import test_rewrite
 from tests.support import recordings as made
 from tests.support import upgrades

@@ -12,11 +12,11 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 import idlc
+from idlc.api.upgrade import UpgradeError
 from idlc.cli.main import main
 from idlc.runtime.typeinfo import type_hash
 from idlc.tasks.upgrade.recordings import definition_of
-from idlc.upgrading.library import UpgradeError
-from idlc.upgrading.versions import version_of
+from idlc.versions.classes import version_of
 from tests.support import programs
 from tests.support.files import write
 from tests.support.paths import ROOT

@@ -2,7 +2,7 @@
 
 import re
 
-from idlc.check.compiler import compile_package
+from idlc.compiler.compiler import compile_package
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, ir

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.generate.idl import idl_text
 from idlc.generate.python import literals
 from idlc.generate.python.imports import References
 from idlc.model import comments, ir, python_names
+from idlc.model.idl_text import idl_text
 from idlc.model.ir import spell
 from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES

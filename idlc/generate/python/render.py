@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import jinja2
 import msgspec
 
-from idlc.generate.idl import idl_text
 from idlc.generate.python import classes, fields, imports
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
@@ -23,9 +22,10 @@ from idlc.generate.python.imports import ALONE, References, Surroundings
 from idlc.generate.python.lines import call, text_of
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.positions import Tables
-from idlc.generate.types import content
 from idlc.model import derive, ir, link, python_names
+from idlc.model.idl_text import idl_text
 from idlc.model.names import snake_case
+from idlc.model.type_data import content
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
 from idlc.runtime import PROTOCOL

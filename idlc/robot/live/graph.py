@@ -10,14 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeAlias
 
-from idlc.compare.changes import Change, Level
-from idlc.compare.fields import Sides, constant_changes, field_changes, with_wire
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import derive, ir
 from idlc.model.describe import DescriptionDict
 from idlc.model.link import Model
+from idlc.versions.changes import Change, Level
+from idlc.versions.fields import Sides, constant_changes, field_changes, with_wire
 from idlc.wire.compatible import reads_alike
 
 Entity: TypeAlias = Literal["topic", "service", "action"]

@@ -12,9 +12,8 @@ from functools import cache
 from itertools import chain, product
 from typing import Any, TypeAlias
 
-from idlc.check.compiler import Compiler
+from idlc.compiler.compiler import Compiler
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.schemas import mcap
 from idlc.model import ir
 from idlc.model.from_description import DescriptionError, model_of_description, model_of_sources
 from idlc.model.lowering.lower import SECTIONS
@@ -22,6 +21,7 @@ from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.file import CDR, MSG, Schema, Topic
+from idlc.recordings.definition_text import mcap
 from idlc.recordings.definitions import (
     RecordedDefinition,
     TextCache,

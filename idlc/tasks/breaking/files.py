@@ -10,10 +10,23 @@ from typing import NamedTuple, TypeAlias
 
 import msgspec
 
-from idlc.check.compiler import models_of, stage, without_errors
-from idlc.compare.changes import LEVELS, Change
-from idlc.compare.distribution import compare_with_distro, is_distro
-from idlc.compare.packages import (
+from idlc.compiler.compiler import models_of, stage, without_errors
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.model import ir
+from idlc.model.link import Model
+from idlc.project import git, inputs, lock
+from idlc.project.files import is_folder
+from idlc.project.find import RULES, InterfaceFile, find, list_files, no_interfaces
+from idlc.project.git import GIT, Revision, checked_out, is_revision
+from idlc.project.inputs import Inputs, by_home
+from idlc.project.lock import load_lock
+from idlc.project.package_xml import read_statements
+from idlc.project.root import Root
+from idlc.project.settings import Config, Scope
+from idlc.versions.changes import LEVELS, Change
+from idlc.versions.distribution import compare_with_distro, is_distro
+from idlc.versions.packages import (
     Allowance,
     Comparison,
     against,
@@ -24,22 +37,8 @@ from idlc.compare.packages import (
     part_to_raise,
     raised,
 )
-from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
-from idlc.model import ir
-from idlc.model.link import Model
-from idlc.project import git, inputs, lock
-from idlc.project.files import is_folder
-from idlc.project.find import RULES, InterfaceFile, find, list_files, no_interfaces
-from idlc.project.git import Revision, checked_out, is_revision
-from idlc.project.inputs import Inputs, by_home
-from idlc.project.lock import load_lock
-from idlc.project.package_xml import read_statements
-from idlc.project.root import Root
-from idlc.project.settings import Config, Scope
 from idlc.wire.layout import oversized
 
-GIT = "git:"
 #: The inputs of packages.
 Packages: TypeAlias = Sequence[Inputs]
 _CHECK_OUT = "`git sparse-checkout disable` checks out all files"
@@ -227,7 +226,7 @@ def _compare(
         )
     homes = [folder for package in packages for folder in package.folders]
     if any(is_folder(home / RULES) for home in homes):
-        from idlc.upgrading.coverage import rule_folders, with_rules
+        from idlc.versions.coverage import rule_folders, with_rules
 
         places = rule_folders(homes)
         changes = with_rules(whole.changes, old, new, places, options.scope.root)

@@ -15,7 +15,7 @@ from importlib import import_module
 from itertools import chain
 from typing import Any, NamedTuple, TypeAlias, get_args
 
-from idlc.check.compiler import Compiler, stage
+from idlc.compiler.compiler import Compiler, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir

@@ -6,9 +6,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from idlc.api.sources import read_source
-from idlc.check.compiler import stage
-from idlc.compare.changes import Change
-from idlc.compare.packages import Comparison, compare
+from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
@@ -17,6 +15,8 @@ from idlc.project import inputs
 from idlc.project.find import find
 from idlc.recordings.types import NAMED, LocalTypes, recorded_types, topics_of, versions
 from idlc.tasks.breaking.files import BreakingOptions, error_free_models, judge
+from idlc.versions.changes import Change
+from idlc.versions.packages import Comparison, compare
 
 
 class RecordedVerdict(NamedTuple):

@@ -13,19 +13,20 @@ from typing import Any, NamedTuple
 import msgspec
 
 from idlc.api.sources import read_source
-from idlc.check.compiler import stage
-from idlc.compare.distribution import PREFIX
+from idlc.api.upgrade import Runner, UpgradeError
+from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
-from idlc.generate.schemas import MCAP_LINE, mcap
 from idlc.model import ir
 from idlc.project.files import is_folder
 from idlc.project.find import RULES
+from idlc.project.git import GIT
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.conversion import Conversion
 from idlc.recordings.containers.file import MSG
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.definition_text import MCAP_LINE, mcap
 from idlc.recordings.definitions import interface_of
 from idlc.recordings.types import (
     DefinedTopic,
@@ -35,12 +36,11 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
-from idlc.tasks.breaking.files import GIT
 from idlc.tasks.upgrade.targets import Target, compiled, target_of
-from idlc.upgrading.convert import Payloads, RunRules
-from idlc.upgrading.library import Runner, UpgradeError
-from idlc.upgrading.plan import Finding, Plan, Version, make_plan
-from idlc.upgrading.rules import Known, Rules, read_rules, rule_files
+from idlc.versions.conversion import Finding, Plan, Version, make_plan
+from idlc.versions.converters import Payloads, RunRules
+from idlc.versions.distribution import PREFIX
+from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 #: Called with a recording, and how much of it is done.
 Progress = Callable[[str, int, int], None]
@@ -109,7 +109,7 @@ def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progre
         if report.errors:
             return result
         if options.write_rules is not None:
-            from idlc.upgrading.stubs import write_stubs
+            from idlc.versions.stubs import write_stubs
 
             plans = [each.plan for each in result.plans if each.plan is not None]
             result.stubs.extend(write_stubs(plans, options.write_rules, options.scope.root, report))

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from idlc.check.compiler import Compiler, sources_of
-from idlc.compare.distribution import PREFIX, is_distro
+from idlc.compiler.compiler import Compiler, sources_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
@@ -16,10 +15,10 @@ from idlc.model import catalog, derive, ir
 from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.project import inputs
 from idlc.project.find import InterfaceFile, find
-from idlc.project.git import checked_out
+from idlc.project.git import GIT, checked_out
 from idlc.project.library import Library, Texts
 from idlc.project.settings import Scope
-from idlc.tasks.breaking.files import GIT
+from idlc.versions.distribution import PREFIX, is_distro
 from idlc.wire.layout import oversized
 
 

@@ -1,1 +1,0 @@
-"""Rules on the package of interfaces: package.xml, setup.py, CMakeLists.txt."""

@@ -1,1 +1,0 @@
-"""Changes between two versions of interfaces, and the levels that they break."""

@@ -1,0 +1,300 @@
+"""Adding a console script to a setup.py, with entry points of any shape.
+
+In: the file's text. Out: the text with another entry, all else untouched, or a refusal with the
+line to add by hand. An existing entry changes nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+from idlc.diagnostics.report import Edit, apply
+from idlc.diagnostics.source import Source, Span
+from idlc.packaging.outcome import Edited, Outcome, Refused, Script, already_taken, split
+from idlc.packaging.setup_edits import append_element, is_spread, margin_of, step_of
+from idlc.packaging.setup_py import Setup, name_of_call, parse, range_of
+from idlc.project.settings import toml
+
+SECTION = "options.entry_points"
+KEY = "console_scripts"
+IN_SETUP_CFG = f"below `{KEY} =` in [{SECTION}]"
+_HEADER = re.compile(r"\s*\[([^\]]*)\]")
+
+
+def _section(lines: list[str], name: str) -> tuple[int, int] | None:
+    """Return the lines of a section, without its header and the empty lines at its end."""
+    headers = [n for n, line in enumerate(lines) if _HEADER.match(line)]
+    for number, end in zip(headers, [*headers[1:], len(lines)], strict=False):
+        header = _HEADER.match(lines[number])
+        if header and "".join(header[1].split()) == name:
+            return number + 1, max(_last(lines[:end]), number + 1)
+    return None
+
+
+def _add_entry(text: str, script: Script, *, in_section: bool) -> Outcome:
+    """Return a text of entries with one more, at its end or in a section, made if need be."""
+    lines = text.splitlines(keepends=True)
+    body = _section(lines, KEY) if in_section else (0, _last(lines))
+    if body is not None:
+        return _with_entry(lines, *body, script, _margin(lines[slice(*body)] or lines))
+    if not lines:
+        return Edited(f"\n[{KEY}]\n{script.line}\n")
+    margin = _margin(lines)
+    return _inserted(lines, _last(lines), [f"{margin}[{KEY}]", f"{margin}{script.line}"])
+
+
+def add_to_cfg(text: str, script: Script) -> Outcome:
+    """Return a setup.cfg with a console script in its `[options.entry_points]`."""
+    lines = text.splitlines(keepends=True)
+    section = _section(lines, SECTION)
+    if section is None:
+        gap = [""] if lines else []
+        new = [*gap, f"[{SECTION}]", f"{KEY} =", f"    {script.line}"]
+        return _inserted(lines, len(lines), new)
+    start, end = section
+    key = next((n for n in range(start, end) if re.match(rf"{KEY}\s*[=:]", lines[n])), None)
+    if key is None:
+        return _inserted(lines, end, [f"{KEY} =", f"    {script.line}"])
+    others = (n for n in range(key + 1, end) if lines[n].strip() and not lines[n][0].isspace())
+    end = max(_last(lines[: next(others, end)]), key + 1)
+    return _with_entry(lines, key, end, script, _margin(lines[key + 1 : end]) or "    ")
+
+
+def _with_entry(lines: list[str], start: int, end: int, script: Script, margin: str) -> Outcome:
+    """Return a text with another line in a range of entries; a command has one entry."""
+    for line in lines[start:end]:
+        entry = re.sub(rf"^{KEY}\s*[=:]", "", line)
+        name, target = split(entry.partition("#")[0])
+        if name == script.name and target:
+            if script.same(entry):
+                return Edited("".join(lines))
+            return already_taken(script, target, IN_SETUP_CFG)
+    return _inserted(lines, end, [margin + script.line])
+
+
+def _margin(lines: list[str]) -> str:
+    """Return the whitespace before the last line with text."""
+    line = "".join(lines[: _last(lines)][-1:])
+    return line[: len(line) - len(line.lstrip())]
+
+
+def _last(lines: list[str]) -> int:
+    """Return the index after the last line with text."""
+    return max((number for number, line in enumerate(lines, 1) if line.strip()), default=0)
+
+
+def _inserted(lines: list[str], at: int, new: list[str]) -> Edited:
+    """Return the text with new lines before line `at`, with the line ends of the others."""
+    ending = "\r\n" if lines and lines[0].endswith("\r\n") else "\n"
+    before, after = lines[:at], lines[at:]
+    if before and not before[-1].endswith(("\n", "\r")):
+        before[-1] += ending
+    return Edited("".join((*before, *(line + ending for line in new), *after)))
+
+
+IN_SETUP = f"to `{KEY}` in the `entry_points` of setup()"
+UNKNOWN = "idlc cannot parse the entry points"
+
+#: The edits of a file, or the reason why there are none.
+Change: TypeAlias = tuple[Edit, ...] | str
+
+
+def add_to_setup(text: str, script: Script) -> Outcome:
+    """Return the file with a console script."""
+    setup = Setup(Source("setup.py", text))
+    if parse(text) is None:
+        return _refusal(script, "this is not valid Python")
+    lines = _lines(setup)
+    if any(map(script.same, lines)):
+        return Edited(text)
+    if setup.call is None:
+        return _refusal(script, f"there are {len(setup.calls) or 'no'} calls of setup()")
+    change = _with_script(setup, setup.call, script)
+    if isinstance(change, str):
+        return _refusal(script, change)
+    new = apply(text, change)[0]
+    after = _lines(Setup(Source("setup.py", new)))
+    if not any(map(script.same, after)) or not lines <= after:
+        return _refusal(script, UNKNOWN)
+    return Edited(new)
+
+
+def _lines(setup: Setup) -> set[str]:
+    """Return the lines of every text that a file shows."""
+    texts = (
+        node.value if isinstance(node, ast.Constant) else setup.text(node)
+        for node in setup.nodes
+        if isinstance(node, ast.expr)
+    )
+    return {line.strip() for text in texts if isinstance(text, str) for line in text.splitlines()}
+
+
+def _refusal(script: Script, why: str) -> Refused:
+    return Refused(why, f"'{script.line}',", IN_SETUP)
+
+
+def _with_script(setup: Setup, call: ast.Call, script: Script) -> Change:
+    """Return the edits that give setup() a console script."""
+    passed = {keyword.arg: keyword.value for keyword in call.keywords}
+    if "entry_points" in passed:
+        return _in_entry_points(setup, passed["entry_points"], script)
+    if None in passed:
+        return "setup() takes its arguments from other code (`**`)"
+    points = f"{{'{KEY}': ['{script.line}']}}"
+    if is_spread(setup.source, call):
+        margin, step = margin_of(setup.source, call), step_of(setup.source)
+        inner = f"{margin}{step}'{KEY}': [\n{margin}{step * 2}'{script.line}',\n{margin}{step}],"
+        points = f"{{\n{inner}\n{margin}}}"
+    return append_element(setup.source, call, f"entry_points={points}")
+
+
+def _in_entry_points(setup: Setup, node: ast.expr, script: Script) -> Change:
+    """Return the edits of the value of `entry_points`."""
+    value = setup.value(node)
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        return _in_literal(setup, value, script, in_section=True)
+    if isinstance(value, ast.Dict):
+        scripts = dict(zip(map(setup.text, value.keys), value.values, strict=True))
+        if KEY not in scripts and None in value.keys:
+            return "the entry points come from other code (`**`)"
+    elif isinstance(value, ast.Call) and name_of_call(value) == "dict":
+        scripts = {keyword.arg: keyword.value for keyword in value.keywords}
+    else:
+        scripts = {}
+    if KEY in scripts:
+        return _in_scripts(setup, scripts[KEY], script)
+    if isinstance(value, ast.Dict):
+        return append_element(setup.source, value, f"'{KEY}': ['{script.line}']")
+    return _unknown(node, value) or "the entry points are not a literal dictionary or string"
+
+
+def _unknown(node: ast.expr, value: ast.expr | None) -> str:
+    """Return the problem with a name whose value is not known."""
+    if value is None and isinstance(node, ast.Name):
+        return f"`{node.id}` is not set in exactly one place"
+    return ""
+
+
+def _in_scripts(setup: Setup, node: ast.expr, script: Script) -> Change:
+    """Return the edits of the value of `console_scripts`."""
+    value = setup.value(node)
+    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):
+        for side in (value.left, value.right):
+            if isinstance(side, (ast.List, ast.BinOp)):
+                return _in_scripts(setup, side, script)
+    if isinstance(value, (ast.List, ast.Tuple)) and _is_enclosed(setup.source, value):
+        for element in value.elts:
+            name, target = split(setup.text(element) or "")
+            if name == script.name:
+                return already_taken(script, target, IN_SETUP).why
+        return append_element(setup.source, value, f"'{script.line}'")
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        start, end = range_of(setup.source, value)
+        literal = setup.source.text[start:end]
+        if literal.endswith(("'''", '"""')):
+            return _in_literal(setup, value, script, in_section=False)
+        name, target = split(value.value)
+        if name == script.name:
+            return already_taken(script, target, IN_SETUP).why
+        line = f"'{script.line}'".replace("'", literal[-1])
+        return (Edit(Span(setup.source, start, end), f"[{literal}, {line}]"),)
+    return _unknown(node, value) or "the console scripts are not a literal list"
+
+
+def _is_enclosed(source: Source, node: ast.List | ast.Tuple) -> bool:
+    """Return whether a list or tuple has brackets of its own."""
+    start, end = range_of(source, node)
+    inside = source.text[start + 1 : end - 1]
+    return source.text[start] in "[(" and parse(f"({inside}\n)") is not None
+
+
+def _in_literal(setup: Setup, value: ast.Constant, script: Script, *, in_section: bool) -> Change:
+    """Return the edit of a text of several lines."""
+    start, end = range_of(setup.source, value)
+    literal = re.fullmatch(r"(?s)\w*('{3}|\"{3})(.*)\1", setup.source.text[start:end])
+    if literal is None or re.sub(r"\r\n?", "\n", literal[2]) != value.value:
+        return "the entry points are a text with escapes or on one line"
+    new = _add_entry(literal[2], script, in_section=in_section)
+    if isinstance(new, Refused):
+        return new.why
+    return (Edit(Span(setup.source, start + literal.start(2), end - 3), new.text),)
+
+
+PYPROJECT = "pyproject.toml"
+SETUP_CFG = "setup.cfg"
+SETUP_PY = "setup.py"
+TABLE = "project.scripts"
+
+
+def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, Outcome]:
+    """Return the file of a package to edit, and the edit; `files` are the existing ones.
+
+    The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
+    """
+    project = _project(files.get(PYPROJECT, ""))
+    if isinstance(project, Refused):
+        return PYPROJECT, project._replace(line=_line(script))
+    dynamic = project.get("dynamic", ())
+    if project and not {"scripts", "entry-points"}.intersection(dynamic):
+        return PYPROJECT, _in_pyproject(files[PYPROJECT], project, script)
+    in_cfg = _section(files.get(SETUP_CFG, "").splitlines(), SECTION)
+    if SETUP_PY in files and not in_cfg:
+        return SETUP_PY, add_to_setup(files[SETUP_PY], script)
+    if SETUP_CFG in files:
+        return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
+    why = "there is no setup.py, and no setup.cfg or pyproject.toml that describes a package"
+    return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
+
+
+def _project(text: str) -> dict[str, Any] | Refused:
+    try:
+        table = toml(text).get("project", {})
+    except ValueError:
+        return Refused("this is not valid TOML", "", f"to [{TABLE}]")
+    return table if isinstance(table, dict) else {}
+
+
+def _line(script: Script) -> str:
+    key = script.name if re.fullmatch(r"[A-Za-z0-9_-]+", script.name) else f'"{script.name}"'
+    return f'{key} = "{script.target}"'
+
+
+def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome:
+    """Return a pyproject.toml with another line in `[project.scripts]`, added if missing."""
+    why = "idlc cannot edit the scripts"
+    refused = Refused(why, _line(script), f"to [{TABLE}]")
+    scripts = project.get("scripts", {})
+    if script.name in scripts:
+        if script.same(f"{script.name} = {scripts[script.name]}"):
+            return Edited(text)
+        why = already_taken(script, str(scripts[script.name]), refused.where).why
+        return refused._replace(why=why)
+    lines = text.splitlines(keepends=True)
+    section = _section(lines, TABLE)
+    at, header = (section[1], []) if section else (len(lines), ["", f"[{TABLE}]"])
+    edited = _inserted(lines, at, [*header, _line(script)])
+    expected = {**project, "scripts": {**scripts, script.name: script.target}}
+    return edited if _project(edited.text) == expected else refused
+
+
+WHERE = "to `data_files` in the call of setup()"
+
+
+def add_launch(text: str, package: str, path: str) -> Outcome:
+    """Return a setup.py that installs a launch file.
+
+    One that names `launch` anywhere does so already; one without `data_files` installs none.
+    """
+    element = f"('share/{package}/launch', ['{path}'])"
+    if parse(text) is None:
+        return Refused("this is not valid Python", f"{element},", WHERE)
+    setup = Setup(Source("setup.py", text))
+    if "data_files" not in setup.arguments or any("launch" in line for line in _lines(setup)):
+        return Edited(text)
+    listed = setup.list_of("data_files")
+    if listed is None:
+        return Refused("the data files are not a literal list", f"{element},", WHERE)
+    return Edited(apply(text, append_element(setup.source, listed, element))[0])

@@ -1,0 +1,206 @@
+"""Reading the facts about the package of interfaces."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+
+import msgspec
+
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source, Span
+from idlc.packaging.cmake import GENERATE, calls
+from idlc.project.find import CLOSING, KINDS, SKIPPED
+from idlc.project.inputs import Inputs
+from idlc.project.lock import FILE, Runtime, load_lock
+from idlc.project.package_xml import Statement, statements
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import Scope
+
+#: Python packages of ROS 2 that have no interfaces.
+_LIBRARIES = frozenset(
+    "ament_index_python cv_bridge geometry_msgs launch launch_ros launch_testing message_filters "
+    "rclpy ros2cli ros2launch rosbag2_py rosidl_runtime_py sensor_msgs_py tf2_geometry_msgs "
+    "tf2_ros tf_transformations".split()
+)
+_SETUP_FILES = ("setup.py", "setup.cfg", "pyproject.toml")
+_NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
+_NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
+
+
+class GeneratedOutput(msgspec.Struct, frozen=True):
+    """Code that idlc generated within the package: its lock, and the inputs recorded in it."""
+
+    path: str
+    package: str
+    inputs: Mapping[str, str]
+    runtime: Runtime = "carried"
+
+
+class Facts(msgspec.Struct, frozen=True):
+    """A package with a package.xml.
+
+    `modules` are its Python files by dotted name, tests excluded. `inputs` are the digests of its
+    interface files by name within the package, empty without `outputs`; `whole` is whether the
+    package has no others. `generates` is whether its CMakeLists.txt generates interfaces that are
+    installed, `native` whether it has C or C++ sources, `marker` whether resource/NAME exists.
+    `available` are the names of ROS packages that can be found.
+    `files` are the paths of interface files in the package's folder by name within the package.
+    `interfaces` are the paths of all, checked or not, .idl files included.
+    `folders` are those with files by dotted name, and whether they are Python packages.
+    """
+
+    name: str
+    manifest: Source
+    statements: tuple[Statement, ...]
+    inputs: Mapping[str, str]
+    modules: Mapping[str, Source]
+    setup_py: Source | None = None
+    setup_cfg: Source | None = None
+    pyproject: Source | None = None
+    cmake: Source | None = None
+    generates: bool = False
+    native: bool = False
+    marker: bool = False
+    whole: bool = False
+    outputs: tuple[GeneratedOutput, ...] = ()
+    available: frozenset[str] = frozenset()
+    files: Mapping[str, str] = {}
+    interfaces: frozenset[str] = frozenset()
+    folders: Mapping[str, bool] = {}
+
+    @property
+    def runtime(self) -> Runtime:
+        """Return the runtime mode of the generated classes."""
+        modes = [output.runtime for output in self.outputs if output.package == self.name]
+        return modes[0] if modes else "carried"
+
+    def declared(self, *tags: str) -> dict[str, Statement]:
+        """Return the statements with one of these tags by their text, the first of each."""
+        by_text: dict[str, Statement] = {}
+        for statement in self.statements:
+            if statement.tag in tags:
+                by_text.setdefault(statement.text, statement)
+        return by_text
+
+    @property
+    def build_type(self) -> str:
+        """The build type; CMake unless package.xml has another."""
+        return next(iter(self.declared("build_type")), "ament_cmake")
+
+    @property
+    def place(self) -> Span:
+        """The span for problems with the whole package.xml: its name."""
+        named = self.declared("name")
+        return next(iter(named.values())).span if named else Span(self.manifest, 0, 0)
+
+
+def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
+    """Return the facts about a package; `None` without a package.xml.
+
+    `ros_packages` returns the names of ROS packages; it is called only with Python code.
+    """
+    root = scope.root
+    path = root.manifest(next(iter(package.folders), package.home))
+    source = root.read_source(path, root.shown(path), Report()) if path else None
+    if path is None or source is None or not (declared := statements(source)):
+        return None
+    folder = path.parent
+    files = list(_files(folder))
+    records = {file: load_lock(file.parent, "", Report()) for file in files if file.name == FILE}
+    locks = {file: record for file, record in records.items() if record}
+    interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
+    checked = {root.absolute(entry.file.path) for entry in package.files}
+    if others := {file.resolve() for file in interfaces if file not in checked}:
+        others -= {file.resolve() for file in checked}
+    generated = {at.parent / path for at, record in locks.items() for path in record.outputs}
+    cmake = _optional(folder / "CMakeLists.txt", root)
+    commands = calls(cmake) if cmake else ()
+    generating = [command for command in commands if command.name == GENERATE]
+    modules = {}  # nodes may be in the folder of generated classes
+    for file in files:
+        parts = file.relative_to(folder).parts
+        is_code = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
+        if is_code and file not in generated and (module := _optional(file, root)):
+            modules[".".join((*parts[:-1], file.stem))] = module
+    return Facts(
+        name=package.package,
+        manifest=source,
+        statements=declared,
+        inputs=package.digests if locks else {},
+        modules=modules,
+        setup_py=_optional(folder / "setup.py", root),
+        setup_cfg=_optional(folder / "setup.cfg", root),
+        pyproject=_optional(folder / "pyproject.toml", root),
+        cmake=cmake,
+        # other interfaces are for tests of the package's own
+        generates=any("SKIP_INSTALL" not in command.words for command in generating),
+        native=any(file.suffix in _NATIVE for file in files),
+        whole=bool(checked) and not others,
+        marker=(folder / "resource" / package.package).is_file(),
+        outputs=tuple(
+            GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
+            for at, record in locks.items()
+        ),
+        files={
+            entry.file.key: place.relative_to(folder).as_posix()
+            for entry in package.files
+            if (place := root.absolute(entry.file.path)).is_relative_to(folder)
+        },
+        interfaces=frozenset(
+            file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
+        ),
+        folders=folders(folder, files),
+        available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
+    )
+
+
+def folders(folder: Path, files: Iterable[Path] | None = None) -> dict[str, bool]:
+    """Return the folders with files, by dotted name, and whether each is a Python package."""
+    is_package: dict[str, bool] = {}
+    for file in _files(folder) if files is None else files:
+        parts = file.relative_to(folder).parts[:-1]
+        for end in range(1, len(parts) + 1):
+            is_package.setdefault(".".join(parts[:end]), False)
+        if file.name == "__init__.py" and parts:
+            is_package[".".join(parts)] = True
+    return is_package
+
+
+def home_of(folder: Path, package: str, root: Root) -> Path:
+    """Return the folder from which setup.py takes a package, or an earlier `idlc gen`'s."""
+    homes = (folder / package, folder / "src" / package)
+    for home in homes:
+        if (home / FILE).is_file():
+            return home
+    setup, cfg, pyproject = (_optional(folder / name, root) for name in _SETUP_FILES)
+    if setup is not None:
+        from idlc.packaging.layout import layout
+        from idlc.packaging.setup_py import Setup
+
+        sources = {"src": False} if (folder / "src").is_dir() else {}
+        view = layout(Setup(setup), cfg, pyproject, sources)
+        if view is not None:
+            return folder / view.folder(package)
+    return homes[not homes[0].is_dir() and homes[1].is_dir()]
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """Yield every file below a package's folder that may be a source, other packages' excluded."""
+    for place, folders, names in os.walk(folder):
+        current = Path(place)
+        closing = any(name in CLOSING or name == MANIFEST for name in (*folders, *names))
+        open_ones = [name for name in folders if name[0] != "." and name not in SKIPPED]
+        folders[:] = sorted(open_ones, reverse=True)
+        if current != folder and closing:
+            folders.clear()
+            continue
+        for name in sorted(names):
+            if name[0] != "." and name not in SKIPPED and (file := current / name).is_file():
+                yield file
+
+
+def _optional(path: Path, root: Root) -> Source | None:
+    """Return a file's text, `None` if it is missing or no text, which others report."""
+    return root.read_source(path, root.shown(path), Report()) if root.is_file(path) else None

@@ -1,0 +1,248 @@
+"""The Python packages that setuptools installs, and their folders, as far as files show.
+
+setup.py lists them, or setup.cfg, or pyproject.toml; otherwise setuptools searches itself.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Mapping
+from configparser import Error as ConfigError
+from configparser import RawConfigParser
+from fnmatch import fnmatchcase
+from posixpath import normpath
+from typing import Any, NamedTuple
+
+from idlc.diagnostics.source import Source, Span
+from idlc.packaging.setup_py import Setup, name_of_call
+from idlc.project.settings import toml
+
+_SEARCH = ("where", "include", "exclude")
+_FINDERS = ("find_packages", "find_namespace_packages")
+#: Characters of the longest setup.cfg or pyproject.toml that is read.
+_MOST = 100_000
+_MOST_ROOTS = 20
+#: Arguments with which other code may choose the packages.
+_HOOKS = frozenset({"distclass", "pbr", "py_modules", "setup_requires"})
+#: Folders that setuptools ignores in its own search.
+_NOT_FOUND = frozenset(
+    "ci bin debian doc docs documentation manpages news newsfragments changelog test tests "
+    "unit_test unit_tests example examples scripts tools util utils python build benchmark "
+    "benchmarks exercise exercises htmlcov".split()
+)
+
+
+class Finder(NamedTuple):
+    """A search for packages below a folder, by patterns of their names."""
+
+    where: str = "."
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+
+    def finds(self, name: str) -> bool:
+        """Return whether a package of this name is found if its folder exists."""
+        is_included = any(fnmatchcase(name, pattern) for pattern in self.include or ("*",))
+        return is_included and not any(fnmatchcase(name, pattern) for pattern in self.exclude)
+
+
+class Installed(NamedTuple):
+    """The listed packages and searches, and the range that lists them.
+
+    `is_nothing`: nothing lists them; setuptools would find several, and installs none.
+    """
+
+    place: Span
+    names: tuple[str, ...] = ()
+    finders: tuple[Finder, ...] = ()
+    is_nothing: bool = False
+
+    def covers(self, name: str, folder: str) -> bool:
+        """Return whether a package in a folder is installed."""
+        path = name.replace(".", "/")
+        return name in self.names or any(
+            normpath(f"{finder.where}/{path}") == folder and finder.finds(name)
+            for finder in self.finders
+        )
+
+
+class PackagingConfig(NamedTuple):
+    """The packages and `package_dir` in one file, each `None` if the file has no such setting."""
+
+    packages: Installed | None = None
+    roots: Mapping[str, str] | None = None
+
+
+class Layout(NamedTuple):
+    """The folders of packages, and the packages that setuptools installs, `None` if unknown."""
+
+    roots: Mapping[str, str]
+    installed: Installed | None
+
+    def folder(self, package: str) -> str:
+        """Return the folder of a package, relative to setup.py."""
+        names = package.split(".")
+        end = len(names)
+        while end and ".".join(names[:end]) not in self.roots:
+            end -= 1
+        root = self.roots.get(".".join(names[:end])) or "."
+        return normpath("/".join((root, *names[end:])))
+
+    def packages(self, folders: Mapping[str, bool]) -> dict[str, bool]:
+        """Return folders by the names that their packages have in setuptools."""
+        if not self.roots:
+            return dict(folders)
+        packages = {} if "" in self.roots else dict(folders)
+        for package, root in self.roots.items():
+            at = normpath(root).replace("/", ".")
+            for name, has_init in folders.items():
+                if f"{name}.".startswith(f"{at}."):
+                    inner = name[len(at) + 1 :]
+                    packages[".".join(filter(None, (package, inner)))] = has_init
+        packages.pop("", None)
+        return packages
+
+
+def layout(
+    setup: Setup, cfg: Source | None, pyproject: Source | None, folders: Mapping[str, bool]
+) -> Layout | None:
+    """Return setuptools' view of a package; `None` if the folders of packages are unknown.
+
+    `folders` are the existing ones, by dotted name.
+    """
+    files = (_of_setup(setup), _of_cfg(cfg), _of_toml(pyproject))
+    configs = [config for config in files if config]
+    if len(configs) < len(files) or setup.call is None:
+        return None
+    roots = next((config.roots for config in configs if config.roots is not None), None)
+    if not all(map(_is_within, (roots or {}).values())) or len(roots or ()) > _MOST_ROOTS:
+        return None
+    installed = [config.packages for config in configs if config.packages]
+    if "packages" in setup.arguments:  # older setuptools do not read pyproject.toml
+        return Layout(roots or {}, None if configs[2].packages else configs[0].packages)
+    if not setup.whole or _HOOKS & setup.arguments.keys():
+        return Layout(roots or {}, None)
+    if installed:
+        wheres = [finder.where for finder in installed[0].finders if _is_within(finder.where)]
+        roots = roots or ({"": wheres[0]} if wheres and normpath(wheres[0]) != "." else {})
+        return Layout(roots, installed[0] if len(installed) == 1 else None)
+    place = setup.place("packages")
+    if "src" in folders:
+        return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
+    tops = {name for name in folders if "." not in name} - _NOT_FOUND
+    is_nothing = len(tops) > 1 and not roots
+    return Layout(roots or {}, Installed(place, is_nothing=True) if is_nothing else None)
+
+
+def _is_within(root: str) -> bool:
+    """Return whether a folder is within the package's."""
+    return re.fullmatch(r"(?!/)[\w./ -]*", root) is not None and ".." not in root.split("/")
+
+
+def _of_setup(setup: Setup) -> PackagingConfig | None:
+    roots = None
+    if "package_dir" in setup.arguments:
+        pairs = setup.pairs(setup.arguments["package_dir"])
+        roots = _texts({key: setup.text(value) for key, value in (pairs or {}).items()})
+        if pairs is None or roots is None:
+            return None
+    if "packages" not in setup.arguments:
+        return PackagingConfig(roots=roots)
+    names, finders = [], []
+    for part in setup.items(setup.arguments["packages"]):
+        text = setup.text(part.node) if part.is_element else None
+        finder = None if text else _finder(setup, part.node)
+        if text:
+            names.append(text)
+        elif finder:
+            finders.append(finder)
+        else:
+            return PackagingConfig(roots=roots)
+    place = setup.place("packages")
+    return PackagingConfig(Installed(place, tuple(names), tuple(finders)), roots)
+
+
+def _finder(setup: Setup, node: ast.expr) -> Finder | None:
+    """Return the search of a find_packages call; `None` if its arguments are computed."""
+    call = setup.value(node)
+    if not isinstance(call, ast.Call) or name_of_call(call) not in _FINDERS:
+        return None
+    arguments = dict(zip(("where", "exclude", "include"), call.args, strict=False))
+    arguments |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg}
+    where = setup.text(arguments["where"]) if "where" in arguments else "."
+    chosen = []
+    for name in ("include", "exclude"):
+        texts = setup.texts(arguments.get(name))
+        if None in texts:
+            return None
+        chosen.append(tuple(text for text in texts if text is not None))
+    return None if where is None else Finder(where, *chosen)
+
+
+def _of_cfg(source: Source | None) -> PackagingConfig | None:
+    if source is None or len(source.text) > _MOST:
+        return None if source else PackagingConfig()
+    parser = RawConfigParser(strict=False)
+    try:
+        parser.read_string(source.text)
+    except ConfigError:
+        return None
+    dirs = _words(parser, "options", "package_dir") or _words(parser, "options", "package-dir")
+    pairs = [line.partition("=") for line in dirs]
+    roots = {key.strip(): root.strip() for key, equals, root in pairs if equals} or None
+    names = _words(parser, "options", "packages")
+    at = re.compile(r"(?mi)^packages\b").search(source.text, max(source.text.find("[options]"), 0))
+    if not parser.has_option("options", "packages") or at is None:
+        return PackagingConfig(roots=roots)
+    place = Span(source, *at.span())
+    if names not in (("find:",), ("find_namespace:",)):
+        return PackagingConfig(Installed(place, names), roots)
+    section = "options.packages.find"
+    where, include, exclude = (_words(parser, section, key) for key in _SEARCH)
+    finder = Finder("".join(where) or ".", include, exclude)
+    return None if len(where) > 1 else PackagingConfig(Installed(place, (), (finder,)), roots)
+
+
+def _words(parser: RawConfigParser, section: str, option: str) -> tuple[str, ...]:
+    """Return the parts of a value, which lines or commas separate."""
+    text = parser.get(section, option, fallback="") or ""
+    parts = text.split("\n") if "\n" in text else text.split(",")
+    return tuple(word for part in parts if (word := part.strip()))
+
+
+def _of_toml(source: Source | None) -> PackagingConfig | None:
+    if source is None or "setuptools" not in source.text:
+        return PackagingConfig()
+    if len(source.text) > _MOST:
+        return None
+    try:
+        table = toml(source.text).get("tool", {}).get("setuptools", {})
+        roots = _texts(table.get("package-dir", {}))
+        packages = table.get("packages")
+        finder = packages.get("find", {}) if isinstance(packages, dict) else {}
+        where = _all_texts(finder.get("where", ["."]))
+        include, exclude = (_all_texts(finder.get(key, [])) for key in ("include", "exclude"))
+        names = _all_texts([] if isinstance(packages, dict) else packages or [])
+    except (ValueError, AttributeError, TypeError):
+        return None
+    if roots is None or len(where) != 1:
+        return None
+    if packages is None:
+        return PackagingConfig(None, roots or None)
+    at = re.search(r"\bpackages\b", source.text)
+    place = Span(source, *(at.span() if at else (0, 0)))
+    finders = (Finder(where[0], include, exclude),) if isinstance(packages, dict) else ()
+    return PackagingConfig(Installed(place, names, finders), roots or None)
+
+
+def _texts(table: Mapping[str, Any]) -> dict[str, str] | None:
+    """Return the texts of a table, `None` if something in it is none."""
+    texts = {key: value for key, value in table.items() if isinstance(value, str)}
+    return texts if len(texts) == len(table) else None
+
+
+def _all_texts(values: Iterable[Any]) -> tuple[str, ...]:
+    texts = tuple(values)
+    if isinstance(values, str) or not all(isinstance(text, str) for text in texts):
+        raise TypeError
+    return texts

@@ -1,1 +1,0 @@
-"""Edits of setup.py, launch files and package.xml that keep every other byte."""

@@ -1,0 +1,1 @@
+"""Two versions of a type: the differences, who is broken, the conversion."""

@@ -1,0 +1,122 @@
+"""The differences between the local standard interfaces and another distribution's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+from idlc.compiler.compiler import Compiler, compile_package, library_for, stage
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.model import catalog, derive, ir
+from idlc.model.distros import BY_NAME, Distro, unknown_distro
+from idlc.model.link import Model
+from idlc.project import inputs
+from idlc.project.library import Library
+from idlc.project.settings import Scope
+from idlc.versions.packages import Comparison, combine, compare
+
+PREFIX = "distro:"
+
+
+def is_distro(against: str) -> bool:
+    """Return whether the text of `--against` names a distribution."""
+    return against.startswith(PREFIX)
+
+
+def compare_with_distro(
+    against: str, packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> Comparison | None:
+    """Return the changes from a distribution's interfaces, the old version, to the local ones.
+
+    They are the interfaces that packages refer to; without packages, all built-in ones. Resulting
+    changes of the packages themselves are included. `None` after an error.
+    """
+    name = against.removeprefix(PREFIX)
+    if name not in BY_NAME:
+        message = f"no such distribution: `{name}`"
+        report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
+        return None
+    other = BY_NAME[name]
+    library = library_for(packages, scope, report)
+    other_library, both = (
+        library_for(packages, scope, Report(), kind=partial(_LayeredLibrary, other, other_first))
+        for other_first in (True, False)
+    )
+    own = [package for package in packages if not catalog.is_standard(package.package)]
+    after = _models(own, both, report)
+    before = _models(own, other_library, Report())
+    if report.had_errors:
+        return None
+    with stage("compare", against):
+        standard = (package.names for package in packages if package not in own)
+        used = set[ir.TypeName]().union(*map(_used, after), *standard)
+        names = used if packages else _all(library, other)
+        of_packages = _of_packages(names, library, other_library, other)
+        return combine([*map(compare, before, after), *of_packages])
+
+
+class _LayeredLibrary(Library):
+    """The local library with the standard interfaces of another distribution.
+
+    With `other_first` they take precedence, otherwise they fill gaps. A message that one of the
+    two lacks therefore does not hide the messages that hold it.
+    """
+
+    def __init__(self, other: Distro, other_first: bool, *place: Any, **options: Any) -> None:
+        super().__init__(*place, **options)
+        self._other = other
+        self._other_first = other_first
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface, or `None` if neither has it."""
+        others = catalog.source(name, self._other)
+        return others if others and self._other_first else super().source(name) or others
+
+
+def _models(packages: Sequence[inputs.Inputs], library: Library, report: Report) -> list[Model]:
+    problems = Report()
+    models = [model for _, model in Compiler(library).all(packages, problems)]
+    report.extend(problems.errors)
+    return models
+
+
+def _used(model: Model) -> set[ir.TypeName]:
+    """Return the standard messages in a package's fields, nested ones included."""
+
+    def targets(name: ir.TypeName) -> list[ir.TypeName]:
+        references = derive.references(model.interfaces[name])
+        return [target for target in references if catalog.is_standard(target.package)]
+
+    own = {interface.name for interface in model.own}
+    return derive.closure(own, targets) - own
+
+
+def _all(library: Library, other: Distro) -> set[ir.TypeName]:
+    """Return the standard interfaces of the local library and another distribution."""
+    names = {name for name in library.packages() if catalog.is_standard(name)}
+    return {
+        *catalog.interfaces(other),
+        *(interface for name in names for interface in library.interfaces(name)),
+    }
+
+
+def _of_packages(
+    names: Iterable[ir.TypeName], library: Library, other_library: Library, other: Distro
+) -> Iterator[Comparison]:
+    """Yield the differences in standard interfaces, package by package."""
+    for package, group in groupby(sorted(names), lambda name: name.package):
+        mine = list(group)
+        old = [(name, source) for name in mine if (source := catalog.source(name, other))]
+        new = [(name, source) for name in mine if (source := library.source(name))]
+        comparison = compare(
+            compile_package(package, old, other_library, Report()).only(mine),
+            compile_package(package, new, library, Report()).only(mine),
+        )
+        # the hints are for authors of interfaces, not for users of ROS 2
+        yield comparison._replace(
+            changes=tuple(change._replace(hint=None) for change in comparison.changes)
+        )

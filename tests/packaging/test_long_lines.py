@@ -1,0 +1,81 @@
+"""Edits of setup.py wrap the lines that they make too long, and change nothing else."""
+
+import ast
+
+import pytest
+
+from idlc.cli.main import main
+from idlc.packaging.setup_edits import wrap_lines
+
+LONG = ", ".join(f"'name_{n} = demo.module_{n}:main'" for n in range(6))
+LINES = {
+    "a list": f"scripts = [{LONG}]\n",
+    "a list in a call": f"setup(\n    name='demo',\n    scripts=[{LONG}],  # all\n)\n",
+    "a whole call": f"setup(name='demo', entry_points={{'console_scripts': [{LONG}]}})\n",
+    "a tuple": f"if True:\n\tx = ({LONG})\n",
+    "a spread": f"setup(*[{LONG}], **{{'a': 1}}, y=lambda: 1, **{{**x, 'b': [{LONG}]}})\n",
+    "parentheses": f"x = [('a' 'b'), (yes if no else {LONG!r}), ((1, 2)), {LONG}]\n",
+    "carriage returns": f"x = [{LONG}]\r\ny = 1\r\n",
+    "letters": f"x = ['ä€😀', {LONG}]; y = [{LONG}]\n",
+    "a mark": f"\ufeffx = [{LONG}]\n",
+}
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_long_lists_are_wrapped(name):
+    text = LINES[name]
+    new = wrap_lines("", text)
+    bare = [one.removeprefix("\ufeff") for one in (text, new)]
+    assert ast.dump(ast.parse(bare[0])) == ast.dump(ast.parse(bare[1]))
+    assert new.count("#") == text.count("#")
+    assert ("\r\n" in text) == ("\r\n" in new)
+    assert new.replace("\r\n", "\n").count("\r") == 0
+    if name != "parentheses":
+        assert all(len(line) <= 99 for line in new.splitlines())
+    assert wrap_lines("", new) == new
+
+
+@pytest.mark.parametrize(
+    "text", [f"x = f(y for y in [{'1' * 99}])\n", f"x = '{'1' * 99}'\n", f"x = [{LONG}\n", "", "\f"]
+)
+def test_what_cannot_be_wrapped_stays(text):
+    new = wrap_lines("", text)
+    assert new == text or ast.dump(ast.parse(new)) == ast.dump(ast.parse(text))
+
+
+@pytest.mark.parametrize("depth", [500, 3000, 100_000])
+def test_deep_code_stays_or_is_wrapped(depth):
+    """Python compares as deep as its recursion limit allows, which libraries may have raised."""
+    text = f"x = [{'1+' * depth}1]\n"
+    new = wrap_lines("", text)
+    assert new in (text, f"x = [\n    {'1+' * depth}1,\n]\n")
+
+
+@pytest.mark.parametrize("text", LINES.values())
+def test_lines_of_the_user_stay(text):
+    assert wrap_lines(text, f"import os\n{text}") == f"import os\n{text}"
+
+
+@pytest.mark.parametrize("command", ["check", "node"])
+def test_commands_write_no_long_lines(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo"]) == 0
+    setup = tmp_path / "demo/setup.py"
+    marker = "('share/ament_index/resource_index/packages', ['resource/demo'])"
+    setup.write_text(
+        f"from setuptools import setup\n\nsetup(\n    name='demo',\n    packages=['demo'],\n"
+        f"    data_files=[{marker}],\n    entry_points={{'console_scripts': ["
+        "'first = demo.first:main']},\n)\n"
+    )
+    monkeypatch.chdir("demo")
+    if command == "check":
+        (tmp_path / "demo/msg").mkdir()
+        (tmp_path / "demo/msg/Drive.msg").write_text("bool a\n")
+        main(["check", "--fix", "."])
+        assert "share/demo/msg" in setup.read_text()
+    else:
+        name = "a_node_with_a_name_that_is_long"
+        assert main(["scaffold", "node", name, "--publisher", "std_msgs/String:chatter"]) == 0
+        assert name in setup.read_text()
+    assert all(len(line) <= 99 for line in setup.read_text().splitlines())
+    ast.parse(setup.read_text())
