@@ -11,7 +11,6 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
 from idlc.model.link import Model, own_fields
-from idlc.packaging.dependencies import addition
 from idlc.packaging.facts import Facts
 from idlc.version import RUNTIME
 
@@ -167,5 +166,7 @@ def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
 
 def _additions(facts: Facts, *elements: tuple[str, str]) -> tuple[Edit, ...]:
     """Return the edits that add elements to package.xml, each after similar ones."""
+    from idlc.packaging.dependencies import addition
+
     edits = (addition(facts.manifest, facts.statements, tag, text) for tag, text in elements)
     return tuple(edit for added in edits for edit in added)

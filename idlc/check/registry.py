@@ -1,4 +1,4 @@
-"""Every rule: a function that yields the problems of a model, or of the package around it."""
+"""The rules that only `idlc check` asks, about a model or the package around it."""
 
 from __future__ import annotations
 

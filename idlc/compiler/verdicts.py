@@ -12,8 +12,6 @@ from idlc.model import ir
 from idlc.model.link import Model, dependents
 
 Rule: TypeAlias = Callable[[Model], Iterable[Diagnostic]]
-
-
 Findings: TypeAlias = dict[ir.TypeName, tuple[Diagnostic, ...]]
 
 
@@ -46,8 +44,6 @@ _OF_PACKAGES = (
     name_rules.unique_modules,
     name_rules.reserved_package_name,
 )
-
-
 _VERDICTS = (
     name_rules.interface_names,
     name_rules.unique_names,

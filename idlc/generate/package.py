@@ -12,7 +12,7 @@ from idlc.compiler.compiler import derived_names, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.generate.target import Target
-from idlc.generate.up_to_date import dependencies
+from idlc.generate.up_to_date import dependencies, unchanged
 from idlc.model import derive, ir
 from idlc.model.distros import Distro
 from idlc.model.link import Model
@@ -147,13 +147,13 @@ def up_to_date(
     target: Target, digests: dict[str, str], library: Library, vendoring: lock.Vendoring
 ) -> tuple[Generated, ...]:
     """Return the packages if a run would change nothing; empty otherwise."""
-    if not target.unchanged(digests, library, vendoring) or target.lock is None:
+    if not unchanged(target, digests, library, vendoring) or target.lock is None:
         return ()
     folders = [target]
     for package in target.lock.vendored:
         folders.append(target.beside(package))
         names = library.interfaces(package)
-        if not folders[-1].unchanged(as_inputs(names, library), library):
+        if not unchanged(folders[-1], as_inputs(names, library), library):
             return ()
     return tuple(_outcome(folder, folder.lock) for folder in folders if folder.lock)
 

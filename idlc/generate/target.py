@@ -13,28 +13,19 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.up_to_date import (
-    _carries_this_runtime,
-    _dependency,
-    _newest_maker,
-    _outputs_stand,
-)
 from idlc.model.link import Model
 from idlc.project import inputs, prefixes, write
 from idlc.project.files import is_file, is_folder
-from idlc.project.library import Library
 from idlc.project.lock import (
     FILE,
     Lock,
     Runtime,
-    Vendoring,
     digest,
     encode,
     load_lock,
 )
 from idlc.project.root import Root
 from idlc.project.write import Change, Plan, plan
-from idlc.version import __version__
 
 
 def folder_targets(
@@ -129,32 +120,6 @@ class Target:
                 self.report.add(codes.CANNOT_WRITE.of(self.name, message))
                 return False
         return False
-
-    def unchanged(
-        self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
-    ) -> bool:
-        """Return whether compiling the inputs would change nothing.
-
-        `inputs` are the digests of the input files by name within the package. In a prefix they
-        do not show it: libraries depend on the installed distribution, too.
-        """
-        lock = None if self.home else self.lock
-        is_unchanged = (
-            lock is not None
-            and (lock.idlc, lock.package) == (__version__, self.package)
-            and lock.runtime == self.runtime
-            and lock.enums == self.enums
-            and lock.vendors_as(vendoring)
-            and bool(lock.converts_values) == library.distro.converts_values
-            and lock.inputs == inputs
-            and _outputs_stand(self.path, lock)
-            and _carries_this_runtime(lock)
-            and _newest_maker() <= (self.path / FILE).stat().st_mtime_ns
-            and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
-        )
-        if is_unchanged:
-            write.sweep(self.path)
-        return is_unchanged
 
     def missing(self) -> list[str]:
         """Return the packages that the generated code needs and this Python cannot import."""

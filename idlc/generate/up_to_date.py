@@ -2,26 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 
+from idlc.generate.target import Target
 from idlc.model.ir import TypeName
+from idlc.project import write
 from idlc.project.library import Library
-from idlc.project.lock import Lock, Tree, digest, meaning
+from idlc.project.lock import FILE, Lock, Tree, Vendoring, digest, meaning
+from idlc.version import __version__
 
 _PACKAGE = Path(__file__).parents[1]
-
-
 #: The sources of idlc that affect the output: a change counts although the version stays.
-_ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
-
-
+_ROOMS = (
+    *("compiler", "diagnostics", "generate", "language", "model"),
+    *("project", "runtime", "tasks", "wire"),
+)
 _MAKERS = (
     *(_PACKAGE / room for room in _ROOMS),
     _PACKAGE / "templates",
     _PACKAGE.parent / "templates",
 )
+
+
+def unchanged(
+    target: Target, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
+) -> bool:
+    """Return whether compiling the inputs would change nothing in a package's folder.
+
+    `inputs` are the digests of the input files by name within the package. In a prefix they
+    do not show it: libraries depend on the installed distribution, too.
+    """
+    lock = None if target.home else target.lock
+    is_unchanged = (
+        lock is not None
+        and (lock.idlc, lock.package) == (__version__, target.package)
+        and lock.runtime == target.runtime
+        and lock.enums == target.enums
+        and lock.vendors_as(vendoring)
+        and bool(lock.converts_values) == library.distro.converts_values
+        and lock.inputs == inputs
+        and _outputs_stand(target.path, lock)
+        and _carries_this_runtime(lock)
+        and _newest_maker() <= (target.path / FILE).stat().st_mtime_ns
+        and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
+    )
+    if is_unchanged:
+        write.sweep(target.path)
+    return is_unchanged
 
 
 def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:

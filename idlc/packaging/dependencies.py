@@ -12,28 +12,16 @@ from idlc.project.package_xml import NOT_XML, Manifest, Statement, read, stateme
 
 #: The elements of a package.xml in the order of the schema: dependencies come after the head.
 HEAD = ("name", "version", "description", "maintainer", "license", "url", "author")
-
-
 DEPENDENCIES = (
     *("build_depend", "build_export_depend", "buildtool_depend", "buildtool_export_depend"),
     *("exec_depend", "run_depend", "depend", "doc_depend", "test_depend"),
     *("conflict", "replace", "group_depend", "member_of_group"),
 )
-
-
 RANK = {tag: at for at, tag in enumerate((*HEAD, *DEPENDENCIES))}
-
-
 _BLANK_LINE = re.compile(r"[^\S\n]*\n[^\S\n]*\n")
-
-
 #: Tags that make a package available when a node runs.
 AT_RUN_TIME = frozenset({"depend", "exec_depend", "run_depend"})
-
-
 AT_TEST_TIME = AT_RUN_TIME | {"test_depend"}
-
-
 GROUP = "rosidl_interface_packages"
 
 

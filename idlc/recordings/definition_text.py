@@ -18,3 +18,11 @@ def mcap(interface: ir.Interface, model: Model) -> str:
         text += f"{line_end}{MCAP_LINE}\nMSG: {name.package}/{name.name}\n"
         text += file_text(model.interfaces[name])
     return text if not text or text.endswith("\n") else f"{text}\n"
+
+
+def definition_text(interface: ir.Interface, model: Model) -> str:
+    """Return the text that a recorder writes: an interface's file, and those it refers to."""
+    text = mcap(interface, model)
+    if isinstance(interface, ir.Message):
+        return text
+    return f"{MCAP_LINE}\n{interface.name.kind.upper()}: {interface.name}\n{text}"

@@ -12,20 +12,12 @@ from typing import Any
 from idlc.recordings.containers.source import RecordingError
 
 SECOND = 10**9
-
-
 #: A plain number below this counts seconds from the start of the recording, one above is a time of
 #: ROS, in seconds; from the second on, in nanoseconds.
 LEAST_TIME = 10**9
-
-
 LEAST_NANOSECONDS = 10**17
-
-
 #: No recording needs more.
 MOST_DIGITS = 20
-
-
 #: Seconds of each unit that is always as long, as numpy calls them.
 UNITS = {
     "W": Fraction(604800),
@@ -34,26 +26,12 @@ UNITS = {
     "m": Fraction(60),
     **{unit: Fraction(1, 1000**n) for n, unit in enumerate("s ms us ns ps fs as".split())},
 }
-
-
 NUMBER = rf"\d{{1,{MOST_DIGITS}}}(?:\.\d{{0,{MOST_DIGITS}}})?"
-
-
 _NUMBER = re.compile(NUMBER, re.ASCII)
-
-
 _LENGTH = re.compile(rf"(?:{NUMBER}[hms])+", re.ASCII)
-
-
 _PART = re.compile(rf"({NUMBER})([hms])", re.ASCII)
-
-
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
-
-
 _FRACTION = re.compile(r"(T\d\d:\d\d:\d\d|\s\d\d:\d\d:\d\d)\.(\d{1,9})")
-
-
 HINT = "write `10`, `1m30s`, a ROS time such as `1700000000.5`, or a UTC date"
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.generate import target, up_to_date
+from idlc.generate import up_to_date
 from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.tasks.gen import GenOptions, gen
 
-PACKAGE = Path(target.__file__).parents[1]
+PACKAGE = Path(up_to_date.__file__).parents[1]
 MAKERS = [path for path in up_to_date._MAKERS if path.is_dir()]
 FOLDERS = [
     folder.relative_to(maker.parent)
@@ -32,7 +32,7 @@ def test_the_rooms_that_count_exist():
 def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
     for maker in MAKERS:
         shutil.copytree(maker, tmp_path / maker.name, dirs_exist_ok=True)
-    monkeypatch.setattr(target, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
+    monkeypatch.setattr(up_to_date, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
     up_to_date._newest_maker.cache_clear()
     before = up_to_date._newest_maker()
     file = next(path for path in (tmp_path / folder).iterdir() if path.is_file())

@@ -26,7 +26,7 @@ from idlc.project.settings import Scope
 from idlc.recordings.containers.conversion import Conversion
 from idlc.recordings.containers.file import MSG
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definition_text import MCAP_LINE, mcap
+from idlc.recordings.definition_text import definition_text
 from idlc.recordings.definitions import interface_of
 from idlc.recordings.types import (
     DefinedTopic,
@@ -283,11 +283,7 @@ def definition_of(version: Version) -> str:
     """Return the text that a recorder writes for a type: its file, and those that it refers to."""
     model = version.models[version.name.package]
     interface = model.interfaces[interface_of(version.name)]
-    text = mcap(interface, model)
-    if isinstance(interface, ir.Message):
-        return text
-    kind = interface.name.kind.upper()
-    return f"{MCAP_LINE}\n{kind}: {interface.name}\n{text}"
+    return definition_text(interface, model)
 
 
 def _write(
