@@ -43,15 +43,16 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=80, help="how many mistakes to make")
     parser.add_argument("--seed", type=int, default=1, help="which mistakes to make")
     parser.add_argument("--jobs", type=int, default=2, help="how many to try at a time")
-    parser.add_argument("--record", action="store_true", help="record again which lines tests run")
     options = parser.parse_args()
     lines = FOLDER / "lines"
     clones = [clone(number) for number in range(options.jobs)]
-    if options.record or not (lines / "tests.json").exists():
+    commit = lines / "commit"
+    if not commit.exists() or commit.read_text(encoding="ascii") != head():
         record(clones[0], lines, options.jobs)
+        commit.write_text(head(), encoding="ascii")
     recorded = Lines(lines, clones[0])
     tests = json.loads((lines / "tests.json").read_text(encoding="ascii"))
-    chosen = choose(ROOT, recorded.executed, options.number, options.seed)
+    chosen = choose(clones[0], recorded.executed, options.number, options.seed)
     outcomes = list(run(chosen, recorded, tests, clones))
     print(report(outcomes, Costs.read(TABLE)))
     return 0
@@ -60,15 +61,19 @@ def main() -> int:
 def clone(number: int) -> Path:
     """Return a clone of the last commit with an environment, in which mistakes are made."""
     folder = FOLDER / f"clone-{number}"
-    shutil.rmtree(folder / "idlc", ignore_errors=True)
     if not folder.exists():
         git("clone", "--quiet", "--shared", str(ROOT), str(folder))
-    commit = git("rev-parse", "HEAD").strip()
     git("-C", str(folder), "fetch", "--quiet", "origin")
-    git("-C", str(folder), "checkout", "--quiet", "--force", "--detach", commit)
+    git("-C", str(folder), "checkout", "--quiet", "--force", "--detach", head())
     make = ["make", "-C", str(folder), "--no-print-directory", "environment"]
     subprocess.run(make, check=True)
+    subprocess.run([python(folder), "-m", "pip", "install", "--quiet", "coverage"], check=True)
     return folder
+
+
+def head() -> str:
+    """Return the commit whose tests are tried: what is not committed is left out."""
+    return git("rev-parse", "HEAD").strip()
 
 
 def git(*words: str) -> str:
