@@ -103,9 +103,9 @@ test-long: $(TEST_ENV)/installed ## run the tests that take long, and random one
 
 costs: $(TEST_ENV)/installed ## measure all tests, and write those that are not quick into tests/costs.tsv
 	rm -rf build/costs
-	-$(PYTEST) --costs build/costs/first $(ARGS)
+	-$(PYTEST) --costs=build/costs/first $(ARGS)
 	$(TEST_ENV)/bin/python -m tests.support.costs build/costs/first --repeat build/costs/again.json
-	-$(PYTEST) --costs build/costs/second --only build/costs/again.json $(ARGS)
+	-$(PYTEST) --costs=build/costs/second --only=build/costs/again.json $(ARGS)
 	$(TEST_ENV)/bin/python -m tests.support.costs build/costs/first build/costs/second
 
 mutants: $(TEST_ENV)/installed ## make N small mistakes in idlc, chosen by SEED, and see which tests notice them

@@ -88,7 +88,7 @@ HANGS = [sys.executable, "-c", "import time; time.sleep(30)"]
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(waiting, "LIMIT", 0.1)
+    monkeypatch.setattr(waiting, "PROGRAM", 0.1)
 
 
 def test_a_program_that_hangs_is_named(impatient):
@@ -104,7 +104,7 @@ def test_a_program_that_hangs_is_named(impatient):
 def test_programs_that_install_and_build_have_more_time():
     assert waiting.limit_of([sys.executable, "-m", "pip", "install", "x"]) == waiting.WORK
     assert waiting.limit_of("cmake -P script.cmake") == waiting.WORK
-    assert waiting.limit_of([sys.executable, "-m", "idlc", "gen", "pipe"]) == waiting.LIMIT
+    assert waiting.limit_of([sys.executable, "-m", "idlc", "gen", "pipe"]) == waiting.PROGRAM
 
 
 def test_a_wait_in_vain_shows_its_condition():

@@ -11,6 +11,8 @@ from typing import Any
 
 #: Seconds that a test waits for one thing, on a busy machine too.
 LIMIT = 30
+#: Seconds for programs: they compute, and share the processors with other tests.
+PROGRAM = 90
 #: Seconds for programs that work for long: these install, build, check or test whole packages, or
 #: show many pages.
 WORK = 240
@@ -85,7 +87,7 @@ def limit_of(command: Any) -> int:
     is_word = isinstance(command, str | os.PathLike)
     words = [str(command)] if is_word else map(str, command)
     names = {Path(word).name for text in words for word in text.split()}
-    return WORK if names & _WORKING else LIMIT
+    return WORK if names & _WORKING else PROGRAM
 
 
 def _text(condition: Callable[[], Any]) -> str:
