@@ -10,7 +10,7 @@
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
 #   LOCKED=yes          install what maintenance/requirements/ names and no other, as CI does on Linux x86-64
-#   JOBS=4              how many tests run at a time
+#   JOBS=6              how many tests run at a time
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2              where `make fuzz` searches, and which mistakes `make mutants` makes
 #   FUZZ=30             how many times as many inputs as `make test-long` does `make fuzz` try
@@ -22,7 +22,7 @@ BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/de
 EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
-JOBS ?= 4
+JOBS ?= 6
 ARGS ?=
 FUZZ ?= 30
 SEED ?= 2
