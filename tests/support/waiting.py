@@ -13,12 +13,13 @@ from typing import Any
 LIMIT = 30
 #: Seconds for programs: they compute, and share the processors with other tests.
 PROGRAM = 90
-#: Seconds for programs that work for long: these install, build, check or test whole packages, or
-#: show many pages.
+#: Seconds for programs that work for long: these install, build, check or test whole packages,
+#: show many pages, or exchange all messages of ROS 2 with rosidl.
 WORK = 240
 _WORKING = frozenset(
-    "basedpyright benchmarks build cmake colcon emacs make maintenance.release mypy npm nvim pip"
-    " pre-commit pytest qemu-aarch64 uv valgrind venv".split()
+    "basedpyright benchmarks build cmake colcon drop_in_side.py emacs make maintenance.release mypy"
+    " npm nvim one_side.py pip pre-commit pytest qemu-aarch64 rosidl_side.py uv valgrind"
+    " venv".split()
 )
 _wait = subprocess.Popen.wait
 _communicate = subprocess.Popen.communicate
