@@ -11,6 +11,7 @@
 #   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
 #   LOCKED=yes          install what maintenance/requirements/ names and no other, as CI does on Linux x86-64
 #   JOBS=6              how many tests run at a time
+#   TIER=quick          which tests `make test`, test-all and test-lowest run (quick or test)
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2              where `make fuzz` searches, and which mistakes `make mutants` makes
 #   FUZZ=30             how many times as many inputs as `make test-long` does `make fuzz` try
@@ -23,6 +24,7 @@ EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
 JOBS ?= 6
+TIER ?= test
 ARGS ?=
 FUZZ ?= 30
 SEED ?= 2
@@ -96,7 +98,7 @@ endif
 ifeq ($(EDITORS),no)
 	@echo 'without Neovim and Emacs of Debian: tests/editors/test_debian.py is left out'
 endif
-	$(PYTEST) --tier test $(SELECTION) $(ARGS)
+	$(PYTEST) --tier $(TIER) $(SELECTION) $(ARGS)
 
 test-long: $(TEST_ENV)/installed ## run the tests that take long, and random ones with more inputs
 	$(PYTEST) --tier long $(SELECTION) $(ARGS)
@@ -113,7 +115,7 @@ mutants: $(TEST_ENV)/installed ## make N small mistakes in idlc, chosen by SEED,
 	$(TEST_ENV)/bin/python -m maintenance.mutants --number $(N) --seed $(SEED) $(ARGS)
 
 test-bare: ## run the commands of the README on a bare Debian: as root and a user, with gcc and without
-	sh tests/repository/bare.sh $(WAYS)
+	BARE_ARGS="$(ARGS)" sh tests/repository/bare.sh $(WAYS)
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
 	$(KILTED_ENV)/bin/python -m pytest $(PARALLEL) -m 'not jazzy' tests/ros $(ARGS)
@@ -126,7 +128,7 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest $(PARALLEL) --tier test $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
+	$(LOWEST_ENV)/bin/python -m pytest $(PARALLEL) --tier $(TIER) $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
 	    $(WITHOUT_EDITORS) $(ARGS)
 
 vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)

@@ -2,6 +2,8 @@
 # Run `make install`, `make demo` and `make test` of this commit in a folder that holds a bare Debian 12:
 # its minimal system, python3-venv, make and git, and for the ways that say so gcc.
 #
+# BARE_ARGS has more words for pytest.
+#
 #   bare.sh [root] [root-gcc] [user] [user-gcc]     the ways to try; without words, all four
 #
 # Needs root, debootstrap and a package index. The clone of root lies in its home, which nobody else may
@@ -14,6 +16,7 @@ cd "$(dirname "$0")/../.."
     exit 2
 }
 umask 022
+: "${BARE_ARGS:=}"
 work=$PWD/build/bare
 mkdir -p "$work/packages"
 
@@ -34,7 +37,7 @@ if [ "${BARE_ROOT:-}" ]; then
     if [ "$BARE_STEP" = test ]; then
         python3 -c 'import fcntl, socket, struct
 fcntl.ioctl(socket.socket(), 0x8914, struct.pack("16sh22x", b"lo", 0x1 | 0x40 | 0x1000))' # up, running, multicast
-        inside 'make demo && make test'
+        inside "make demo && make test ARGS='$BARE_ARGS'"
     else
         inside 'make install'
     fi

@@ -31,7 +31,7 @@ LEFT_OUT = {
 
 def named(code: str) -> set[str]:
     """Return the targets that commands of a shell make."""
-    calls = re.findall(r"(?:^|(?<=[ '$]))make ([^&|;#`'\n]*)", code, re.MULTILINE)
+    calls = re.findall(r"(?:^|(?<=[ '\x22$]))make ([^&|;#`'\n]*)", code, re.MULTILINE)
     return {
         word
         for words in calls
