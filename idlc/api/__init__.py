@@ -1,1 +1,1 @@
-"""What programs get from `import idlc` to read recordings and convert messages."""
+"""The part of `import idlc` that reads recordings and converts messages."""

@@ -1,4 +1,4 @@
-"""Whether a generated package is what a run would write."""
+"""Compares a generated package with the one that a run would write."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ HANG = 120
 
 
 class Outcome(NamedTuple):
-    """What the tests made of a mistake: the test that failed, or None, and how many ran."""
+    """The result for a mistake: the test that failed, or None, and how many ran."""
 
     mutation: Mutation
     test: str | None

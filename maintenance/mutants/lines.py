@@ -18,7 +18,7 @@ def key(test: str) -> str:
 
 
 class Lines:
-    """What `--lines FOLDER` recorded."""
+    """The record that `--lines FOLDER` wrote."""
 
     def __init__(self, folder: Path, root: Path) -> None:
         #: for each file of idlc and each context, a number with a bit for each executed line

@@ -36,7 +36,7 @@ disable_warnings =
 
 
 class Recorder:
-    """What pytest calls while tests run, in each worker."""
+    """Hooks that pytest calls while tests run, in each worker."""
 
     def __init__(self, folder: Path, root: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)

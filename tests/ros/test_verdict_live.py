@@ -71,5 +71,10 @@ def test_rosidl_and_idlc_agree_on_invented_files(family, part, tmp_path):
             text = rosidl_view.text_of(case)
             assert idl_view.read(outcome["idl"], name) == idl_view.read(text, name), text
     assert disagreements == []
-    accepted = sum(outcome["stage"] is None for outcome in outcomes)
-    assert 0 < accepted < len(cases), "too one-sided to show much"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_invented_files_are_not_too_one_sided_to_show_much(family):
+    """A part has too few files to tell; rosidl agrees with idlc on each of them."""
+    verdicts = [rosidl_view.view(case)["build_verdict"] for case in FAMILIES[family]()]
+    assert len(verdicts) * 0.2 < verdicts.count("accept") < len(verdicts) * 0.8
