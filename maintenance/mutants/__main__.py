@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -141,6 +142,8 @@ def try_mutation(folder: Path, mutation: Mutation, tests: list[str], costs: Cost
                 break
     finally:
         write(path, source)
+    if failed and first_failure(folder, [failed]):
+        sys.exit(f"{failed} fails without a mistake, too")
     return Outcome(mutation, failed, ran, time.monotonic() - started)
 
 
@@ -169,9 +172,10 @@ def first_failure(folder: Path, tests: list[str]) -> str | None:
     )
     if done.returncode in (0, 5):
         return None
-    lines = done.stdout.splitlines()
-    failed = [line for line in lines if line.startswith(("FAILED ", "ERROR "))]
-    return failed[0].split(" - ")[0].partition(" ")[2] if failed else "(pytest ended)"
+    # a module that cannot be imported is named without a test, and a crash names none
+    lines = re.findall(r"(?m)^(?:FAILED|ERROR) (.*)", done.stdout)
+    named = (test for line in lines for test in tests if f"{line} - ".startswith(f"{test} - "))
+    return next(named, tests[0])
 
 
 def row(outcome: Outcome, costs: Costs) -> str:
