@@ -318,8 +318,8 @@ def _resolved(endpoint: roles.Endpoint, node: str) -> str:
 
 
 def test_packages(planned: Plan) -> list[str]:
-    """Return the packages that the test needs besides those of the node."""
-    packages = {module.partition(".")[0] for module in _tested(planned)[1]}
+    """Return the packages that the test and its conftest.py need besides those of the node."""
+    packages = {module.partition(".")[0] for module in _tested(planned)[1]} | {"rcl_interfaces"}
     others = packages - sys.stdlib_module_names - {*planned.packages, planned.node.package}
     return ["python3-pytest", *sorted(others)]
 

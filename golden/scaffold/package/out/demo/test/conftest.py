@@ -12,6 +12,7 @@ import sys
 import time
 
 import pytest
+from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.node import Node
 
@@ -58,6 +59,12 @@ class Running:
             if time.monotonic() > deadline:
                 pytest.fail(f'{why}; it printed:\n{self.output}')
             rclpy.spin_once(self._observer, timeout_sec=0.05)
+
+    def until_it_spins(self, name: str) -> None:
+        """Spin the observer until the node answers; a signal would break its imports before."""
+        client = self._observer.create_client(GetParameters, f'{name}/get_parameters')
+        self.until(client.service_is_ready)
+        self.until(client.call_async(GetParameters.Request()).done)
 
     def leave(self) -> None:
         """Terminate the node; others would see a killed node for some time."""
