@@ -99,6 +99,12 @@ def pytest_terminal_summary(terminalreporter, config):
                 terminalreporter.write_line(f"{report.nodeid}: {value}")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def nested_folders(tmp_path_factory):
+    """Keep pytest, where a test starts it, from removing the folders of all earlier runs."""
+    os.environ["PYTEST_DEBUG_TEMPROOT"] = str(tmp_path_factory.mktemp("nested"))
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """The working folder, which is empty."""

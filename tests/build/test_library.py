@@ -406,9 +406,10 @@ setup(name="other")
 
 def test_builds_of_others_work_where_pth_files_are_not_run(tmp_path):
     """An editable idlc on PYTHONPATH is found by its entry points alone."""
-    folder = str(metadata.distribution("idlc").locate_file(""))
+    installed = [metadata.distribution(name) for name in ("idlc", "setuptools")]
+    path = os.pathsep.join(str(distribution.locate_file("")) for distribution in installed)
     words = ["-S", "-c", ENTRY_POINTS, "--name"]
-    assert programs.run_with(sys.executable, *words, cwd=tmp_path, PYTHONPATH=folder) == "other\n"
+    assert programs.run_with(sys.executable, *words, cwd=tmp_path, PYTHONPATH=path) == "other\n"
 
 
 @pytest.mark.parametrize("text", ["[tool.idlc]\n[", "\xff", "tool.idlc" * 10**5, "[tool.idlc]\n"])

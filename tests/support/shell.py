@@ -14,7 +14,8 @@ from tests.support.paths import ROOT
 KEPT = re.compile(
     r"PATH|HOME|USER|LOGNAME|SHELL|TMPDIR"  # where programs and files are
     r"|(PIP|UV|NPM)_.*|.*_PROXY|.*_CERTS?(_.*)?|.*_CA_BUNDLE"  # how packages are installed
-    r"|_ROS_WHEELS_.*|LD_LIBRARY_PATH|COVERAGE_.*|PYTEST_XDIST_.*"  # how this process was started
+    r"|_ROS_WHEELS_.*|LD_LIBRARY_PATH|COVERAGE_.*"  # how this process was started
+    r"|PYTEST_(XDIST_.*|DEBUG_TEMPROOT)"
     r"|IDLC_(?!DEBUG).*|CYDR_CACHE_DIR|NODE|SEED|TOOLS",  # how `make` and users choose tests
     re.IGNORECASE,
 )
