@@ -65,6 +65,7 @@ def check_setup(
     report.extend(_missing_interfaces(mine, keys))
     report.extend(setup_edits.unusable_entry(read, package))
     view = layout(read, *(others or (None, None)), folders)
+    report.extend(setup_edits.unnoticed_changes(read, view.folder(package) if view else package))
     if view and (others or "packages" in read.arguments):
         report.extend(_missing_packages(mine, view))
     return report
@@ -81,7 +82,13 @@ def installed(facts: Facts, model: Model) -> Iterator[Diagnostic]:
         names = sorted(interface.name.file for interface in model.own)
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
-        yield from check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
+        for problem in check_setup(
+            setup.source, facts.name, keys, facts.folders, others, facts.runtime
+        ):
+            # the next `idlc gen` writes the file that setup.py should run
+            is_early = problem.code == codes.STALE_GENERATED_CODE.id and not facts.has_build_step
+            if not is_early:
+                yield problem
     elif setup is not None and (view := _layout(facts, setup)):
         yield from _absent_folders(_Package(setup, facts.name, (), facts.folders), view)
 

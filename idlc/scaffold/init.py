@@ -368,7 +368,10 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
             outcome = Refused(why, f"{KEYWORD}=True,", "to the arguments of each")
         if setup.call is not None:
             edits = append_element(setup.source, setup.call, f"{KEYWORD}=True")
-            outcome = Edited(apply(text, edits)[0])
+            edited = Source(SETUP, apply(text, edits)[0])
+            again = check_setup(edited, name, files, existing, others)
+            steps = (edit for problem in again for edit in problem.edits)
+            outcome = Edited(apply(edited.text, steps)[0])
     draft.put(SETUP, outcome, "builds compile the interfaces and install their classes")
     report.extend(problem for problem in problems if not problem.edits)
     view = layout(setup, *others, existing)
