@@ -65,9 +65,9 @@ def check_setup(
     report.extend(_missing_interfaces(mine, keys))
     report.extend(setup_edits.unusable_entry(read, package))
     view = layout(read, *(others or (None, None)), folders)
-    report.extend(setup_edits.unnoticed_changes(read, view.folder(package) if view else package))
     if view and (others or "packages" in read.arguments):
         report.extend(_missing_packages(mine, view))
+    report.extend(setup_edits.unnoticed_changes(read, view.folder(package) if view else package))
     return report
 
 

@@ -1,10 +1,7 @@
 """What setup(idlc_interfaces=True) installs and distributes, whatever `data_files` lists."""
 
-import importlib.util
 import sys
 import tarfile
-import venv
-from pathlib import Path
 
 import pytest
 
@@ -135,26 +132,6 @@ def test_a_keyword_compiles_and_installs_classes_that_are_new(package, tmp_path)
     built_by_keyword(sys.executable, package, tmp_path / "prefix", ROS_DISTRO="jazzy")
     assert (tmp_path / "prefix/site/demo/msg/_drive.py").is_file()
     assert (tmp_path / "prefix/share/demo/msg/Drive.json").is_file()
-
-
-def test_a_build_without_idlc_installs_what_was_committed(package, tmp_path):
-    (package / "demo/msg").mkdir()
-    (package / "demo/msg/__init__.py").write_text("# as it was committed\n")
-    environment = tmp_path / "venv"
-    venv.create(environment)
-    setuptools = Path(importlib.util.find_spec("setuptools").origin).parents[1]
-    borrowed = tmp_path / "borrowed"
-    borrowed.mkdir()
-    for pattern in ("setuptools*", "pkg_resources", "_distutils_hack"):
-        for path in setuptools.glob(pattern):
-            (borrowed / path.name).symlink_to(path)
-    python, prefix = environment / "bin/python", tmp_path / "prefix"
-    said = built_by_keyword(python, package, prefix, PYTHONPATH=str(borrowed))
-    assert "idlc_interfaces" in said
-    classes = prefix / "site/demo/msg/__init__.py"
-    assert classes.read_text() == "# as it was committed\n"
-    assert (prefix / INDEX / "packages/demo").is_file()
-    assert not (prefix / "share/demo").exists()
 
 
 def test_packages_need_not_name_what_a_package_comes_with(package, tmp_path):

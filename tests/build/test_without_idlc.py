@@ -73,8 +73,8 @@ OUTDATED = {
         "Ask.srv` changed",
     ),
     "deleted": (lambda: Path("msg/Stop.msg").unlink(), "`msg/Stop.msg` was removed"),
-    "renamed": (lambda: rename("msg/Stop.msg", "msg/Halt.msg"), "`msg/Halt.msg` was added"),
-    "added": (lambda: write_all({"action/Go.action": "---\n---\n"}), "`action/Go.action` was added"),
+    "renamed": (lambda: rename("msg/Stop.msg", "msg/Halt.msg"), "`msg/Stop.msg` was removed"),
+    "added": (lambda: write_all({"action/Go.action": "---\n---\n"}), "Go.action` was added"),
     "moved and edited": (
         lambda: write_all({"msg/more/Stop.msg": "bool soon\n", "msg/Stop.msg": "bool soon\n"}),
         "`msg/Stop.msg` changed",
@@ -127,7 +127,7 @@ def test_a_build_installs_current_classes(change, package):
     assert Path("build/lib/demo/msg/_drive.py").is_file()
 
 
-def test_what_is_gone_is_not_built_again(package, monkeypatch):
+def test_what_is_gone_is_not_built_again(package):
     assert build(package)[0] == 0
     assert Path("build/lib/demo/srv/_ask.py").is_file()
     Path("build/lib/demo/of_users.py").write_text("")
