@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import NamedTuple
 
+from idlc.check.outputs import outdated
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
+from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated
 from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
 from idlc.packaging import setup_edits
@@ -311,17 +311,7 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
 def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """Generated code in the package matches the current interfaces."""
     for output in facts.outputs:
-        if output.package != facts.name or not facts.whole:
-            continue
-        changed = []
-        for name in sorted(output.inputs.keys() | facts.inputs.keys()):
-            before, now = output.inputs.get(name), facts.inputs.get(name)
-            if before != now:
-                what = "was added" if before is None else "changed" if now else "was removed"
-                changed.append(f"`{name}` {what}")
-        if changed:
+        if output.package == facts.name and facts.whole:
             folder = facts.manifest.path.rpartition("/")[0] or "."
             words = ("gen", folder, "-o", output.path.rpartition("/")[0])
-            message = f"the generated code is out of date: {first_few(changed, 3)}"
-            hint = f"run `idlc {shlex.join(words)}`"
-            yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
+            yield from outdated(output.path, output.inputs, facts.inputs, words)
