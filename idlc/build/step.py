@@ -80,8 +80,8 @@ def _added(
     project: Path, inputs: Mapping[str, str], files: Mapping[str, list[Path]]
 ) -> Iterator[str]:
     """Yield interfaces that have no classes, in the folders of those that have some."""
-    if _may_exclude(project / "pyproject.toml"):
-        return
+    if any(_may_exclude(place / "pyproject.toml") for place in (project, *project.parents)):
+        return  # and these may be among them
     roots = {_root(path) for key in inputs.keys() & files.keys() for path in files[key]}
     for key in sorted(files.keys() - inputs.keys()):
         if not roots or roots & {_root(path) for path in files[key]}:

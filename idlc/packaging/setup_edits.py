@@ -277,8 +277,8 @@ def _before_setup(setup: Setup, folder: str) -> tuple[Edit, ...]:
     statements = [node for node in setup.tree.body if node.lineno <= call.lineno]
     statement = statements[-1]
     at = start_of(source, statement)
-    is_plain = isinstance(statement, (ast.Expr, ast.If)) and _begins_line(source, at)
-    if not is_plain or re.search(r"[^\w./-]", folder):  # it becomes part of a program
+    has_own_line = _begins_line(source, at) and not getattr(statement, "decorator_list", ())
+    if not has_own_line or re.search(r"[^\w./-]", folder):  # it becomes part of a program
         return ()
     find, imports = imported(setup, "importlib.util", "find_spec")
     run, more = imported(setup, "runpy", "run_path")

@@ -134,6 +134,23 @@ def test_a_keyword_compiles_and_installs_classes_that_are_new(package, tmp_path)
     assert (tmp_path / "prefix/share/demo/msg/Drive.json").is_file()
 
 
+def test_classes_of_removed_interfaces_are_not_built_again(package, tmp_path):
+    (package / "srv").mkdir()
+    (package / "srv/Ask.srv").write_text("---\n")
+    prefix = tmp_path / "prefix"
+    built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")
+    assert (prefix / "site/demo/srv/_ask.py").is_file()
+    (package / "srv/Ask.srv").unlink()
+    (package / "msg/Drive.msg").rename(package / "msg/Go.msg")
+    built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")
+    assert not (prefix / "site/demo/srv").exists()
+    modules = {path.name for path in (prefix / "site/demo/msg").glob("*.py")}
+    assert modules == {"__init__.py", "_go.py", "_go__codec.py"}
+    assert sorted(path.name for path in (prefix / "share/demo/msg").iterdir()) == [
+        f"Go.{ending}" for ending in ("idl", "json", "msg")
+    ]
+
+
 def test_packages_need_not_name_what_a_package_comes_with(package, tmp_path):
     (package / "msg/Drive.msg").write_text("std_msgs/Header header\n")
     (package / "pyproject.toml").write_text("[tool.idlc]\nvendor-deps = true\n")

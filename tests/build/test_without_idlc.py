@@ -141,6 +141,22 @@ def test_what_is_gone_is_not_built_again(package):
     assert Path("build/lib/demo/of_users.py").is_file()
 
 
+def test_interfaces_that_are_gone_are_not_installed_again(package, tmp_path):
+    prefix = tmp_path / "prefix"
+    words = ("-q", "install_data", "--install-dir", str(prefix))
+    assert build(package, *words)[0] == 0
+    rename("msg/Stop.msg", "msg/Halt.msg")
+    Path("srv/Ask.srv").unlink()
+    (prefix / "share/demo/msg/of_users.txt").write_text("")
+    assert main(["gen"]) == 0
+    Path("msg/Stop.msg").symlink_to("nowhere")  # as `colcon build --symlink-install` leaves it
+    status, said = build(package, *words)
+    assert status == 0, said
+    names = {path.name for path in (prefix / "share/demo").rglob("*") if path.is_file()}
+    installed = {"package.xml", "demo_launch.py", "Drive.msg", "Halt.msg", "of_users.txt"}
+    assert names == installed
+
+
 def test_questions_about_a_package_are_answered(package):
     Path("msg/Drive.msg").write_text("float32 speed\n")
     status, said = build(package, "--version")
