@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from idlc.check.select import Selection
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, enumerated, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.packaging.facts import home_of
 from idlc.project import inputs, prefixes
@@ -166,18 +166,11 @@ def _packages(scope: Scope) -> Iterator[Finding]:
 
 def _importable(package: inputs.Inputs, home: Path, root: Root) -> Iterator[Finding]:
     """Yield the reason why this Python does not find a package of ROS 2, or finds another one."""
-    name = package.package
-    has_setup = is_file(home / "setup.py")
-    kinds = sorted({file.file.kind for file in package.files})
-    if not (kinds or has_setup):
-        return
-    if kinds and has_setup:
-        classes = home_of(home, name, root)
-        absent = [kind for kind in kinds if not is_file(classes / kind / "__init__.py")]
-        if absent:
-            kind_names = " and ".join(f".{kind}" for kind in absent)
-            hint = f"`idlc gen {shlex.quote(root.shown(home))}` writes them"
-            yield Finding("package", f"{name} has no classes for its {kind_names} files", hint)
+    name, kinds = package.package, sorted({file.file.kind for file in package.files})
+    if is_file(home / "setup.py"):
+        yield from _ungenerated(name, kinds, home, root)
+    elif not kinds:
+        return  # Python need not find it
     built = [path for place in (home, *home.parents) for path in _built(place / "install", name)]
     folders = _folders(name)
     if not folders:
@@ -192,11 +185,21 @@ def _importable(package: inputs.Inputs, home: Path, root: Root) -> Iterator[Find
     elif lacking:
         text = f"Python finds {name} in {first}, which has no `{name}.{lacking[0]}`"
         yield Finding("package", text, "build and install it again")
-    compiled = {path.name.split(".")[1] for path in first.glob("*_s__*.cpython-*")}
-    tags = [tag for tag in compiled if not tag.startswith(f"{_TAG}-")]
-    if tags and len(tags) == len(compiled):
-        text = f"{name} in {first} was built with {tags[0].split('-x')[0]}, and this is {_TAG}"
+    # rosidl's extension modules, named as in `demo_s__rosidl_typesupport_c.cpython-311-...so`
+    tags = {path.name.split(".")[1] for path in first.glob("*_s__*.cpython-*")}
+    pythons = sorted("-".join(tag.split("-")[:2]) for tag in tags)
+    if pythons and _TAG not in pythons:
+        text = f"{name} in {first} was built with {pythons[0]}, and this is {_TAG}"
         yield Finding("package", text, "build it again in an environment of this Python")
+
+
+def _ungenerated(name: str, kinds: Sequence[str], home: Path, root: Root) -> Iterator[Finding]:
+    """Yield a problem if a package that setup.py builds lacks classes in its folder."""
+    classes = home_of(home, name, root)
+    absent = [f".{kind}" for kind in kinds if not is_file(classes / kind / "__init__.py")]
+    if absent:
+        hint = f"`idlc gen {shlex.quote(root.shown(home))}` writes them"
+        yield Finding("package", f"{name} has no classes for its {enumerated(absent)} files", hint)
 
 
 def _unfound(name: str, built: Sequence[Path], home: str) -> Finding:
