@@ -29,7 +29,8 @@ def problem(home: Path) -> str:
 
     The text is empty if there is none. Interfaces that are all absent, as on a robot, are none.
     """
-    project = next(folder for folder in home.parents if (folder / "setup.py").is_file())
+    projects = (folder for folder in home.parents if (folder / "setup.py").is_file())
+    project = next(projects, home.parent)
     files = dict(_interfaces(project))
     # only what `data_files` lists is in a source distribution
     is_distributed = (project / "PKG-INFO").is_file()
@@ -90,7 +91,7 @@ def _added(
 
 def _may_exclude(settings: Path) -> bool:
     """Return whether [tool.idlc] leaves out interfaces by patterns."""
-    text = settings.read_text(encoding="utf-8") if settings.is_file() else ""
+    text = settings.read_text(encoding="utf-8", errors="replace") if settings.is_file() else ""
     _, _, rest = text.partition("[tool.idlc]")
     table = re.split(r"^\[", rest, maxsplit=1, flags=re.MULTILINE)[0]
     return bool(re.search(r"^\s*exclude\s*=", table, re.MULTILINE) or "idlc.exclude" in text)
@@ -135,11 +136,13 @@ def remove_leftovers(distribution: Any, command: str, home: Path) -> None:
 
 
 def _remove_interfaces(prefix: Path, distribution: Any) -> None:
+    """Remove interfaces that the package no longer has; without any, it may be a copy without."""
     name = distribution.get_name()
     entries = (entry for entry in distribution.data_files or () if not isinstance(entry, str))
     wanted = {Path(prefix, entry[0], PurePath(path).name) for entry in entries for path in entry[1]}
-    for kind in _KINDS:
-        for path in sorted(Path(prefix, "share", name, kind).glob("*")):
+    folders = [Path(prefix, "share", name, kind) for kind in _KINDS]
+    if any(path.parent in folders for path in wanted):
+        for path in (path for folder in folders for path in sorted(folder.glob("*"))):
             if path.suffix in _INSTALLED and path not in wanted:
                 path.unlink()
 

@@ -83,13 +83,13 @@ def current_outputs(
     package: Inputs, records: Mapping[Path, Lock], scope: Scope
 ) -> Iterator[Diagnostic]:
     """Yield a problem for each folder of generated code that does not match a package."""
-    root, now = scope.root, package.digests
+    root = scope.root
     is_whole = package.is_whole(root)
     for folder, record in records.items():
         manifest = root.manifest(package.home)
         if manifest is not None and folder.is_relative_to(manifest.parent):
             continue  # the rules of packages judge it
-        before = record.inputs
+        before, now = record.inputs, package.digests
         if not is_whole:  # the other files are not known
             before = {name: before[name] for name in before.keys() & now.keys()}
             now = {name: now[name] for name in before}

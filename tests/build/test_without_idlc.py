@@ -155,6 +155,10 @@ def test_interfaces_that_are_gone_are_not_installed_again(package, tmp_path):
     names = {path.name for path in (prefix / "share/demo").rglob("*") if path.is_file()}
     installed = {"package.xml", "demo_launch.py", "Drive.msg", "Halt.msg", "of_users.txt"}
     assert names == installed
+    for folder in ("msg", "srv"):  # as on a robot
+        shutil.rmtree(folder)
+    assert build(package, *words)[0] == 0
+    assert (prefix / "share/demo/msg/Drive.msg").is_file()
 
 
 def test_questions_about_a_package_are_answered(package):
