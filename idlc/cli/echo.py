@@ -40,7 +40,8 @@ def command(topic: str, count: int | None, style: str, session: Session, report:
     configuration file instead, write zenoh:FILE. ROS_DOMAIN_ID selects the domain. idlc needs no
     interface files, because the robot's nodes send the definition of the type.
 
-    In CSV, lists are JSON. In JSON, numbers that are not finite are null.
+    In CSV, lists are JSON. In JSON, numbers that are not finite are null. On a terminal, YAML
+    shows the first 16 elements of an array that has more than 32.
     """
     from idlc.cli import messages, output
     from idlc.robot.live import traffic
@@ -53,6 +54,6 @@ def command(topic: str, count: int | None, style: str, session: Session, report:
     report.notes.clear()
     arrived = traffic.messages(session, ends, kind, count, report)
     with suppress(KeyboardInterrupt):
-        for text in messages.texts(style, arrived):
+        for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):
             output.lines(text, sys.stdout)
             sys.stdout.flush()

@@ -5,6 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
+import re
+import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -66,24 +69,75 @@ def field_words(kind: Any, word: str) -> list[str]:
     ]
 
 
-def texts(style: str, messages: Iterable[Any]) -> Iterator[str]:
-    """Yield messages as YAML documents, JSON lines or CSV rows."""
-    import yaml
+def texts(style: str, messages: Iterable[Any], *, is_brief: bool = False) -> Iterator[str]:
+    """Yield messages as YAML documents, JSON lines or CSV rows.
 
-    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": 100}
+    If `is_brief`, long arrays in YAML are shortened, for eyes.
+    """
     for number, message in enumerate(messages):
         values = message.to_dict()
         if style == "json":
             yield f"{_json(values)}\n"
         elif style == "yaml":
-            yield yaml.dump(values, Dumper=dumper, **options) + BETWEEN
+            yield _yaml(_shortened(values) if is_brief else values) + BETWEEN
         else:
             cells = dict(_cells(values, ""))
             rows = io.StringIO()
             head = [] if number else [cells.keys()]
             csv.writer(rows, lineterminator="\n").writerows((*head, cells.values()))
             yield rows.getvalue()
+
+
+#: Arrays of more elements are shortened on a terminal, and written without the YAML library.
+_LONG = 32
+#: Texts that readers of YAML 1.2 take for numbers, while PyYAML reads and writes YAML 1.1.
+_NUMBER = re.compile(r"[-+]?(\.\d+|\d+(\.\d*)?)([eE][-+]?\d+)?|0o[0-7]+|0x[\dA-Fa-f]+")
+
+
+def _shortened(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _shortened(part) for name, part in value.items()}
+    if not isinstance(value, list):
+        return value
+    shown = [_shortened(part) for part in value[: _LONG // 2 if len(value) > _LONG else None]]
+    return [*shown, f"... {len(value)} in all"] if len(value) > _LONG else shown
+
+
+def _yaml(values: Any) -> str:
+    """Return values as YAML.
+
+    PyYAML takes seconds and much memory for an image, so numbers in long arrays replace marks.
+    """
+    import yaml
+
+    mark, arrays = f"array{secrets.token_hex(8)}x", list[str]()
+
+    class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+        def represent_text(self, text: str) -> Any:
+            style = "'" if _NUMBER.fullmatch(text) else None
+            return self.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+        def represent_array(self, array: list[Any]) -> Any:
+            if len(array) <= _LONG or not {*map(type, array)} <= {int, float}:
+                return self.represent_list(array)
+            plain = repr(array)
+            is_plain = "e" not in plain and "n" not in plain
+            arrays.append(plain if is_plain else f"[{', '.join(map(_number, array))}]")
+            return self.represent_text(f"{mark}{len(arrays) - 1}x")
+
+    Dumper.add_representer(str, Dumper.represent_text)
+    Dumper.add_representer(list, Dumper.represent_array)
+    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": 100}
+    text: str = yaml.dump(values, Dumper=Dumper, **options)
+    return re.sub(rf"{mark}(\d+)x", lambda match: arrays[int(match[1])], text)
+
+
+def _number(value: float) -> str:
+    """Return a number in YAML, where a number with an exponent has a point."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}[repr(value)]
+    text = repr(value)
+    return text.replace("e", ".0e") if "." not in text else text
 
 
 def _json(values: Any) -> str:
