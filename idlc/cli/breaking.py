@@ -217,7 +217,7 @@ def command(
         if style == "github" and verdict:
             from idlc.diagnostics.formats import notice
 
-            sys.stdout.write(notice("idlc breaking", text))
+            output.lines(notice("idlc breaking", text), style, sys.stdout)
         return output.status(report)
     output.show(report, style, sys.stdout)
     if style == "json":

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import click
 import msgspec
 
+from idlc.diagnostics.ci import Form, silenced
 from idlc.diagnostics.text import one_line
 from idlc.runtime.names import ValidationError
 
@@ -68,22 +70,54 @@ def field_words(kind: Any, word: str) -> list[str]:
 
 def texts(style: str, messages: Iterable[Any]) -> Iterator[str]:
     """Yield messages as YAML documents, JSON lines or CSV rows."""
-    import yaml
-
-    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": 100}
     for number, message in enumerate(messages):
         values = message.to_dict()
         if style == "json":
             yield f"{_json(values)}\n"
         elif style == "yaml":
-            yield yaml.dump(values, Dumper=dumper, **options) + BETWEEN
+            yield _yaml(values) + BETWEEN
         else:
             cells = dict(_cells(values, ""))
             rows = io.StringIO()
             head = [] if number else [cells.keys()]
             csv.writer(rows, lineterminator="\n").writerows((*head, cells.values()))
             yield rows.getvalue()
+
+
+#: Text that some readers of YAML take for a number.
+_NUMBER = re.compile(
+    r"[-+]?(?:0o[0-7]+|0x[0-9a-fA-F]+|(?:\.[0-9]+|[0-9]+\.?[0-9]*)(?:[eE][-+]?[0-9]+)?)"
+)
+
+
+def _yaml(values: Any) -> str:
+    """Return a YAML document; text that is not plainly visible is quoted, with escapes."""
+    import yaml
+
+    base: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+    class Dumper(base):  # type: ignore[misc]
+        pass
+
+    def represent(dumper: Any, text: str) -> Any:
+        is_odd = one_line(text) != text or silenced(text) != text
+        style = "'" if _NUMBER.fullmatch(text) else None
+        style = '"' if is_odd else style
+        return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+    Dumper.add_representer(str, represent)
+    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
+    text = yaml.dump(values, Dumper=Dumper, width=100, **options)
+    if silenced(text, Form.COMMANDS) != silenced(text):  # a line begins within a value
+        text = yaml.dump(values, Dumper=Dumper, width=1 << 30, **options)
+    return "\n".join(map(_escaped, text.split("\n")))
+
+
+def _escaped(line: str) -> str:
+    """Return a line with hidden characters as escapes; they are in quoted text only."""
+    if one_line(line) == line:
+        return line
+    return "".join(each if one_line(each) == each else f"\\U{ord(each):08x}" for each in line)
 
 
 def _json(values: Any) -> str:
