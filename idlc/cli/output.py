@@ -178,5 +178,5 @@ def document(
     """
     from idlc.diagnostics.formats import DOCUMENTS, Run
 
-    with written_as(_FORMS[style], sys.stdout):
+    with written_as(_FORMS.get(style, Form.EXACT), sys.stdout):
         sys.stdout.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))
