@@ -64,7 +64,7 @@ def command(
         return
     try:
         text = "".join(messages.texts(style, [kind.Response.deserialize(payload)]))
-        output.lines(text.removesuffix(messages.BETWEEN), sys.stdout)
+        output.lines(text.removesuffix(messages.BETWEEN), style, sys.stdout)
     except ValueError as error:
         message = f"`{ends[0].name}` sent a malformed response: {error}"
         report.add(codes.NO_ANSWER.of("", message))

@@ -76,6 +76,8 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     topic, each row is a message. The columns are the recording time and the fields.
     """
     from idlc.cli import output
+    from idlc.cli.streams import written_as
+    from idlc.diagnostics.ci import Form
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.recordings.find import expand, split_recordings
@@ -86,7 +88,8 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
     paths = (*expand(subject), *recordings)
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
-    with output.progress_bar(sys.stderr) as update:
+    form = Form.EXACT if request.style == "csv" else Form.TEXT
+    with output.progress_bar(sys.stderr) as update, written_as(form, sys.stdout):
         written = columns(request, report, update)
     width = shutil.get_terminal_size((100, 24)).columns
     previews = [file.preview.text(width) for file in written if file.preview]

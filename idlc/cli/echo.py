@@ -55,5 +55,5 @@ def command(topic: str, count: int | None, style: str, session: Session, report:
     arrived = traffic.messages(session, ends, kind, count, report)
     with suppress(KeyboardInterrupt):
         for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):
-            output.lines(text, sys.stdout)
+            output.lines(text, style, sys.stdout)
             sys.stdout.flush()

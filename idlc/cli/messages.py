@@ -14,6 +14,7 @@ from typing import Any
 import click
 import msgspec
 
+from idlc.diagnostics.ci import Form, silenced
 from idlc.diagnostics.text import one_line
 from idlc.runtime.names import ValidationError
 
@@ -104,7 +105,7 @@ def _shortened(value: Any) -> Any:
 
 
 def _yaml(values: Any) -> str:
-    """Return values as YAML.
+    """Return a YAML document; text that is not plainly visible is quoted, with escapes.
 
     PyYAML takes seconds and much memory for an image, so numbers in long arrays replace marks.
     """
@@ -114,7 +115,9 @@ def _yaml(values: Any) -> str:
 
     class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
         def represent_text(self, text: str) -> Any:
+            is_odd = one_line(text) != text or silenced(text) != text
             style = "'" if _NUMBER.fullmatch(text) else None
+            style = '"' if is_odd else style
             return self.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
         def represent_array(self, array: list[Any]) -> Any:
@@ -125,11 +128,25 @@ def _yaml(values: Any) -> str:
             arrays.append(plain if is_plain else f"[{', '.join(map(_number, array))}]")
             return self.represent_text(f"{mark}{len(arrays) - 1}x")
 
+    def dumped(width: int) -> str:
+        arrays.clear()
+        text = yaml.dump(values, Dumper=Dumper, width=width, **options)
+        return "\n".join(map(_escaped, text.split("\n")))
+
     Dumper.add_representer(str, Dumper.represent_text)
     Dumper.add_representer(list, Dumper.represent_array)
-    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": 100}
-    text: str = yaml.dump(values, Dumper=Dumper, **options)
+    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
+    text = dumped(100)
+    if silenced(text, Form.COMMANDS) != silenced(text):  # a line begins within a value
+        text = dumped(1 << 30)
     return re.sub(rf"{mark}(\d+)x", lambda match: arrays[int(match[1])], text)
+
+
+def _escaped(line: str) -> str:
+    """Return a line with hidden characters as escapes; they are in quoted text only."""
+    if one_line(line) == line:
+        return line
+    return "".join(each if one_line(each) == each else f"\\U{ord(each):08x}" for each in line)
 
 
 def _number(value: float) -> str:
