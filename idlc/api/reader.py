@@ -70,6 +70,19 @@ def field_reader(
     return _Type(kind).reader(paths, nanoseconds=nanoseconds, asks=asks)
 
 
+def type_at(kind: type, path: str) -> ir.FieldType:
+    """Return the type of the single value at a path, or of a time; raise PathError for others."""
+    owner = _Type(kind)
+    node = wanted_values((path,), owner.message, owner.messages)
+    while not node.numbers:
+        if None in node.elements:
+            raise PathError(f"`{path}` leads to many values: give an index such as `[0]`")
+        (node,) = (*node.fields.values(), *node.elements.values())
+    if isinstance(node.type, (ir.Primitive, ir.String)) or is_time(node.type, owner.messages):
+        return node.type
+    raise PathError(f"`{path}` is no single value: give the path of a number or a string")
+
+
 class _Type:
     """The type of a generated class, for readers."""
 
