@@ -13,7 +13,13 @@ from types import SimpleNamespace
 from typing import Any, NoReturn, TypeAlias, overload
 
 from idlc import runtime
-from idlc.generate.python.reader import is_time, reader_source
+from idlc.generate.python.reader import (
+    PathError,
+    Wanted,
+    is_time,
+    reader_source,
+    wanted_values,
+)
 from idlc.model import ir
 from idlc.model.from_description import message_of
 from idlc.runtime.cdr import NATIVE, order_of
@@ -22,7 +28,6 @@ from idlc.runtime.codec import FAILURES, READINGS, maker, text_of_view
 from idlc.runtime.names import DecodeError, ValidationError, owner_of, slot_name
 from idlc.runtime.typeinfo import CarefulReader, FieldInfo, Structure, structure_of
 from idlc.wire.layout import Messages
-from idlc.wire.paths import PathError, Wanted, wanted_values
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 #: Readers that are kept: a program has a few, and those of a server's users are not endless.

@@ -72,17 +72,17 @@ FAILURES = (struct.error, ValueError, IndexError, OverflowError)
 
 
 class Pause:
-    """Keeps Python's cyclic garbage collector from running, which finds nothing in messages.
+    """Keeps the garbage collector, which finds nothing in messages, from running in any thread.
 
-    It runs again when all threads that paused it are done, unless something else had disabled it.
-    No code of users runs meanwhile. A list is the count, because no thread interrupts its methods.
+    The last of the threads in it lets it run, unless it was disabled before the first.
     """
 
     def __init__(self) -> None:
-        self.threads: list[None] = []
+        self.threads: list[None] = []  # a count that no thread can interrupt
         self.has_disabled = False
         if hasattr(os, "register_at_fork"):
-            os.register_at_fork(after_in_child=self.forget)
+            os.register_at_fork(after_in_child=self.threads.clear)
+            os.register_at_fork(after_in_child=self.resume)
 
     def __enter__(self) -> None:
         self.threads.append(None)
@@ -92,14 +92,14 @@ class Pause:
 
     def __exit__(self, *_: object) -> None:
         self.threads.pop()
-        if self.has_disabled and not self.threads:
+        if not self.threads:
+            self.resume()
+
+    def resume(self) -> None:
+        """Let it run: no thread is in the pause, as in a process that was forked."""
+        if self.has_disabled:
             self.has_disabled = False
             gc.enable()
-
-    def forget(self) -> None:
-        """Let it run in a forked process, which has none of the other threads."""
-        self.threads[:] = [None]
-        self.__exit__()
 
 
 PAUSE = Pause()

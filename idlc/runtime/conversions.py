@@ -10,7 +10,6 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, get_type_hints
 
 from .checked import validate, validate_count, validate_element
-from .codec import PAUSE
 from .names import ValidationError, owner_of, slot_name
 from .typeinfo import FieldInfo, Structure, inner_path, spelling_hint, structure_of
 
@@ -67,9 +66,8 @@ def _plain(value: Any, field: FieldInfo) -> Any:
 
 def from_dict(kind: type, values: dict[str, Any]) -> Any:
     """Return a message of class `kind` from a dictionary as `to_dict` makes it."""
-    with PAUSE:
-        message = _from_dict(kind, structure_of(kind), values, "")
-        validate(message)
+    message = _from_dict(kind, structure_of(kind), values, "")
+    validate(message)
     return message
 
 

@@ -399,7 +399,8 @@ class Message(metaclass=MessageMeta):
         """
         from .conversions import from_dict
 
-        message: typing_extensions.Self = from_dict(cls, values)
+        with codec.PAUSE:
+            message: typing_extensions.Self = from_dict(cls, values)
         return message
 
     __copy__ = __deepcopy__ = copied
