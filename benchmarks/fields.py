@@ -37,7 +37,7 @@ _STEP = re.compile(r"(\w+)|\[(-?\d+)\]")
 
 def rows(work: Work) -> Iterator[Row]:
     for (name, path), times in FIELDS.items():
-        goal = Goal(at_most=1 / times, than="deserialize")
+        goal = Goal(at_most=round(1 / times, 2), than="deserialize")
         rounds = 9 if MESSAGES[name].large else 21
         yield Row(GROUP, f"{name} {path}", partial(candidates, work, name, path), goal, rounds)
 

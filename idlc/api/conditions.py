@@ -52,7 +52,7 @@ class Condition(NamedTuple):
         does not have, and for a value that no such field equals.
         """
         if self.operator not in OPERATORS:
-            raise ValueError(f"`{self.operator}` is none of {' '.join(OPERATORS)}")
+            raise ValueError(f"`{self.operator}` is not one of {' '.join(OPERATORS)}")
         type_ = type_at(kind, self.path)
         try:
             return self._replace(value=_comparable(self.value, type_, start))

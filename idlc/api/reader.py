@@ -85,7 +85,7 @@ def type_at(kind: type, path: str) -> ir.FieldType:
         (node,) = (*node.fields.values(), *node.elements.values())
     if isinstance(node.type, (ir.Primitive, ir.String)) or is_time(node.type, owner.messages):
         return node.type
-    raise PathError(f"`{path}` is no single value: give the path of a number or a string")
+    raise PathError(f"`{path}` is not a single value: give the path of a number or a string")
 
 
 class _Type:

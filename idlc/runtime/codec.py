@@ -49,7 +49,7 @@ class Reading:
         self.text = text
         self.copy = copy
         #: Up to this size of a message, slices of bytes are faster than those of a view.
-        self.small = 8192 if copy else 0
+        self.small = 8192
 
     def of(self, kind: type) -> Reading:
         """Return the reading for sequences of a class of another package.
@@ -64,7 +64,7 @@ READINGS: dict[tuple[Text, bool], Reading] = {
     for text in (bytes.decode, text_of_view)
     for copy in (True, False)
 }
-COPYING = READINGS[bytes.decode, True]
+COPYING, VIEWING = READINGS[bytes.decode, True], READINGS[bytes.decode, False]
 
 
 #: The exceptions of decoding a buffer that is not a message.
@@ -184,8 +184,10 @@ def functions(kind: type) -> Functions:
 
     def deserialize(buffer: Any, copy: bool = True) -> Any:
         try:
-            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0] and copy:
-                return decode(buffer)
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                if copy:
+                    return decode(buffer)
+                return codecs("<", VIEWING).decode(buffer)
             return read(codecs, buffer, copy)
         except DecodeError:
             raise

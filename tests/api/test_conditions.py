@@ -86,14 +86,14 @@ def test_fields_of_messages(recording):
 
 WRONG = {
     ("widht", "<", 3): "did you mean `width`",
-    ("width", "=", 3): "is none of",
+    ("width", "=", 3): "is not one of",
     ("width", "<", "many"): "not compared with 'many'",
     ("width", "<", True): "not compared with True",
     ("width", "<", None): "not compared with None",
     ("encoding", "==", 3): "not compared with 3",
-    ("data", "==", 3): "no single value",
+    ("data", "==", 3): "not a single value",
     ("data[*]", "==", 3): "many values",
-    ("header", "==", 3): "no single value",
+    ("header", "==", 3): "not a single value",
     ("header.stamp", "==", True): "not compared with True",
 }
 

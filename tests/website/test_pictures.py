@@ -22,6 +22,9 @@ def test_a_picture_shows_what_is_printed(name):
 
 def test_the_chart_shows_the_kept_run():
     holds(FOLDER / "speed.svg", chart(results.load()))
+
+
+def test_the_chart_of_fields_shows_the_kept_run():
     holds(FOLDER / "fields.svg", fields_chart(results.load()))
 
 
