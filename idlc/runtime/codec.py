@@ -185,9 +185,7 @@ def functions(kind: type) -> Functions:
     def deserialize(buffer: Any, copy: bool = True) -> Any:
         try:
             if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
-                if copy:
-                    return decode(buffer)
-                return codecs("<", VIEWING).decode(buffer)
+                return (decode if copy else codecs("<", VIEWING).decode)(buffer)
             return read(codecs, buffer, copy)
         except DecodeError:
             raise
