@@ -8,7 +8,8 @@ import json
 import math
 import re
 import secrets
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -70,13 +71,45 @@ def field_words(kind: Any, word: str) -> list[str]:
     ]
 
 
-def texts(style: str, messages: Iterable[Any], *, is_brief: bool = False) -> Iterator[str]:
-    """Yield messages as YAML documents, JSON lines or CSV rows.
+def fields_of(kind: Any, paths: Sequence[str]) -> Callable[[bytes], dict[str, Any]]:
+    """Return a function that reads fields of a message as `to_dict` has them; absent ones are None.
+
+    Raises ValueError for paths that the class does not have.
+    """
+    from idlc.api.reader import Absent, field_reader, reader
+
+    reader(kind, *paths)  # which names all that are wrong
+    readers = {path: field_reader(kind, (path,), False, True) for path in paths}
+
+    def read(buffer: bytes) -> dict[str, Any]:
+        values: dict[str, Any] = dict.fromkeys(readers)
+        for path, read_field in readers.items():
+            with suppress(Absent):
+                values[path] = _plain(read_field(buffer))
+        return values
+
+    return read
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as `to_dict` has it."""
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if isinstance(value, list):
+        return [_plain(element) for element in value]
+    if isinstance(value, bytes):
+        return value[0]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def texts(
+    style: str, messages: Iterable[dict[str, Any]], *, is_brief: bool = False
+) -> Iterator[str]:
+    """Yield messages, as dictionaries, as YAML documents, JSON lines or CSV rows.
 
     If `is_brief`, long arrays in YAML are shortened, for eyes.
     """
-    for number, message in enumerate(messages):
-        values = message.to_dict()
+    for number, values in enumerate(messages):
         if style == "json":
             yield f"{_json(values)}\n"
         elif style == "yaml":

@@ -2,7 +2,6 @@
 
 import json
 import math
-from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -11,7 +10,7 @@ from idlc.cli.messages import texts
 
 
 def text(values, style="yaml", **options):
-    return "".join(texts(style, [SimpleNamespace(to_dict=lambda: values)], **options))
+    return "".join(texts(style, [values], **options))
 
 
 def test_yaml_is_read_as_it_was():

@@ -203,7 +203,7 @@ def test_messages_of_a_robot(style):
         sent = Message(text)
         stream = streams.GuardedStream(io.StringIO())
         try:
-            for piece in messages.texts(style, [sent]):
+            for piece in messages.texts(style, [sent.to_dict()]):
                 output.lines(piece, style, stream)
         except ci.SpeakingError:
             assert style == "csv"
