@@ -61,7 +61,9 @@ def recordings_table(run: Run) -> str:
 
 def fields_table(run: Run) -> str:
     """Return the table about reading one field, with columns for whole decoding."""
-    return table(fields.GROUP, (one for one in run.results if one.group == fields.GROUP), ())
+    return table(
+        fields.GROUP, (result for result in run.results if result.group == fields.GROUP), ()
+    )
 
 
 def of_recordings(result: Result) -> bool:

@@ -487,7 +487,7 @@ class RecordedTopic(Selection):
         A time is an int in nanoseconds, a datetime, or a text: `10` and `1m30s` count from the
         start of the recording, `1700000000.5` is a time of ROS in seconds, `2026-11-22T07:30` is
         in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
-        It is the time at which messages were recorded, or that of the field `by`, such as
+        The time is when a message was recorded, or with `by` the value of this field, such as
         "header.stamp".
         """
         if by:

@@ -107,7 +107,7 @@ def texts(
 ) -> Iterator[str]:
     """Yield messages, as dictionaries, as YAML documents, JSON lines or CSV rows.
 
-    If `is_brief`, long arrays in YAML are shortened, for eyes.
+    If `is_brief`, YAML shows only the first elements of a long array.
     """
     for number, values in enumerate(messages):
         if style == "json":
@@ -140,7 +140,8 @@ def _shortened(value: Any) -> Any:
 def _yaml(values: Any) -> str:
     """Return a YAML document; text that is not plainly visible is quoted, with escapes.
 
-    PyYAML takes seconds and much memory for an image, so numbers in long arrays replace marks.
+    PyYAML takes seconds and much memory for an image, so it writes a mark for each long array of
+    numbers, and the numbers replace the mark afterwards.
     """
     import yaml
 

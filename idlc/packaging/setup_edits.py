@@ -253,7 +253,7 @@ KEYWORD = "idlc_interfaces"
 def unnoticed_changes(setup: Setup, folder: str) -> Iterator[Diagnostic]:
     """Yield the problem of a setup.py that installs outdated classes where idlc is missing.
 
-    `folder` is that of the classes.
+    `folder` contains the classes.
     """
     is_entered = any("/packages" in (entry.folder or "") for entry in setup.data_files or ())
     if BUILD_STEP in setup.source.text or not (is_entered or KEYWORD in setup.arguments):
