@@ -18,6 +18,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.packaging.facts import Facts, facts
+from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
 from idlc.project.find import KINDS, RULES, list_files, no_interfaces
@@ -172,6 +173,8 @@ class Checker:
     ) -> None:
         self._scope = scope
         self.library = library_for(packages, scope, Report())
+        folders = {package.package: package.folders for package in packages}
+        self._neighbours = Neighbours(folders, scope.root)
         self._lowered: link.Memory = {}
         # dependencies between interfaces are only worth remembering for a next run
         self._checked = IncrementalFindings() if again else None
@@ -209,7 +212,9 @@ class Checker:
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""
         if package.package not in self._facts:
-            self._facts[package.package] = facts(package, self.library.packages, self._scope)
+            self._facts[package.package] = facts(
+                package, self.library.packages, self._neighbours, self._scope
+            )
         current = self._facts[package.package]
         if current is None or not current.inputs:
             return current

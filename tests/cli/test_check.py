@@ -446,9 +446,7 @@ def test_a_hint_calls_find_packages_as_setup_py_can(capsys):
         }
     )
     _, out = check(capsys)
-    assert (
-        "write `packages=tools.find_packages(exclude=['test'])`, or run `idlc check --fix`" in out
-    )
+    assert "add `*tools.find_packages(include=['demo.*'])` to `packages`, or run" in out
 
 
 def test_files_that_are_not_python_or_xml_are_not_judged(capsys):
