@@ -161,6 +161,7 @@ MISSING_FIND_PACKAGE = Code("IDL466", "missing-find-package", WARNING, PACKAGE)
 UNUSED_CMAKE_DEPENDENCY = Code("IDL467", "unused-cmake-dependency", WARNING, PACKAGE)
 RUNTIME_NOT_EXPORTED = Code("IDL468", "runtime-not-exported", WARNING, PACKAGE)
 DEPRECATED_ARGUMENT = Code("IDL469", "deprecated-argument", WARNING, PACKAGE)
+CANNOT_BUILD = Code("IDL470", "cannot-build", WARNING, PACKAGE)
 
 # remarks
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check import cmake_lists, outputs
+from idlc.check import builds, cmake_lists, outputs
 from idlc.check.registry import advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
 from idlc.compiler.compiler import Compiler, library_for, stage
@@ -105,8 +105,9 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
     report.extend((*looked, *problems))
     report.notes += looked.notes
     first = next(iter(checking.values()))
-    looked_at = filter(None, map(first.package_facts, packages))
-    notes = tuple(filter(None, map(cmake_lists.unknown, looked_at)))
+    looked_at = [*filter(None, map(first.package_facts, packages))]
+    unjudged = (note(each) for each in looked_at for note in (cmake_lists.unknown, builds.unjudged))
+    notes = tuple(filter(None, unjudged))
     return CheckResult(files, len(packages), fixed, distros, notes, texts)
 
 
