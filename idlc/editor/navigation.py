@@ -99,23 +99,7 @@ def references(state: ServerState, params: ReferenceParams) -> list[Location]:
     """Return the uses of the subject at a position in all folders, and its definition."""
     declared = params.context.include_declaration
     if package := _named_package(state, params):
-        locations = [
-            state.location(at, snapshot.folder)
-            for snapshot, at, used in uses(state)
-            if used.package == package
-        ]
-        manifests = (
-            snapshot.root.manifest(path.parent.parent)
-            for snapshot in state.snapshots()
-            for path in snapshot.interfaces
-        )
-        for path in dict.fromkeys(filter(None, manifests)):
-            source = _source(path, state)
-            for name, at in _packages(source) if source else ():
-                is_own = at.source.text[: at.start].rstrip().endswith("<name>")
-                if name == package and (declared or not is_own):
-                    locations.append(Location(state.uri(path), state.range(at)))
-        return locations
+        return _uses_of_package(package, state, declared=declared)
     context = state.context(params.text_document.uri)
     subject = _subject_at(context, params) if context else None
     if context is None or subject is None:
@@ -131,6 +115,27 @@ def references(state: ServerState, params: ReferenceParams) -> list[Location]:
     if facts and (span := declaration(facts, subject.package)):
         locations.append(state.location(span, snapshot.folder))
     return list(dict.fromkeys(filter(None, (first, *locations))))
+
+
+def _uses_of_package(package: str, state: ServerState, *, declared: bool) -> list[Location]:
+    """Return where fields use a package and each package.xml names it, with its own `<name>`."""
+    locations = [
+        state.location(at, snapshot.folder)
+        for snapshot, at, used in uses(state)
+        if used.package == package
+    ]
+    manifests = (
+        snapshot.root.manifest(path.parent.parent)
+        for snapshot in state.snapshots()
+        for path in snapshot.interfaces
+    )
+    for path in dict.fromkeys(filter(None, manifests)):
+        source = _source(path, state)
+        for name, at in _packages(source) if source else ():
+            is_own = at.source.text[: at.start].rstrip().endswith("<name>")
+            if name == package and (declared or not is_own):
+                locations.append(Location(state.uri(path), state.range(at)))
+    return locations
 
 
 def mentions(element: Element, context: InterfaceContext) -> Iterator[Span]:

@@ -110,12 +110,12 @@ Abouts: TypeAlias = Mapping[str, About]
 
 def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
     """Yield the pages of all packages and of the interfaces that they use, with a search."""
-    sources: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
-    for model in models:
-        for name, interface in model.interfaces.items():
-            if interface.source is not None and (name not in sources or interface in model.own):
-                sources[name] = (interface, model)
+    sources = _with_sources(models)
     own = sorted({interface.name for model in models for interface in model.own})
+    users: dict[ir.TypeName, set[ir.TypeName]] = {}
+    for interface, _ in sources.values():
+        for target in derive.references(interface):
+            users.setdefault(target, set()).add(interface.name)
     pages = {name: f"{name.package}/{name.kind}-{name.name}.html" for name in sorted(sources)}
     packages = {
         package: tuple(sources[name][0] for name in names)
@@ -130,27 +130,39 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
         yield RenderedFile(home[package], template.render(page=shown))
     if len(packages) > 1:
         template = html().get_template("documents/index.html.jinja")
-        entries = []
-        for name, interfaces in packages.items():
-            own_facts = about.get(name, About())
-            version = [f"version {own_facts.version}"] if own_facts.version else []
-            line = " · ".join([*version, kind_counts(interfaces)])
-            entries.append(Entry(home[name], words(name), "", line, own_facts.description))
+        entries = [
+            _package_entry(package, home[package], about.get(package, About()), interfaces)
+            for package, interfaces in packages.items()
+        ]
         shown = Listing("Interfaces", "", (), (), "", True, entries)
         yield RenderedFile("index.html", template.render(page=shown))
     yield RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n")
     for path in ("search.js", "style.css"):
         yield RenderedFile(path, verbatim(f"documents/{path}"))
     template = html().get_template("documents/interface.html.jinja")
-    users: dict[ir.TypeName, set[ir.TypeName]] = {}
-    for interface, _ in sources.values():
-        for target in derive.references(interface):
-            users.setdefault(target, set()).add(interface.name)
     owners = {name: Home(home[name], about.get(name, About()).version) for name in home}
     for name, (interface, model) in sorted(sources.items()):
         owner = owners.get(name.package, Home())
         text = template.render(page=page(interface, model, users.get(name, set()), pages, owner))
         yield RenderedFile(pages[name], text)
+
+
+def _with_sources(models: Sequence[Model]) -> dict[ir.TypeName, tuple[ir.Interface, Model]]:
+    """Return the interfaces that have a file, each with its model: that of its package, if any."""
+    sources: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
+    for model in models:
+        for name, interface in model.interfaces.items():
+            if interface.source is not None and (name not in sources or interface in model.own):
+                sources[name] = (interface, model)
+    return sources
+
+
+def _package_entry(
+    package: str, home: str, facts: About, interfaces: Sequence[ir.Interface]
+) -> Entry:
+    version = [f"version {facts.version}"] if facts.version else []
+    line = " · ".join([*version, kind_counts(interfaces)])
+    return Entry(home, words(package), "", line, facts.description)
 
 
 def _index(packages: Packages, home: Mapping[str, str], pages: Pages, about: Abouts) -> str:
