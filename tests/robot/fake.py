@@ -90,7 +90,7 @@ class Robot:
             hash=hash_,
             qos=qos or QoSProfile(depth=10),
         )
-        self.declared.append(self.transport.announce(entity.token))
+        self.declared.append(self.transport.announce(entity))
         if wait:
             self.await_count(kind, name, 1)
         return entity
@@ -120,7 +120,7 @@ class Robot:
             else:
                 request.drop()
 
-        self.declared.append(self.transport.service(entity.key, reply))
+        self.declared.append(self.transport.service(entity, reply))
 
     def description(self, service, asked):
         hash_, description, interface = described(asked.type_name, tuple(self.files.items()))
@@ -144,7 +144,7 @@ class Robot:
     def publisher(self, name, type_, qos=None, hash_=None):
         """Return a function that publishes a message or bytes."""
         entity = self.announce(Kind.PUBLISHER, name, type_, hash_, qos)
-        sender = self.transport.publisher(entity.key, entity.qos)
+        sender = self.transport.publisher(entity)
         self.declared.append(sender)
         count = iter(range(1, 1 << 30))
 
@@ -168,7 +168,7 @@ class Robot:
                 data = made if isinstance(made, bytes) else made.serialize()
                 request.reply(data, request.attachment)
 
-        self.declared.append(self.transport.service(entity.key, reply))
+        self.declared.append(self.transport.service(entity, reply))
 
     def action(self, name, type_):
         """Announce the five parts of an action server."""

@@ -142,10 +142,11 @@ def call(
         if following and pending < AT_ONCE:
             number, (service, request) = following
             client = own_endpoint(session, service, Kind.CLIENT, QoSProfile(depth=10))
-            attachment = pack_attachment(1, time.time_ns(), client.gid)
+            gid = session.transport.gid(client)
+            attachment = pack_attachment(1, time.time_ns(), gid)
             receive = partial(inbox.put, number)
             payload = request.serialize()
-            session.transport.call(service.key, payload, attachment, receive, timeout=left)
+            session.transport.call(client, payload, attachment, receive, timeout=left)
             pending, following = pending + 1, next(unsent, None)
         elif arrival := inbox.get(min(left, TICK)):
             if arrival.sample:

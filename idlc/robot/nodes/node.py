@@ -76,7 +76,7 @@ class Node(HasParameters):
         self.timers: list[Timer] = []
         self._clock = Clock(clock_type=ClockType.ROS_TIME)
         self._clock_subscription: Subscription[Any] | None = None
-        self._token = self.transport.announce(self.entity.token)
+        self._token = self.transport.announce(self.entity)
         self._logger = Logger(self.entity.node_name.strip("/").replace("/", "."), self._log)
         # in the order of rclpy, so that ids are equal
         log: Any = standard("rcl_interfaces/msg/Log")

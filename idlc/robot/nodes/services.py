@@ -37,7 +37,7 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
         self._queue: Bounded[tuple[Request, Attachment]] = Bounded(self.qos_profile)
         #: The ids of the request objects that wait or are being answered.
         self._open: set[int] = set()
-        return (self.node.transport.service(self.entity.key, self._receive),)
+        return (self.node.transport.service(self.entity, self._receive),)
 
     def _receive(self, request: Request) -> None:
         attachment = parse_attachment(request.attachment)
@@ -93,7 +93,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
     def open(self) -> tuple[Closeable, ...]:
         """Prepare calls."""
-        self._gid = self.entity.gid  # computed once, as it is a hash
+        self._gid = self.node.transport.gid(self.entity)  # computed once, as it can be a hash
         self._numbers = count(1)
         self._pending: dict[int, Future[ResponseT]] = {}
         return ()
@@ -122,7 +122,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         self._pending[number] = future
         future.wake_at_end(partial(self._pending.pop, number, None))
         try:
-            self.node.transport.call(self.entity.key, payload, attachment, receive, timeout=timeout)
+            self.node.transport.call(self.entity, payload, attachment, receive, timeout=timeout)
         except Exception as error:
             future.cancel()
             raise RobotError(f"`{self.srv_name}`: {one_line(str(error))}") from None
