@@ -93,5 +93,8 @@ class Transport(Protocol):
         Raises TimeoutError after `timeout` seconds if answers may be missing.
         """
 
+    def notes(self) -> list[str]:
+        """Return sentences about what this connection cannot show."""
+
     def close(self) -> None:
         """Close the connection; all declarations end with it."""

@@ -146,6 +146,10 @@ class ZenohTransport:
                 raise TimeoutError
             yield str(reply.ok.key_expr)
 
+    def notes(self) -> list[str]:
+        """Return nothing."""
+        return []
+
     def close(self) -> None:
         """Close the Zenoh session."""
         with suppress(zenoh.ZError):  # it is closed already, or gives up after ten seconds

@@ -49,6 +49,9 @@ class Tokens:
         assert timeout > 0
         callback(None)
 
+    def notes(self):
+        return []
+
     def close(self):
         pass
 

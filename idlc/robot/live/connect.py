@@ -49,6 +49,7 @@ def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Se
         return
     with session:
         yield session
+        report.notes += session.transport.notes()
         if session.graph.is_full:
             report.notes.append("the robot announces too many endpoints; some are missing")
         if session.graph.is_incomplete:
