@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import select
+import selectors
 import socket
 import threading
 import time
@@ -30,6 +30,10 @@ class Connection:
         self.lock = threading.RLock()
         self._sockets = address.open_sockets(place)
         self._send = self._sockets[0].sendto
+        # `select.select` refuses the files of a program that has opened a thousand
+        self._selector = selectors.DefaultSelector()
+        for each in self._sockets:
+            self._selector.register(each, selectors.EVENT_READ, each)
         port = self._sockets[0].getsockname()[1]
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
         own = [(host, port) for host in address.own_hosts(place)]
@@ -54,9 +58,8 @@ class Connection:
         while self._is_open:
             with self.lock:
                 wait = self.participant.deadline - time.monotonic()
-            ready = select.select(self._sockets, (), (), min(max(wait, 0), _TICK))[0]
-            for each in ready:
-                self._receive(each)
+            for key, _ in self._selector.select(min(max(wait, 0), _TICK)):
+                self._receive(key.data)
             with self.lock:
                 if self._is_open:
                     self.send(self.participant.tick(time.monotonic()))
@@ -118,5 +121,6 @@ class Connection:
         if was_open and threading.current_thread() is not self._thread:
             self._thread.join()
         if was_open:
+            self._selector.close()
             for each in self._sockets:
                 each.close()
