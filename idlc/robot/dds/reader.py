@@ -17,6 +17,8 @@ MOST_WAITING = 64 << 20
 #: Numbers that a reader asks for at a time, and samples of which it holds fragments.
 _AHEAD = 256
 _MOST_PARTIAL = 8
+#: Cyclone DDS as a vendor.
+_CYCLONE = b"\x01\x10"
 
 
 class Outgoing(NamedTuple):
@@ -114,7 +116,9 @@ class Reader:
             return None
         writer.count += 1
         ids = self.guid[wire.PREFIX :], guid[wire.PREFIX :]
-        part = formats.format_acknack(*ids, writer.next or 0, [], writer.count)
+        # 0 asks where to begin; Cyclone DDS calls it malformed
+        first = 1 if guid.startswith(_CYCLONE) else 0
+        part = formats.format_acknack(*ids, writer.next or first, [], writer.count)
         # it is not final: the writer has to answer
         part = part[:1] + bytes([part[1] & ~2]) + part[2:]
         return Outgoing(writer.address, guid[: wire.PREFIX], (part,))
@@ -169,6 +173,8 @@ class Reader:
             return
         if writer.next is not None and part.number < writer.next:
             return
+        if writer.next is None and writer.reliable and not writer.waits:
+            writer.next = part.number  # else a heartbeat would begin after it
         if part.total > MOST_SAMPLE:
             self.lost += 1
             writer.early.setdefault(part.number, None)  # else the reader would ask for ever
