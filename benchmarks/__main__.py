@@ -13,6 +13,7 @@ from benchmarks import (
     columns,
     compiling,
     editing,
+    fields,
     imports,
     recordings,
     report,
@@ -25,7 +26,7 @@ from benchmarks.peers import PEERS, installed
 from benchmarks.work import Work, in_memory
 
 GROUPS = (
-    *(codec, batches, columns, classes, imports),
+    *(codec, batches, fields, columns, classes, imports),
     *(recordings, compiling, starting, editing, topics),
 )
 

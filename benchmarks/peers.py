@@ -32,6 +32,7 @@ PEERS = {
     "mcap-ros2": ("mcap_ros2", "mcap-ros2-support"),
     "cyclonedds": ("cyclonedds", "cyclonedds"),
     "cydr": ("cydr", "cydr"),
+    "edgefirst-schemas": ("edgefirst", "edgefirst-schemas"),
     "rerun-sdk": ("rerun", "rerun-sdk"),
     "roboto-mcap-codec": ("mcap_codec", "roboto-mcap-codec"),
     "ros2-pkg-create": ("ros2_pkg_create", "ros2-pkg-create"),
@@ -91,9 +92,14 @@ class Implementation:
         """Return a function that serializes a message."""
         raise NotImplementedError
 
-    def decoder(self, row: str, raw: bytes) -> Call:
-        """Return a function that deserializes a buffer."""
+    def decode(self, row: str) -> Callable[[bytes], object]:
+        """Return a function that deserializes buffers."""
         raise NotImplementedError
+
+    def decoder(self, row: str, raw: bytes) -> Call:
+        """Return a function that deserializes one buffer."""
+        decode = self.decode(row)
+        return lambda: decode(raw)
 
 
 class Idlc(Implementation):
@@ -111,9 +117,8 @@ class Idlc(Implementation):
     def encoder(self, row, message):
         return lambda: message.serialize()
 
-    def decoder(self, row, raw):
-        kind = self.class_of(*MESSAGES[row].parts)
-        return lambda: kind.deserialize(raw)
+    def decode(self, row):
+        return self.class_of(*MESSAGES[row].parts).deserialize
 
 
 class Rclpy(Implementation):
@@ -133,11 +138,11 @@ class Rclpy(Implementation):
 
         return lambda: serialize_message(message)
 
-    def decoder(self, row, raw):
+    def decode(self, row):
         from rclpy.serialization import deserialize_message
 
         kind = self.class_of(*MESSAGES[row].parts)
-        return lambda: deserialize_message(raw, kind)
+        return lambda raw: deserialize_message(raw, kind)
 
 
 class Rosbags(Implementation):
@@ -159,17 +164,13 @@ class Rosbags(Implementation):
         store, name = self.store, MESSAGES[row].type
         return lambda: store.serialize_cdr(message, name)
 
-    def decoder(self, row, raw):
+    def decode(self, row):
         store, name = self.store, MESSAGES[row].type
-        return lambda: store.deserialize_cdr(raw, name)
+        return lambda raw: store.deserialize_cdr(raw, name)
 
 
 class McapRos2(Implementation):
     """mcap-ros2-support, whose classes exist only while it decodes."""
-
-    def _of(self, functions, row):
-        name = MESSAGES[row].type
-        return functions(name, mcap_schema(name))[name]
 
     def message(self, row, raw):
         return self.decoder(row, raw)()
@@ -177,14 +178,15 @@ class McapRos2(Implementation):
     def encoder(self, row, message):
         from mcap_ros2._dynamic import serialize_dynamic
 
-        encode = self._of(serialize_dynamic, row)
+        name = MESSAGES[row].type
+        encode = serialize_dynamic(name, mcap_schema(name))[name]
         return lambda: encode(message)
 
-    def decoder(self, row, raw):
+    def decode(self, row):
         from mcap_ros2._dynamic import generate_dynamic
 
-        decode = self._of(generate_dynamic, row)
-        return lambda: decode(raw)
+        name = MESSAGES[row].type
+        return generate_dynamic(name, mcap_schema(name))[name]
 
 
 class Cyclonedds(Implementation):
@@ -207,9 +209,8 @@ class Cyclonedds(Implementation):
     def encoder(self, row, message):
         return lambda: message.serialize()
 
-    def decoder(self, row, raw):
-        kind = self.class_of(MESSAGES[row].type)
-        return lambda: kind.deserialize(raw)
+    def decode(self, row):
+        return self.class_of(MESSAGES[row].type).deserialize
 
 
 class Cydr(Implementation):
@@ -231,9 +232,8 @@ class Cydr(Implementation):
     def encoder(self, row, message):
         return lambda: message.serialize()
 
-    def decoder(self, row, raw):
-        kind = self.class_of(row)
-        return lambda: kind.deserialize(raw)
+    def decode(self, row):
+        return self.class_of(row).deserialize
 
 
 def implementations(generated: Path) -> dict[str, Implementation]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
-from benchmarks import recordings
+from benchmarks import fields, recordings
 from benchmarks.measure import IDLC, Result
 from benchmarks.results import REFERENCES, Run, standing
 
@@ -48,14 +48,22 @@ def summary(run: Run) -> str:
 
 
 def full_table(run: Run) -> str:
-    """Return the tables of all rows except those about recordings."""
-    results = [result for result in run.results if not of_recordings(result)]
+    """Return the tables of all rows except those about recordings and about fields."""
+    others = (result for result in run.results if result.group != fields.GROUP)
+    results = [result for result in others if not of_recordings(result)]
     return tables(results, REFERENCES, run)
 
 
 def recordings_table(run: Run) -> str:
     """Return the tables about recordings, with columns for copying and decompression."""
     return tables(filter(of_recordings, run.results), (), run)
+
+
+def fields_table(run: Run) -> str:
+    """Return the table about reading one field, with columns for whole decoding."""
+    return table(
+        fields.GROUP, (result for result in run.results if result.group == fields.GROUP), ()
+    )
 
 
 def of_recordings(result: Result) -> bool:
@@ -103,6 +111,7 @@ def factor(ratio: float) -> str:
 PARTS = {
     ROOT / "docs" / "performance.md": full_table,
     ROOT / "docs" / "recorded-data.md": recordings_table,
+    ROOT / "docs" / "fields.md": fields_table,
 }
 PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=<!-- end -->)", re.DOTALL)
 

@@ -18,6 +18,7 @@ KEPT = Path(__file__).with_name("results.json")
 REFERENCES = {
     "bare interpreter",
     "copy",
+    "copy=False",
     "decompression",
     "deserialize_many",
     "deserialize",

@@ -7,6 +7,7 @@ from idlc.version import __version__
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from idlc.api.load import load
+    from idlc.api.reader import patch, reader
     from idlc.api.recording import Recording
     from idlc.api.upgrade import upgrade
     from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
@@ -17,6 +18,8 @@ __all__ = [
     "__version__",
     "delimited",
     "load",
+    "patch",
+    "reader",
     "split_delimited",
     "split_mcap_chunk",
     "upgrade",
@@ -28,6 +31,8 @@ _MODULES = {
     "Recording": "api.recording",
     "delimited": "recordings.batches",
     "load": "api.load",
+    "patch": "api.reader",
+    "reader": "api.reader",
     "split_delimited": "recordings.batches",
     "split_mcap_chunk": "recordings.batches",
     "upgrade": "api.upgrade",
@@ -38,7 +43,8 @@ def __getattr__(name: str) -> object:
     """Import what a program asks for."""
     if name in _MODULES:
         module = __import__(f"idlc.{_MODULES[name]}", fromlist=[name])
-        return getattr(module, name)
+        globals()[name] = getattr(module, name)
+        return globals()[name]
     raise AttributeError(f"module 'idlc' has no attribute {name!r}")
 
 

@@ -8,6 +8,8 @@ from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
+import numpy as np
+
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, unread_reason
@@ -20,12 +22,14 @@ from idlc.recordings.containers.messages import (
 )
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.times import moment
+from idlc.runtime.codec import PAUSE
 
 if TYPE_CHECKING:
     import pandas as pd
     import polars as pl
     import pyarrow as pa
 
+    from idlc.api.conditions import Condition
     from idlc.api.upgrade import Upgrade
     from idlc.recordings.load import TopicType
 
@@ -50,6 +54,8 @@ def readings(as_: Any, rules: Any) -> dict[str, Reading]:
 Kind = TypeVar("Kind")
 #: The path in errors of many messages: the index of a message, and the path in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
+#: So many messages are decoded ahead, of so many bytes together.
+MANY, AHEAD = 256, 1 << 18
 #: The columns of a message besides its fields.
 TIMES = ("log_time", "publish_time")
 
@@ -79,19 +85,46 @@ class Selection:
     They are of the type that was recorded, compiled when it is first needed, unless a class that
     idlc generated is given; that must be of the same type as the recorded one. `include` are
     folders in which types are looked for that the recording does not define. With `reading`, they
-    are converted to another version of the type first.
+    are converted to another version of the type first. Only messages that match all `conditions`
+    are read; `absent` counts those in which a path of one does not exist.
     """
 
     def __init__(
-        self, topic: Topic, include: tuple[str, ...] = (), reading: Reading | None = None
+        self,
+        topic: Topic,
+        include: tuple[str, ...] = (),
+        reading: Reading | None = None,
+        conditions: tuple[Condition, ...] = (),
     ) -> None:
         self.topic = topic
         self.include = include
         self.reading = reading
+        self.conditions = conditions
+        self.absent = 0
+
+    def read_all(self) -> Iterator[Messages]:
+        """Yield all messages as they are recorded, many at a time."""
+        raise NotImplementedError
 
     def recorded(self) -> Iterator[Messages]:
-        """Yield the messages as they are recorded, many at a time."""
-        raise NotImplementedError
+        """Yield the messages that match, as they are recorded, many at a time."""
+        if not self.conditions:
+            yield from self.read_all()
+            return
+        from idlc.api.conditions import Filter
+
+        matching, done = Filter(self._type.kind, self.conditions), 0
+        for batch in self.read_all():
+            views = batch.views()
+            results, error = _each(matching.matches, views)
+            self.absent = matching.absent
+            if any(results):
+                mask = np.zeros(len(batch), bool)
+                mask[: len(results)] = results
+                yield batch.selected(mask)
+            if error:
+                _raise(error, self.topic, views[len(results)], done + len(results))
+            done += len(batch)
 
     def batches(self) -> Iterator[Messages]:
         """Yield the messages, many at a time, in the version that they are read as."""
@@ -147,21 +180,43 @@ class Selection:
         return self.messages()
 
     @overload
-    def messages(self, kind: None = None) -> Iterator[Stamped[Any]]: ...
+    def messages(self, kind: None = None, *, fields: None = None) -> Iterator[Stamped[Any]]: ...
 
     @overload
-    def messages(self, kind: type[Kind]) -> Iterator[Stamped[Kind]]: ...
+    def messages(self, kind: type[Kind], *, fields: None = None) -> Iterator[Stamped[Kind]]: ...
 
-    def messages(self, kind: Any = None) -> Iterator[Stamped[Any]]:
-        """Yield each message with its time, in the order in which they were recorded."""
+    @overload
+    def messages(
+        self, kind: Any = None, *, fields: str | Iterable[str]
+    ) -> Iterator[Stamped[Any]]: ...
+
+    def messages(
+        self, kind: Any = None, *, fields: str | Iterable[str] | None = None
+    ) -> Iterator[Stamped[Any]]:
+        """Yield each message with its time, in the order in which they were recorded.
+
+        With `fields`, the values at these paths take the place of the message, and nothing else is
+        decoded: one value for one path, a tuple for several, as `idlc.reader` reads them.
+        """
         self._source(kind)
         kind, done = kind or self.kind, 0
+        read = kind.deserialize
+        if fields is not None:
+            from idlc.api.reader import reader
+
+            read = reader(kind, *([fields] if isinstance(fields, str) else fields))
         for batch in self.batches():
-            for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
-                with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
-                    message = kind.deserialize(view)
-                yield Stamped(time, message)
-                done += 1
+            views = batch.views()
+            # many small messages at once, because the collector is paused meanwhile
+            step = max(1, min(MANY, AHEAD * len(views) // (sum(map(len, views)) + 1)))
+            for first in range(0, len(views), step):
+                part = views[first : first + step]
+                values, error = _each(read, part)
+                times = batch.log_times[first : first + len(values)].tolist()
+                yield from map(Stamped, times, values)
+                if error:
+                    _raise(error, self.topic, part[len(values)], done + len(values))
+                done += len(values)
 
     def to_columns(
         self, kind: Any = None, *, fields: Iterable[str] | None = None, datetimes: bool = False
@@ -254,6 +309,23 @@ def arrow() -> Any:
     return pyarrow
 
 
+def _each(read: Callable[[Raw], Any], views: list[Raw]) -> tuple[list[Any], Exception | None]:
+    """Return what is read of each message, up to the first that raises an error."""
+    values: list[Any] = []
+    try:
+        with PAUSE:
+            for view in views:
+                values.append(read(view))  # noqa: PERF401 - those before an error stay
+    except ValueError as error:
+        return values, error
+    return values, None
+
+
+def _raise(error: Exception, topic: Topic, view: Raw, number: int) -> None:
+    with _at(topic, lambda: [view], number):
+        raise error
+
+
 @contextmanager
 def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator[None]:
     """Turn errors in messages into errors that name the message of the recording."""
@@ -288,8 +360,9 @@ class Part(Selection):
         window: Window,
         include: tuple[str, ...] = (),
         reading: Reading | None = None,
+        conditions: tuple[Condition, ...] = (),
     ) -> None:
-        super().__init__(topic, include, reading)
+        super().__init__(topic, include, reading, conditions)
         self.place = place
         self.ids = ids
         self.pieces = pieces
@@ -297,13 +370,13 @@ class Part(Selection):
 
     def __reduce__(self) -> tuple[Any, ...]:
         where = self.place, self.ids, self.pieces, self.window
-        return Part, (self.topic, *where, self.include, self.reading)
+        return Part, (self.topic, *where, self.include, self.reading, self.conditions)
 
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
 
-    def recorded(self) -> Iterator[Messages]:
-        """Yield the messages as they are recorded, many at a time."""
+    def read_all(self) -> Iterator[Messages]:
+        """Yield all messages as they are recorded, many at a time."""
         with closing(open_pieces(self.place)) as file:
             yield from file.messages(self.ids, self.pieces, self.window)
 
@@ -399,29 +472,53 @@ class RecordedTopic(Selection):
         window: Window,
         include: tuple[str, ...],
         reading: Reading | None = None,
+        conditions: tuple[Condition, ...] = (),
     ) -> None:
-        super().__init__(topic, include, reading)
+        super().__init__(topic, include, reading, conditions)
         self._container = container
         self._window = window
 
     def __repr__(self) -> str:
         return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
 
-    def between(self, start: Any = None, end: Any = None) -> RecordedTopic:
+    def between(self, start: Any = None, end: Any = None, *, by: str = "") -> RecordedTopic:
         """Return those of a time: from `start`, until before `end`.
 
         A time is an int in nanoseconds, a datetime, or a text: `10` and `1m30s` count from the
         start of the recording, `1700000000.5` is a time of ROS in seconds, `2026-11-22T07:30` is
         in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
+        The time is when a message was recorded, or with `by` the value of this field, such as
+        "header.stamp".
         """
+        if by:
+            topic = self if start is None else self.where(by, ">=", start)
+            return topic if end is None else topic.where(by, "<", end)
         first, last = (
             None if time is None else moment(time, self._container.start) for time in (start, end)
         )
-        window = self._window.narrowed(first, last)
-        return RecordedTopic(self._container, self.topic, window, self.include, self.reading)
+        return self._narrowed(self._window.narrowed(first, last), self.conditions)
 
-    def recorded(self) -> Iterator[Messages]:
-        """Yield the messages as they are recorded, many at a time."""
+    def where(self, path: str, operator: str, value: Any) -> RecordedTopic:
+        """Return the messages in which a field compares with a value: ==, !=, <, <=, > or >=.
+
+        >>> recording["/imu"].where("linear_acceleration.z", ">", 12).to_arrow()
+
+        Times are given as for `between`. Messages in which the path does not exist do not match;
+        `absent` counts them. The path is one of the type that was recorded. Raises ValueError for
+        a path that the type does not have.
+        """
+        from idlc.api.conditions import Condition
+
+        self._source(None)
+        condition = Condition(path, operator, value).typed(self._type.kind, self._container.start)
+        return self._narrowed(self._window, (*self.conditions, condition))
+
+    def _narrowed(self, window: Window, conditions: tuple[Condition, ...]) -> RecordedTopic:
+        how = self.include, self.reading, conditions
+        return RecordedTopic(self._container, self.topic, window, *how)
+
+    def read_all(self) -> Iterator[Messages]:
+        """Yield all messages as they are recorded, many at a time."""
         return self._container.messages(self.topic, self._window)
 
     def parts(self, size: int = PART) -> list[Part]:
@@ -429,7 +526,7 @@ class RecordedTopic(Selection):
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
-        how = self._window, self.include, self.reading
+        how = self._window, self.include, self.reading, self.conditions
         return [
             Part(self.topic, file.place, tuple(numbers), pieces, *how)
             for file, numbers, _ in self._container.places(self.topic)

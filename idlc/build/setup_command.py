@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
+from idlc.build.step import present, remove_leftovers
 from idlc.cli import output
 from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
@@ -48,10 +49,12 @@ def compiled_class(package: str, base: Any) -> type:
     settings = load_settings(Root.here(), report)
     where = scope(settings, package)
     inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
+    folder = home_of(where.root.base, package, where.root)
     if not inputs:
-        return distribution_class(package, base, {})
-    home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
+        return distribution_class(package, base, {}, folder)
+    home = folder.relative_to(where.root.base).as_posix()
     runtime, vendoring = settings.runtime, settings.vendoring
+    before = _packages(package, folder)
     gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
@@ -62,34 +65,41 @@ def compiled_class(package: str, base: Any) -> type:
     files = shared(model, manifest, libraries, report)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
-    lock = load_lock(where.root.base / home, home, Report())
+    after = _packages(package, folder)
+    gone = before - after  # setup() has found them already
+    return distribution_class(package, base, files, folder, after, gone, libraries.build_tag)
+
+
+def _packages(package: str, home: Path) -> set[str]:
+    """Return the Python packages that were generated into a folder."""
+    lock = load_lock(home, "", Report())
     modules = (PurePosixPath(package, path) for path in (lock.outputs if lock else ()))
-    folders = {module.parent for module in modules if module.suffix == ".py"}
-    generated = tuple(sorted(".".join(folder.parts) for folder in folders))
-    return distribution_class(package, base, files, generated, libraries.build_tag)
+    return {".".join(module.parent.parts) for module in modules if module.suffix == ".py"}
 
 
 def distribution_class(
     package: str,
     base: Any,
     files: Mapping[str, bytes],
+    home: Path,
     packages: Iterable[str] = (),
+    gone: Iterable[str] = (),
     build_tag: str = "",
 ) -> type:
     """Return a class of distributions that installs files, by their paths in a prefix.
 
     They replace what `data_files` lists for the same paths. A package with interfaces whose files
     have no entries in ROS 2's index gets none from `data_files` either. The Python `packages` that
-    were generated are installed, whether setup() lists them or not. `build_tag` is for the names
-    of wheels.
+    were generated into `home` are installed, whether setup() lists them or not, and those that are
+    `gone` are not. `build_tag` is for the names of wheels.
     """
     index = {f"{prefixes.INDEX}/{kind}/{package}" for kind in ("packages", "rosidl_interfaces")}
 
     def run_commands(self: Any) -> None:
         getattr(self, "set_defaults", lambda: None)()  # looks for packages that nothing names
-        self.packages = sorted({*(self.packages or ()), *packages})
+        self.packages = sorted({*(self.packages or ()), *packages}.difference(gone))
         place = Path(self.get_option_dict("build").get("build_base", ("", "build"))[1], "idlc")
-        self.sources = list(self.data_files or ())
+        self.sources = present(self.data_files or ())
         listed, added = _merged(self.sources, files, index if files else set())
         if _WHEELS & set(self.commands):
             # where `ros2 run` and launch files look for the commands of a package
@@ -116,6 +126,7 @@ def distribution_class(
             self.data_files = self.sources
         base.run_command(self, command)
         self.data_files = installed
+        remove_leftovers(self, command, home)
 
     # editable installations leave data files out, because they ask for them by this other name
     added = {"has_data": base.has_data_files, "sources": None}

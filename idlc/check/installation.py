@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import NamedTuple
 
+from idlc.check.outputs import outdated
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
+from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated
 from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
 from idlc.packaging import setup_edits
@@ -67,6 +67,7 @@ def check_setup(
     view = layout(read, *(others or (None, None)), folders)
     if view and (others or "packages" in read.arguments):
         report.extend(_missing_packages(mine, view))
+    report.extend(setup_edits.unnoticed_changes(read, view.folder(package) if view else package))
     return report
 
 
@@ -81,7 +82,13 @@ def installed(facts: Facts, model: Model) -> Iterator[Diagnostic]:
         names = sorted(interface.name.file for interface in model.own)
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
-        yield from check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
+        for problem in check_setup(
+            setup.source, facts.name, keys, facts.folders, others, facts.runtime
+        ):
+            # the next `idlc gen` writes the file that setup.py should run
+            is_early = problem.code == codes.STALE_GENERATED_CODE.id and not facts.has_build_step
+            if not is_early:
+                yield problem
     elif setup is not None and (view := _layout(facts, setup)):
         yield from _absent_folders(_Package(setup, facts.name, (), facts.folders), view)
 
@@ -304,17 +311,7 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
 def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """Generated code in the package matches the current interfaces."""
     for output in facts.outputs:
-        if output.package != facts.name or not facts.whole:
-            continue
-        changed = []
-        for name in sorted(output.inputs.keys() | facts.inputs.keys()):
-            before, now = output.inputs.get(name), facts.inputs.get(name)
-            if before != now:
-                what = "was added" if before is None else "changed" if now else "was removed"
-                changed.append(f"`{name}` {what}")
-        if changed:
+        if output.package == facts.name and facts.whole:
             folder = facts.manifest.path.rpartition("/")[0] or "."
             words = ("gen", folder, "-o", output.path.rpartition("/")[0])
-            message = f"the generated code is out of date: {first_few(changed, 3)}"
-            hint = f"run `idlc {shlex.join(words)}`"
-            yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
+            yield from outdated(output.path, output.inputs, facts.inputs, words)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import sys
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -32,43 +33,57 @@ def _summary(
     verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...], report: Report
 ) -> str:
     """Return the last line of the text: changes, consequence, omissions and the next version."""
+    from idlc.diagnostics import codes
     from idlc.diagnostics.report import first_few
     from idlc.diagnostics.terminal import counted
     from idlc.tasks.breaking.files import Verdict
     from idlc.tasks.breaking.recordings import RecordedVerdict
 
     broken = {level: number for level, number in verdict.levels.items() if number}
-    text = "no breaking changes"
+    added = verdict.added if isinstance(verdict, Verdict) else ()
+    parts = []
+    if verdict.not_compared:
+        parts.append(f"{len(verdict.not_compared)} not compared")
+    at = ""
     if broken:
-        parts = ", ".join(f"{number} {level}" for level, number in broken.items())
+        levels_of = ", ".join(f"{number} {level}" for level, number in broken.items())
         number = sum(bool(problem.levels) for problem in report)
         consequence = _CONSEQUENCES[next(iter(broken))][isinstance(verdict, RecordedVerdict)]
-        text = f"{counted(number, 'breaking change')} ({parts}): {consequence}"
+        parts.append(f"{counted(number, 'breaking change')} ({levels_of}): {consequence}")
+    elif verdict.hidden:
+        at = f" at level {', '.join(levels)}"
+    nothing = any(problem.code == codes.NOTHING_COMPARED.id for problem in report)
+    if not (broken or nothing) and (added or any(verdict.seen.values())):
+        parts.append(f"no breaking changes{' in the rest' if verdict.not_compared else ''}{at}")
     if verdict.hidden:
-        at = "" if broken else f" at level {', '.join(levels)}"
-        text += f"{at}; --level hides {counted(verdict.hidden, 'change')}"
-    if isinstance(verdict, Verdict) and verdict.not_compared:
-        text += f"; {len(verdict.not_compared)} not compared"
+        parts.append(f"--level hides {counted(verdict.hidden, 'change')}")
     if verdict.allowed:
-        text += f"; {verdict.allowed} allowed"
-    if not isinstance(verdict, Verdict):
-        seen = [counted(number, noun) for noun, number in verdict.seen.items()]
-        text += f"; compared {', '.join(seen)}"
-        facts = verdict._asdict()
-        if silent := facts.get("silent"):
-            text += f"; {counted(silent, 'endpoint')} without a type hash"
-        if others := facts.get("others"):
-            text += f"; hidden: {counted(others, 'change')} without effect on readers (see --level)"
-        return text
-    if verdict.added:
-        text += f"; added: {first_few(verdict.added, 5)}"
-    if verdict.part is None:
-        numbers = (*verdict.levels.values(), verdict.allowed, verdict.hidden)
-        same = not any((*numbers, verdict.added, verdict.not_compared))
-        return f"{text}; the versions are the same" if same else text
+        parts.append(f"{verdict.allowed} allowed")
+    parts.append(
+        f"compared {', '.join(counted(number, noun) for noun, number in verdict.seen.items())}"
+    )
+    if added:
+        parts.append(f"added: {first_few(added, 5)}")
+    if isinstance(verdict, Verdict):
+        parts += _advice(verdict)
+    elif isinstance(verdict, RecordedVerdict):
+        if verdict.others:
+            others = counted(verdict.others, "change")
+            parts.append(f"hidden: {others} without effect on readers (see --level)")
+    elif verdict.silent:
+        parts.append(f"{counted(verdict.silent, 'endpoint')} without a type hash")
+    return "; ".join(parts)
+
+
+def _advice(verdict: Verdict) -> Iterator[str]:
+    """Yield the version to give to the package, if there is one."""
+    numbers = (*verdict.levels.values(), verdict.allowed, verdict.hidden)
     if verdict.next_version:
-        return f"{text}; suggested version: {verdict.next_version} (now {verdict.version})"
-    return f"{text}; raise the {verdict.part} version"
+        yield f"suggested version: {verdict.next_version} (now {verdict.version})"
+    elif verdict.part:
+        yield f"raise the {verdict.part} version"
+    elif not any((*numbers, verdict.added, verdict.not_compared)):
+        yield "the versions are the same"
 
 
 EPILOG = options.example(
@@ -139,7 +154,8 @@ def command(
     all standard interfaces.
 
     With a recording, idlc reports changes that prevent programs with your interfaces from reading
-    the recording. Without PATH, it compares every recorded type that it also finds on this machine.
+    the recording. If PATH is a recording, too, idlc compares the recorded types with each other.
+    Without PATH, it compares every recorded type with the type on this machine.
 
     With graph or the address of a robot, idlc reports types of which running nodes use different
     versions. It also compares these versions with your files and your installed packages.
@@ -167,14 +183,15 @@ def command(
     verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
     if against is not None and not report.had_errors:
         recordings: tuple[str, ...] = ()
+        newer: tuple[str, ...] = ()
         files = paths
         if not is_running and not is_distro(against) and not against.startswith(GIT):
             from idlc.recordings.find import recordings_of
 
-            recordings, files = recordings_of(against, paths, settings.root)
+            recordings, newer, files = recordings_of(against, paths, settings.root)
         needs_none = recordings or is_distro(against)
         comparison = BreakingOptions(
-            paths=files or settings.paths or (() if needs_none else (".",)),
+            paths=() if newer else files or settings.paths or (() if needs_none else (".",)),
             against=against,
             scope=scope(settings, **scoping),
             levels=levels or (() if recordings else LEVELS),
@@ -185,7 +202,7 @@ def command(
         if recordings:
             from idlc.tasks.breaking.recordings import compare_with_recordings
 
-            verdict = compare_with_recordings(comparison, recordings, report)
+            verdict = compare_with_recordings(comparison, recordings, newer, report)
             output.notes(report, sys.stderr)
         elif is_running:
             from idlc.tasks.breaking.graph import compare_with_graph
@@ -200,7 +217,7 @@ def command(
         if style == "github" and verdict:
             from idlc.diagnostics.formats import notice
 
-            sys.stdout.write(notice("idlc breaking", text))
+            output.lines(notice("idlc breaking", text), style, sys.stdout)
         return output.status(report)
     output.show(report, style, sys.stdout)
     if style == "json":

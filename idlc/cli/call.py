@@ -63,8 +63,8 @@ def command(
         report.add(codes.NO_ANSWER.of("", message, hint=hint))
         return
     try:
-        text = "".join(messages.texts(style, [kind.Response.deserialize(payload)]))
-        output.lines(text.removesuffix(messages.BETWEEN), sys.stdout)
+        text = "".join(messages.texts(style, [kind.Response.deserialize(payload).to_dict()]))
+        output.lines(text.removesuffix(messages.BETWEEN), style, sys.stdout)
     except ValueError as error:
         message = f"`{ends[0].name}` sent a malformed response: {error}"
         report.add(codes.NO_ANSWER.of("", message))

@@ -17,6 +17,7 @@ from idlc.cli import completion, options
         "idlc columns rec.mcap /imu",
         "idlc columns rec.mcap /imu -o imu.parquet",
         "idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv",
+        "idlc columns rec.mcap /imu --where 'linear_acceleration.z > 12'",
         "idlc columns rec.mcap -o columns/",
     ),
 )
@@ -51,6 +52,14 @@ from idlc.cli import completion, options
     help="Start time: an offset from the start (`10` or `1m30s`), a ROS time, or a UTC date.",
 )
 @click.option("--to", "end", metavar="TIME", help="End time (exclusive).")
+@click.option(
+    "--where",
+    "conditions",
+    metavar="CONDITION",
+    multiple=True,
+    help="Select messages by a field, such as `width > 640` or `name[0] == 'left'`. Repeat the "
+    "option to combine conditions.",
+)
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(
     "--datetimes/--no-datetimes",
@@ -68,14 +77,17 @@ from idlc.cli import completion, options
 )
 @options.include
 @click.option("--force", is_flag=True, help="Replace existing files.")
-def command(subject: str, fields: str | None, **arguments: Any) -> int:
+def command(subject: str, fields: str | None, conditions: tuple[str, ...], **arguments: Any) -> int:
     """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.
 
     REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc reads
     several recordings as one recording. Without TOPIC, it reads all topics. In the table of a
     topic, each row is a message. The columns are the recording time and the fields.
     """
+    from idlc.api.conditions import Condition
     from idlc.cli import output
+    from idlc.cli.streams import written_as
+    from idlc.diagnostics.ci import Form
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.recordings.find import expand, split_recordings
@@ -83,10 +95,15 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
 
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
+    try:
+        arguments["conditions"] = tuple(map(Condition.parse, conditions))
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
     paths = (*expand(subject), *recordings)
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
-    with output.progress_bar(sys.stderr) as update:
+    form = Form.EXACT if request.style == "csv" else Form.TEXT
+    with output.progress_bar(sys.stderr) as update, written_as(form, sys.stdout):
         written = columns(request, report, update)
     width = shutil.get_terminal_size((100, 24)).columns
     previews = [file.preview.text(width) for file in written if file.preview]

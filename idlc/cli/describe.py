@@ -26,8 +26,9 @@ def command(subject: str, scope: Scope, report: Report) -> None:
     """
     import json
 
+    from idlc.cli import output
     from idlc.tasks.show import describe
 
     content = describe(subject, scope, report)
     if content is not None:
-        sys.stdout.write(json.dumps(content, indent=2) + "\n")
+        output.lines(json.dumps(content, indent=2) + "\n", "json", sys.stdout)

@@ -50,7 +50,7 @@ def check_paths(
             stream = sys.stderr if diff else sys.stdout  # a diff alone can be applied
             paint = output.painter(stream)
             for name, (old, new) in checked.texts.items() if diff else ():
-                sys.stdout.writelines(output.diff(name, old, new, sys.stdout))
+                output.diff(name, old, new, sys.stdout)
             if not statistics:
                 output.show(report, style, stream, fixable=True)
             if statistics or len(report) > terminal.MANY:

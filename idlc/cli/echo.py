@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     "echo",
     epilog=options.example(
         "idlc echo tcp/robot:7447 /odom",
+        "idlc echo tcp/robot:7447 /odom --fields pose.pose.position",
         "idlc echo tcp/robot:7447 /odom --count 100 --format csv > odom.csv",
     ),
 )
@@ -30,17 +33,30 @@ if TYPE_CHECKING:
     type=click.IntRange(min=1),
     help="Stop after this number of messages.  [default: Ctrl-C stops]",
 )
+@click.option(
+    "--fields",
+    metavar="FIELD,...",
+    help="Print only these fields, such as `header.stamp,position[0]`. idlc decodes nothing else.",
+)
 @options.output_style(
     ("yaml", "json", "csv"), "Output format: YAML documents, one JSON object per line, or CSV."
 )
-def command(topic: str, count: int | None, style: str, session: Session, report: Report) -> None:
+def command(
+    topic: str,
+    count: int | None,
+    fields: str | None,
+    style: str,
+    session: Session,
+    report: Report,
+) -> None:
     """Print the messages of a robot's topic as they arrive.
 
     ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447. To use a
     Zenoh configuration file instead, write zenoh:FILE. ROS_DOMAIN_ID selects the domain. idlc needs
     no interface files, because the robot's nodes send the definition of the type.
 
-    In CSV, lists are JSON. In JSON, numbers that are not finite are null.
+    In CSV, lists are JSON. In JSON, numbers that are not finite are null. On a terminal, YAML
+    shows the first 16 elements of an array that has more than 32.
     """
     from idlc.cli import messages, output
     from idlc.robot.live import traffic
@@ -51,8 +67,19 @@ def command(topic: str, count: int | None, style: str, session: Session, report:
         return
     output.notes(report, sys.stderr)
     report.notes.clear()
-    arrived = traffic.messages(session, ends, kind, count, report)
+    read: Callable[[bytes], dict[str, Any]] = partial(_read_all, kind)
+    if fields is not None:
+        try:
+            read = messages.fields_of(kind, [path.strip() for path in fields.split(",")])
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
+    arrived = traffic.messages(session, ends, read, count, report)
     with suppress(KeyboardInterrupt):
-        for text in messages.texts(style, arrived):
-            output.lines(text, sys.stdout)
+        for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):
+            output.lines(text, style, sys.stdout)
             sys.stdout.flush()
+
+
+def _read_all(kind: Any, buffer: bytes) -> dict[str, Any]:
+    values: dict[str, Any] = kind.deserialize(buffer).to_dict()
+    return values

@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Callable
 
-from idlc.cli.streams import set_up
+from idlc.cli.streams import guarded, set_up
+from idlc.diagnostics.ci import SpeakingError
 
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
@@ -25,6 +26,11 @@ class PipeClosedError(Exception):
 def status_of(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
     set_up()
+    with guarded():
+        return _status_of(command)
+
+
+def _status_of(command: Callable[[], object]) -> int:
     try:
         os.stat(os.getcwd())  # noqa: PTH109, PTH116 - a server starts without pathlib
     except OSError as error:  # its path may be too long
@@ -43,6 +49,12 @@ def status_of(command: Callable[[], object]) -> int:
     except (BrokenPipeError, PipeClosedError):
         _discard_output()
         return PIPE_CLOSED
+    except SpeakingError:
+        from idlc.cli.output import usage_error
+
+        message = "the output contains a line that a CI system would obey as a command"
+        usage_error(message, "write the output to a file, for example with `> FILE`")
+        return 2
     except OSError as error:
         if error.errno not in _FULL or error.filename:
             return _internal(error)

@@ -67,7 +67,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
             if write:
                 rewrite(file.path, file.shown, source.text, new, report)
             if diff:
-                sys.stdout.writelines(output.diff(file.shown, source.text, new, sys.stdout))
+                output.diff(file.shown, source.text, new, sys.stdout)
             else:
                 sys.stdout.write(f"{done} {one_line(file.shown)}\n")
     output.show(report, "text", sys.stderr)

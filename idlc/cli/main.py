@@ -18,6 +18,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    try:
+        return _dispatch(words)
+    except KeyboardInterrupt:  # while modules are imported
+        sys.stderr.write("interrupted\n")
+        return 130
+
+
+def _dispatch(words: list[str]) -> int:
     from idlc.cli.exit_status import status_of
 
     if words in (["--version"], ["-V"]):

@@ -5,12 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
+import math
+import re
+import secrets
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 import click
 import msgspec
 
+from idlc.diagnostics.ci import Form, silenced
 from idlc.diagnostics.text import one_line
 from idlc.runtime.names import ValidationError
 
@@ -66,24 +71,124 @@ def field_words(kind: Any, word: str) -> list[str]:
     ]
 
 
-def texts(style: str, messages: Iterable[Any]) -> Iterator[str]:
-    """Yield messages as YAML documents, JSON lines or CSV rows."""
-    import yaml
+def fields_of(kind: Any, paths: Sequence[str]) -> Callable[[bytes], dict[str, Any]]:
+    """Return a function that reads fields of a message as `to_dict` has them; absent ones are None.
 
-    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": 100}
-    for number, message in enumerate(messages):
-        values = message.to_dict()
+    Raises ValueError for paths that the class does not have.
+    """
+    from idlc.api.reader import Absent, field_reader, reader
+
+    reader(kind, *paths)  # which names all that are wrong
+    readers = {path: field_reader(kind, (path,), False, True) for path in paths}
+
+    def read(buffer: bytes) -> dict[str, Any]:
+        values: dict[str, Any] = dict.fromkeys(readers)
+        for path, read_field in readers.items():
+            with suppress(Absent):
+                values[path] = _plain(read_field(buffer))
+        return values
+
+    return read
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as `to_dict` has it."""
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if isinstance(value, list):
+        return [_plain(element) for element in value]
+    if isinstance(value, bytes):
+        return value[0]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def texts(
+    style: str, messages: Iterable[dict[str, Any]], *, is_brief: bool = False
+) -> Iterator[str]:
+    """Yield messages, as dictionaries, as YAML documents, JSON lines or CSV rows.
+
+    If `is_brief`, YAML shows only the first elements of a long array.
+    """
+    for number, values in enumerate(messages):
         if style == "json":
             yield f"{_json(values)}\n"
         elif style == "yaml":
-            yield yaml.dump(values, Dumper=dumper, **options) + BETWEEN
+            yield _yaml(_shortened(values) if is_brief else values) + BETWEEN
         else:
             cells = dict(_cells(values, ""))
             rows = io.StringIO()
             head = [] if number else [cells.keys()]
             csv.writer(rows, lineterminator="\n").writerows((*head, cells.values()))
             yield rows.getvalue()
+
+
+#: Arrays of more elements are shortened on a terminal, and written without the YAML library.
+_LONG = 32
+#: Texts that readers of YAML 1.2 take for numbers, while PyYAML reads and writes YAML 1.1.
+_NUMBER = re.compile(r"[-+]?(\.\d+|\d+(\.\d*)?)([eE][-+]?\d+)?|0o[0-7]+|0x[\dA-Fa-f]+")
+
+
+def _shortened(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _shortened(part) for name, part in value.items()}
+    if not isinstance(value, list):
+        return value
+    shown = [_shortened(part) for part in value[: _LONG // 2 if len(value) > _LONG else None]]
+    return [*shown, f"... {len(value)} in all"] if len(value) > _LONG else shown
+
+
+def _yaml(values: Any) -> str:
+    """Return a YAML document; text that is not plainly visible is quoted, with escapes.
+
+    PyYAML takes seconds and much memory for an image, so it writes a mark for each long array of
+    numbers, and the numbers replace the mark afterwards.
+    """
+    import yaml
+
+    mark, arrays = f"array{secrets.token_hex(8)}x", list[str]()
+
+    class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+        def represent_text(self, text: str) -> Any:
+            is_odd = one_line(text) != text or silenced(text) != text
+            style = "'" if _NUMBER.fullmatch(text) else None
+            style = '"' if is_odd else style
+            return self.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+        def represent_array(self, array: list[Any]) -> Any:
+            if len(array) <= _LONG or not {*map(type, array)} <= {int, float}:
+                return self.represent_list(array)
+            plain = repr(array)
+            is_plain = "e" not in plain and "n" not in plain
+            arrays.append(plain if is_plain else f"[{', '.join(map(_number, array))}]")
+            return self.represent_text(f"{mark}{len(arrays) - 1}x")
+
+    def dumped(width: int) -> str:
+        arrays.clear()
+        text = yaml.dump(values, Dumper=Dumper, width=width, **options)
+        return "\n".join(map(_escaped, text.split("\n")))
+
+    Dumper.add_representer(str, Dumper.represent_text)
+    Dumper.add_representer(list, Dumper.represent_array)
+    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
+    text = dumped(100)
+    if silenced(text, Form.COMMANDS) != silenced(text):  # a line begins within a value
+        text = dumped(1 << 30)
+    return re.sub(rf"{mark}(\d+)x", lambda match: arrays[int(match[1])], text)
+
+
+def _escaped(line: str) -> str:
+    """Return a line with hidden characters as escapes; they are in quoted text only."""
+    if one_line(line) == line:
+        return line
+    return "".join(each if one_line(each) == each else f"\\U{ord(each):08x}" for each in line)
+
+
+def _number(value: float) -> str:
+    """Return a number in YAML, where a number with an exponent has a point."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}[repr(value)]
+    text = repr(value)
+    return text.replace("e", ".0e") if "." not in text else text
 
 
 def _json(values: Any) -> str:

@@ -9,8 +9,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from idlc.cli.streams import colours
+from idlc.cli.streams import colours, written_as
 from idlc.diagnostics import codes, terminal
+from idlc.diagnostics.ci import Form
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Paint
 from idlc.diagnostics.text import one_line, visible
@@ -65,7 +66,8 @@ def painter(stream: TextIO) -> Paint:
 def show(report: Report, style: str, stream: TextIO, *, fixable: bool = False) -> None:
     """Write every problem to a stream, as text or as JSON lines; see `terminal.text`."""
     if style == "json":
-        stream.writelines(terminal.json_lines(report))
+        with written_as(Form.JSON, stream):
+            stream.writelines(terminal.json_lines(report))
     else:
         blocks = terminal.text(report, colour=colours(stream), fixable=fixable)
         stream.writelines([f"{block}\n" for block in blocks])
@@ -79,8 +81,13 @@ def usage_error(message: str, hint: str) -> None:
     sys.stderr.write(f"{head}\n  {advice}\n")
 
 
-def diff(path: str, old: str, new: str, stream: TextIO) -> Iterator[str]:
-    """Yield a unified diff: for a program as it is, for a terminal without control characters."""
+def diff(path: str, old: str, new: str, stream: TextIO) -> None:
+    """Write a unified diff: for a program as it is, for a terminal without control characters."""
+    with written_as(Form.EXACT, stream):
+        stream.write("".join(_diff(path, old, new, stream)))
+
+
+def _diff(path: str, old: str, new: str, stream: TextIO) -> Iterator[str]:
     from difflib import unified_diff
 
     path = one_line(path)
@@ -104,7 +111,8 @@ def fact(stream: TextIO, kind: str, **facts: object) -> None:
     """Write a JSON line that is not a problem."""
     import json
 
-    stream.write(json.dumps({"type": kind, **facts}) + "\n")
+    with written_as(Form.JSON, stream):
+        stream.write(json.dumps({"type": kind, **facts}) + "\n")
 
 
 #: The coloured elements of an interface; quoted text is first, because it may contain `#`.
@@ -115,19 +123,37 @@ _ELEMENTS = re.compile(
 
 
 def texts(parts: Iterable[str], style: str, stream: TextIO, *, interfaces: bool = False) -> None:
-    """Write texts, one after the other; `interfaces` in the text format are coloured."""
+    """Write texts, one after the other; `interfaces` in the text format are coloured.
+
+    Text in other formats than JSON is exact.
+    """
     text = "\n".join(parts)
     if style == "text" or stream.isatty():  # other formats are for other tools
         text = "\n".join(map(visible, text.split("\n")))
     if interfaces and style == "text":
         paint = painter(stream)
         text = _ELEMENTS.sub(lambda match: paint(str(match.lastgroup), match[0]), text)
-    stream.write(text)
+    with written_as(_FORMS.get(style, Form.EXACT), stream):
+        stream.write(text)
 
 
-def lines(text: str, stream: TextIO) -> None:
-    """Write whole lines; a terminal gets them without control characters."""
-    stream.write("\n".join(map(visible, text.split("\n"))) if stream.isatty() else text)
+#: The forms of formats that are not exact.
+_FORMS = {
+    "text": Form.TEXT,
+    "json": Form.JSON,
+    "jsonschema": Form.JSON,
+    "yaml": Form.YAML,
+    "github": Form.COMMANDS,
+    "junit": Form.XML,
+    "gitlab": Form.JSON,
+    "sarif": Form.JSON,
+}
+
+
+def lines(text: str, style: str, stream: TextIO) -> None:
+    """Write whole lines in a format; a terminal gets them without control characters."""
+    with written_as(_FORMS.get(style, Form.EXACT), stream):
+        stream.write("\n".join(map(visible, text.split("\n"))) if stream.isatty() else text)
 
 
 def counts(report: Report) -> dict[str, int]:
@@ -152,4 +178,5 @@ def document(
     """
     from idlc.diagnostics.formats import DOCUMENTS, Run
 
-    sys.stdout.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))
+    with written_as(_FORMS.get(style, Form.EXACT), sys.stdout):
+        sys.stdout.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))

@@ -6,9 +6,12 @@ import codecs
 import contextlib
 import io
 import os
+import stat
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+from idlc.diagnostics.ci import Form, silenced
 
 if TYPE_CHECKING:
     from threading import Event
@@ -68,3 +71,124 @@ def stop_signals() -> Iterator[Event]:
     finally:
         for number, handler in zip(numbers, handlers, strict=True):
             signal.signal(number, handler or signal.SIG_DFL)
+
+
+#: Characters at the end of an unfinished line that can be a part of a prefix.
+_TAIL = 20
+
+
+class GuardedStream(io.TextIOBase):
+    """A standard stream that a CI system may read: text of others never becomes its commands.
+
+    All text is `TEXT`, unless a command says otherwise with `written_as`. Without a form, text is
+    written as it is.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+        #: The end of the line so far, without the blanks before it.
+        self._tail = ""
+        self.form: Form | None = Form.TEXT
+
+    def write(self, text: str) -> int:
+        """Write text; raise SpeakingError for exact text that a CI system would obey."""
+        self._stream.write(self._silenced(text))
+        return len(text)
+
+    def write_bytes(self, data: bytes) -> None:
+        """Write exact text as bytes."""
+        self._silenced(data.decode("utf-8", "replace"))
+        self._stream.buffer.write(data)
+
+    def _silenced(self, text: str) -> str:
+        if self.form is None or not text:
+            return text
+        whole = silenced(self._tail + text, self.form)
+        line = f"{self._tail}{text}".rpartition("\n")[2].lstrip()
+        if whole.startswith(self._tail):
+            text = whole[len(self._tail) :]
+        else:  # a prefix begins in what is written already
+            text = silenced(f" {text}", self.form)
+        self._tail = line if len(line) < _TAIL else f"x{line[1 - _TAIL :]}"
+        return text
+
+    @property
+    def buffer(self) -> Any:
+        """The stream of bytes; exact text is checked there, too."""
+        return _GuardedBytes(self) if self.form is Form.EXACT else self._stream.buffer
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """The encoding of the stream."""
+        return str(self._stream.encoding)
+
+    @property
+    def errors(self) -> str:  # type: ignore[override]
+        """The name of the replacement of characters that cannot be encoded."""
+        return str(self._stream.errors)
+
+    def flush(self) -> None:
+        """Flush the stream."""
+        self._stream.flush()
+
+    def writable(self) -> bool:
+        """Return True."""
+        return True
+
+    def fileno(self) -> int:
+        """Return the file descriptor."""
+        return int(self._stream.fileno())
+
+
+class _GuardedBytes(io.RawIOBase):
+    """The bytes of exact text."""
+
+    def __init__(self, stream: GuardedStream) -> None:
+        self._stream = stream
+
+    def writable(self) -> bool:
+        """Return True."""
+        return True
+
+    def write(self, data: Any) -> int:
+        """Write bytes of UTF-8."""
+        piece = bytes(data)
+        self._stream.write_bytes(piece)
+        return len(piece)
+
+
+@contextlib.contextmanager
+def guarded() -> Iterator[None]:
+    """Guard the standard streams while a command runs."""
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = (
+        stream if stream.isatty() else GuardedStream(stream) for stream in before
+    )
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
+
+
+@contextlib.contextmanager
+def written_as(form: Form, stream: TextIO) -> Iterator[None]:
+    """Say which form all text has that is written to a stream meanwhile.
+
+    No CI system reads a file, so exact text is written to it as it is.
+    """
+    if not isinstance(stream, GuardedStream):
+        yield
+        return
+    before = stream.form
+    stream.form = None if form is Form.EXACT and _is_file(stream) else form
+    try:
+        yield
+    finally:
+        stream.form = before
+
+
+def _is_file(stream: GuardedStream) -> bool:
+    try:
+        return stat.S_ISREG(os.fstat(stream.fileno()).st_mode)
+    except (OSError, ValueError):
+        return False

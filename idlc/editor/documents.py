@@ -12,7 +12,7 @@ from bisect import bisect_right
 from codecs import BOM_UTF8
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -58,14 +58,13 @@ def path_text(uri: str, *, on_windows: bool) -> str:
 # Positions in a text, as the protocol counts them and as Python does.
 
 TOP = Range(Position(0, 0), Position(0, 0))
-_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)")
+_END = re.compile(r"\r\n|\r|\n")
 
 
 def lines_of(text: str) -> list[str]:
     """Return the lines with their ends; the last has none and may be empty."""
-    lines = _LINE.findall(text)
-    lines.append(text[sum(map(len, lines)) :])
-    return lines
+    ends = [0, *(match.end() for match in _END.finditer(text)), len(text)]
+    return [text[start:end] for start, end in pairwise(ends)]
 
 
 def units(text: str, encoding: str) -> int:

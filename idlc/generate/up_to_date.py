@@ -10,13 +10,13 @@ from idlc.generate.target import Target
 from idlc.model.ir import TypeName
 from idlc.project import write
 from idlc.project.library import Library
-from idlc.project.lock import FILE, Lock, Tree, Vendoring, digest, meaning
+from idlc.project.lock import BUILD_STEP, FILE, Lock, Tree, Vendoring, digest, meaning
 from idlc.version import __version__
 
 _PACKAGE = Path(__file__).parents[1]
 #: The sources of idlc that affect the output: a change counts although the version stays.
 _ROOMS = (
-    *("compiler", "diagnostics", "generate", "language", "model"),
+    *("build", "compiler", "diagnostics", "generate", "language", "model"),
     *("project", "runtime", "tasks", "wire"),
 )
 _MAKERS = (
@@ -44,6 +44,7 @@ def unchanged(
         and bool(lock.converts_values) == library.distro.converts_values
         and lock.inputs == inputs
         and _outputs_stand(target.path, lock)
+        and target.step.keys() == lock.outputs.keys() & {BUILD_STEP}
         and _carries_this_runtime(lock)
         and _newest_maker() <= (target.path / FILE).stat().st_mtime_ns
         and all(_dependency(name, library) == old for name, old in lock.dependencies.items())

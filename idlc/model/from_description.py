@@ -48,7 +48,7 @@ def model_of_description(
     """
     messages: dict[ir.TypeName, ir.Message] = {}
     for part in (description["type_description"], *description["referenced_type_descriptions"]):
-        message = _message(part, program)
+        message = message_of(part, program)
         if message.name in messages:
             raise DescriptionError(f"it describes `{message.name}` twice")
         messages[message.name] = message
@@ -67,7 +67,8 @@ def model_of_description(
     return model
 
 
-def _message(part: IndividualDict, program: str) -> ir.Message:
+def message_of(part: IndividualDict, program: str) -> ir.Message:
+    """Return the message that one description describes; raises DescriptionError."""
     name = _type_name(part["type_name"])
     bare: list[FieldDict] = [{**field, "default_value": ""} for field in part["fields"]]
     written = part["fields"] if bare != individual(ir.Message(name=name))["fields"] else []

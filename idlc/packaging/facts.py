@@ -13,7 +13,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.packaging.cmake import GENERATE, calls
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import FILE, Runtime, load_lock
+from idlc.project.lock import BUILD_STEP, FILE, Runtime, load_lock
 from idlc.project.package_xml import Statement, statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
@@ -49,6 +49,7 @@ class Facts(msgspec.Struct, frozen=True):
     `files` are the paths of interface files in the package's folder by name within the package.
     `interfaces` are the paths of all, checked or not, .idl files included.
     `folders` are those with files by dotted name, and whether they are Python packages.
+    `has_build_step` is whether idlc wrote the file that a setup.py runs where idlc is missing.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Facts(msgspec.Struct, frozen=True):
     files: Mapping[str, str] = {}
     interfaces: frozenset[str] = frozenset()
     folders: Mapping[str, bool] = {}
+    has_build_step: bool = False
 
     @property
     def runtime(self) -> Runtime:
@@ -152,6 +154,7 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
             file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
         ),
         folders=folders(folder, files),
+        has_build_step=any(file.name == BUILD_STEP for file in files),
         available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
     )
 

@@ -16,6 +16,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit
 from idlc.diagnostics.source import Source, Span
 from idlc.packaging.setup_py import Setup, parse, range_of, span_of, start_of
+from idlc.project.lock import BUILD_STEP
 
 #: The widest line that the linters of ROS 2 accept.
 WIDTH = 99
@@ -247,6 +248,50 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
 
 #: The argument of setup() for which idlc compiles interfaces.
 KEYWORD = "idlc_interfaces"
+
+
+def unnoticed_changes(setup: Setup, folder: str) -> Iterator[Diagnostic]:
+    """Yield the problem of a setup.py that installs outdated classes where idlc is missing.
+
+    `folder` contains the classes.
+    """
+    is_entered = any("/packages" in (entry.folder or "") for entry in setup.data_files or ())
+    if BUILD_STEP in setup.source.text or not (is_entered or KEYWORD in setup.arguments):
+        return
+    find, run = "find_spec('idlc')", f"run_path('{folder}/{BUILD_STEP}')"
+    edits = _before_setup(setup, folder)
+    yield codes.STALE_GENERATED_CODE.at(
+        setup.place(KEYWORD),
+        "builds without idlc do not notice if the classes are out of date",
+        hint=f"write `if not {find}: {run}` before setup()"
+        + (", or run `idlc check --fix`" if edits else ""),
+        edits=edits,
+    )
+
+
+def _before_setup(setup: Setup, folder: str) -> tuple[Edit, ...]:
+    """Return the edits that run the build step before the statement that calls setup()."""
+    source, call = setup.source, setup.call
+    if call is None:
+        return ()
+    statements = [node for node in setup.tree.body if node.lineno <= call.lineno]
+    statement = statements[-1]
+    at = start_of(source, statement)
+    has_own_line = _begins_line(source, at) and not getattr(statement, "decorator_list", ())
+    if not has_own_line or re.search(r"[^\w./-]", folder):  # it becomes part of a program
+        return ()
+    find, imports = imported(setup, "importlib.util", "find_spec")
+    run, more = imported(setup, "runpy", "run_path")
+    if imports and more and imports[0].span == more[0].span:
+        first = imports[0]
+        blank = first.text.rstrip("\r\n") + line_end(source)
+        imports, more = (Edit(first.span, blank + more[0].text),), ()
+    quote = quote_of(source, call)
+    text = (
+        f"if not {find}('idlc'):  # this build stops if `idlc gen` was not run after a change\n"
+        f"{step_of(source)}{run}('{folder}/{BUILD_STEP}')\n\n"
+    )
+    return (*imports, *more, insertion(source, at, text.replace("'", quote)))
 
 
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:

@@ -101,7 +101,7 @@ class Revision(NamedTuple):
         places = [place for place in map(self.counterpart, paths) if place and Path(place).exists()]
         left_out = exclude.seen_from(self.folder, self.top)
         listed = list_files(places, self.root, report, left_out).files
-        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in listed)
+        return tuple(msgspec.structs.replace(file, shown=self.shown(file.path)) for file in listed)
 
     def holds(self, path: Path) -> bool:
         """Return whether a file of the working tree is in this repository, not in another."""
@@ -117,14 +117,18 @@ class Revision(NamedTuple):
             if is_meant and not os.path.lexists(now / ".git") and not _is_empty(now):
                 yield name
 
+    def is_present(self, path: Path) -> bool:
+        """Return whether the working tree has a file or folder of the revision, too."""
+        return os.path.lexists(self.top / path.relative_to(self.folder))
+
     def is_skipped(self, shown: str) -> bool:
         """Return whether git keeps a file of the revision, or a link to it, out of the tree."""
-        path = PurePath(shown.removeprefix(self._shown(self.folder)[:-1]))
+        path = PurePath(shown.removeprefix(self.shown(self.folder)[:-1]))
         names = (ancestor.as_posix() for ancestor in (path, *path.parents))
         return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
 
-    def _shown(self, path: Path) -> str:
-        """Return the name of a file of the revision in messages."""
+    def shown(self, path: Path) -> str:
+        """Return the name of a file or folder of the revision in messages."""
         return f"git:{self.name}:{path.relative_to(self.folder).as_posix()}"
 
 

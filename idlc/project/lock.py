@@ -104,6 +104,8 @@ def _is(path: str, mode: int) -> str:
 Content = TypeVar("Content")
 
 FILE = "idlc.lock"
+#: The file beside it by which builds without idlc notice that classes are out of date.
+BUILD_STEP = "_idlc_build.py"
 #: Raised when an older idlc could not read what a newer one writes.
 FORMAT = 1
 

@@ -65,13 +65,16 @@ def expand(word: str) -> list[str]:
 
 def recordings_of(
     against: str, paths: tuple[str, ...], root: Root
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the recordings that --against means, which may be a pattern, and the other paths.
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Return the recordings that --against means, those among the paths, and the other paths.
 
-    A shell that expands the pattern itself leaves all but the first among the paths.
+    --against may be a pattern. A shell that expands it leaves all but the first recording among the
+    paths; beside other paths, they count as if they were part of --against.
     """
     matches = expand(against)
     if not split_recordings(matches, root)[0]:
-        return (), paths
+        return (), (), paths
     more, others = split_recordings(paths, root)
-    return tuple(dict.fromkeys((*matches, *more))), tuple(others)
+    if others:
+        return tuple(dict.fromkeys((*matches, *more))), (), tuple(others)
+    return tuple(matches), tuple(dict.fromkeys(more)), ()

@@ -6,8 +6,9 @@ Constructors leave checks to `checked`, which is rarely needed.
 
 from __future__ import annotations
 
+import gc
+import os
 import struct
-from os import environ
 
 from .cdr import NATIVE, order_of
 from .names import DecodeError, ValidationError, demand_stamp, owner_of
@@ -33,7 +34,7 @@ else:
 
 
 #: Whether all messages check their fields. Read once, as in rosidl's modules.
-CHECK_FIELDS = environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
+CHECK_FIELDS = os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
 
 ORDERS = {"little": "<", "big": ">"}
 
@@ -63,11 +64,47 @@ READINGS: dict[tuple[Text, bool], Reading] = {
     for text in (bytes.decode, text_of_view)
     for copy in (True, False)
 }
-COPYING = READINGS[bytes.decode, True]
+COPYING, VIEWING = READINGS[bytes.decode, True], READINGS[bytes.decode, False]
 
 
 #: The exceptions of decoding a buffer that is not a message.
 FAILURES = (struct.error, ValueError, IndexError, OverflowError)
+
+
+class Pause:
+    """Keeps the garbage collector, which finds nothing in messages, from running in any thread.
+
+    The last of the threads in it lets it run, unless it was disabled before the first.
+    """
+
+    def __init__(self) -> None:
+        self.threads: list[None] = []  # a count that no thread can interrupt
+        self.has_disabled = False
+        if hasattr(os, "register_at_fork"):
+            os.register_at_fork(after_in_child=self.threads.clear)
+            os.register_at_fork(after_in_child=self.resume)
+
+    def __enter__(self) -> None:
+        self.threads.append(None)
+        if gc.isenabled():
+            self.has_disabled = True
+            gc.disable()
+
+    def __exit__(self, *_: object) -> None:
+        self.threads.pop()
+        if not self.threads:
+            self.resume()
+
+    def resume(self) -> None:
+        """Let it run: no thread is in the pause, as in a process that was forked."""
+        if self.has_disabled:
+            self.has_disabled = False
+            gc.enable()
+
+
+PAUSE = Pause()
+#: From this size on, messages of many parts are decoded while the collector is paused.
+LARGE = 1 << 14
 
 
 class Codec:
@@ -101,15 +138,26 @@ def codecs_of(kind: type) -> Codecs:
 def keep_codecs(owner: Any, make: Callable[[Any, str, Reading], Codec]) -> Codecs:
     """Return the codecs that `make` makes, each once; the class keeps them as `_codec_`."""
     cached: dict[tuple[str, Reading], Codec] = {}
+    types = owner._fields_and_field_types.values()
+    has_parts = any("/" in type_ for type_ in types if type_.startswith("sequence<"))
 
     def codecs(order: str, reading: Reading = COPYING) -> Codec:
         codec = cached.get((order, reading))
         if codec is None:
             codec = cached[order, reading] = make(owner, order, reading)
+            if has_parts:
+                codec.decode = partial(_decode_parts, codec.decode)
         return codec
 
     owner._codec_ = staticmethod(codecs)
     return codecs
+
+
+def _decode_parts(decode: Callable[[Any], Any], data: Any) -> Any:
+    if len(data) < LARGE:
+        return decode(data)
+    with PAUSE:
+        return decode(data)
 
 
 def functions(kind: type) -> Functions:
@@ -136,8 +184,8 @@ def functions(kind: type) -> Functions:
 
     def deserialize(buffer: Any, copy: bool = True) -> Any:
         try:
-            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0] and copy:
-                return decode(buffer)
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                return (decode if copy else codecs("<", VIEWING).decode)(buffer)
             return read(codecs, buffer, copy)
         except DecodeError:
             raise
@@ -230,14 +278,16 @@ def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]
     decode = codecs("<", READINGS[bytes.decode, copy]).decode
     result: list[Any] = []
     put = result.append
-    for buffer in buffers:
-        try:
-            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
-                put(decode(buffer))
-            else:
-                put(read(codecs, buffer, copy))
-        except FAILURES:
-            put(_indexed(kind, buffer, copy, len(result)))
+    buffers = list(buffers)  # whose code runs before the pause
+    with PAUSE:
+        for buffer in buffers:
+            try:
+                if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                    put(decode(buffer))
+                else:
+                    put(read(codecs, buffer, copy))
+            except FAILURES:
+                put(_indexed(kind, buffer, copy, len(result)))
     return result
 
 

@@ -117,8 +117,12 @@ def same(mine: Any, other: Any) -> bool:
 def copied(message: Any, memo: dict[int, Any] | None = None) -> Any:
     """Return a copy; with the memo of `deepcopy`, it shares nothing that can change."""
     kind = type(message)
-    duplicate = object.__new__(kind)
+    duplicate, store = object.__new__(kind), object.__setattr__
     if owner_of(kind) is kind:
+        if memo is None:
+            for slot in kind.__slots__:
+                store(duplicate, slot, getattr(message, slot))
+            return duplicate
         state = {slot: getattr(message, slot) for slot in kind.__slots__}
     else:  # a user's subclass, which may have more than slots
         reduced: Any = object.__reduce_ex__(message, 4)
@@ -131,7 +135,6 @@ def copied(message: Any, memo: dict[int, Any] | None = None) -> Any:
         for name, value in state.items():
             if type(value) not in ATOMIC:
                 state[name] = deepcopy(value, memo)
-    store = object.__setattr__
     for name, value in state.items():
         store(duplicate, name, value)
     return duplicate
@@ -399,7 +402,8 @@ class Message(metaclass=MessageMeta):
         """
         from .conversions import from_dict
 
-        message: typing_extensions.Self = from_dict(cls, values)
+        with codec.PAUSE:
+            message: typing_extensions.Self = from_dict(cls, values)
         return message
 
     __copy__ = __deepcopy__ = copied

@@ -237,8 +237,9 @@ def view_reader(order: str, name: str) -> Callable[[Any], Any]:
     """Return a function that makes a numpy array over a buffer, in whichever byte order that is."""
     import numpy as np
 
-    dtype: Any = np.dtype(name)
-    return partial(np.frombuffer, dtype=dtype.newbyteorder(order))
+    kind: Any = np.dtype(name)
+    dtype, frombuffer = kind.newbyteorder(order), np.frombuffer
+    return lambda raw: frombuffer(raw, dtype)  # half of what a keyword takes
 
 
 def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], Any]:

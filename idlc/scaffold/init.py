@@ -50,7 +50,10 @@ from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
 #: The folder of generated classes in a library.
 _ROS = "ros"
 #: What a review can leave out of the generated files.
-_REVIEWED_ELSEWHERE = ("_idlc/**", "_vendor/**", "_type_data.py", "*/_*__codec.py", "idlc.lock")
+_REVIEWED_ELSEWHERE = (
+    *("_idlc/**", "_vendor/**", "_idlc_build.py", "_type_data.py"),
+    *("*/_*__codec.py", "idlc.lock"),
+)
 _PLAIN_SETUP = "from setuptools import setup\n\nsetup()\n"
 _SETUP_TEXT = _PLAIN_SETUP.replace("()", f"({KEYWORD}=True)")
 #: The file of each service at the top of a repository, and its template.
@@ -368,7 +371,10 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
             outcome = Refused(why, f"{KEYWORD}=True,", "to the arguments of each")
         if setup.call is not None:
             edits = append_element(setup.source, setup.call, f"{KEYWORD}=True")
-            outcome = Edited(apply(text, edits)[0])
+            edited = Source(SETUP, apply(text, edits)[0])
+            again = check_setup(edited, name, files, existing, others)
+            steps = (edit for problem in again for edit in problem.edits)
+            outcome = Edited(apply(edited.text, steps)[0])
     draft.put(SETUP, outcome, "builds compile the interfaces and install their classes")
     report.extend(problem for problem in problems if not problem.edits)
     view = layout(setup, *others, existing)
@@ -478,8 +484,7 @@ def _ignored(draft: Draft, layout: Layout, out: str) -> None:
             )
         return
     lines = [f"{out}/{pattern} linguist-generated" for pattern in _REVIEWED_ELSEWHERE]
-    if layout.kind != "library":
-        del lines[1]
+    del lines[2 if layout.kind == "library" else 1]  # a library has no setup.py that runs it
     attributes = draft.text(".gitattributes")
     reason = "reviews hide generated code"
     draft.put(".gitattributes", _with_lines(attributes, lines), reason)

@@ -12,8 +12,10 @@ from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
+from idlc.generate.target import build_step
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
+from idlc.project.lock import BUILD_STEP
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import Code, Text, code
@@ -107,6 +109,7 @@ def package_files(package: Package) -> dict[str, str]:
     files["LICENSE"] = text.replace("(c) HOLDER", f"(c) {package.maintainer}")
     if package.build_type == PYTHON:
         files[f"resource/{package.name}"] = ""
+        files[f"{package.name}/{BUILD_STEP}"] = build_step().decode()
         files[f"{package.name}/__init__.py"] = f'"""Nodes and interfaces of {package.name}."""\n'
     return files
 

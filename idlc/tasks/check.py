@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check import cmake_lists
+from idlc.check import cmake_lists, outputs
 from idlc.check.registry import advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
 from idlc.compiler.compiler import Compiler, library_for, stage
@@ -21,6 +21,7 @@ from idlc.packaging.facts import Facts, facts
 from idlc.project import inputs
 from idlc.project.files import is_folder
 from idlc.project.find import KINDS, RULES, list_files, no_interfaces
+from idlc.project.lock import Lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
@@ -176,6 +177,7 @@ class Checker:
         self._checked = IncrementalFindings() if again else None
         self._advised = IncrementalFindings() if again else None
         self._facts: dict[str, Facts | None] = {}
+        self._records: dict[str, dict[Path, Lock]] = {}
 
     def check(self, packages: Sequence[inputs.Inputs], report: Report) -> list[Model]:
         """Report problems, selected or not; return packages' models, limited to checked files."""
@@ -190,6 +192,7 @@ class Checker:
             if surroundings is not None:
                 with stage("check package", package.package):
                     check_package(surroundings, models[-1], report)
+            report.extend(outputs.current_outputs(package, self._outputs(package), self._scope))
             if any(is_folder(folder / RULES) for folder in package.folders):
                 from idlc.versions.coverage import rule_folders, rule_problems
 
@@ -197,6 +200,11 @@ class Checker:
                     folders = rule_folders(package.folders)
                     report.extend(rule_problems(folders, model, self._scope.root))
         return models
+
+    def _outputs(self, package: inputs.Inputs) -> dict[Path, Lock]:
+        if package.package not in self._records:
+            self._records[package.package] = outputs.outputs(package, self._scope)
+        return self._records[package.package]
 
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import msgspec
 
+from idlc.api.conditions import Condition
 from idlc.api.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
@@ -193,6 +194,7 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
     fields: tuple[str, ...] | None = None
     start: str | None = None
     end: str | None = None
+    conditions: tuple[Condition, ...] = ()
     nested: bool = False
     datetimes: bool = True
     check: bool = False
@@ -330,8 +332,11 @@ def _written(
     """Write the columns of one topic, unless it has no such fields."""
     name, rows = job.topic.topic.name, 0
     flat = job.style in ("csv", TEXT) or not options.nested
+    topic = job.topic
     try:
-        reader = job.topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
+        for condition in options.conditions:
+            topic = topic.where(*condition)
+        reader = topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
     except ValueError as error:
         hint = f"`idlc show {options.recordings[0]} {name}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
@@ -343,6 +348,8 @@ def _written(
             rows += batch.num_rows
             progress(name, rows, job.topic.topic.count)
             yield batch
+        if topic.absent:
+            report.notes += (f"{name}: {topic.absent:,} messages do not have a field of --where",)
 
     if job.style == TEXT:
         preview = Preview(f"{name}  {job.topic.topic.type}", reader.schema.names)

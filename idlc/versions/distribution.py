@@ -52,11 +52,13 @@ def compare_with_distro(
     if report.had_errors:
         return None
     with stage("compare", against):
-        standard = (package.names for package in packages if package not in own)
-        used = set[ir.TypeName]().union(*map(_used, after), *standard)
+        named = (package.names for package in packages if package not in own)
+        used = set[ir.TypeName]().union(*map(_used, after), *named)
         names = used if packages else _all(library, other)
         of_packages = _of_packages(names, library, other_library, other)
-        return combine([*map(compare, before, after), *of_packages])
+        standard = combine(of_packages)
+        whole = combine([*map(compare, before, after), standard])
+        return whole._replace(compared=standard.compared)
 
 
 class _LayeredLibrary(Library):

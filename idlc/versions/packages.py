@@ -26,16 +26,26 @@ from idlc.versions.fields import Sides, added, constant_changes, field_changes
 CANDIDATES = 50
 
 
+class Skipped(NamedTuple):
+    """Interfaces, or folders of interfaces, that could not be compared, and the reason."""
+
+    names: tuple[str, ...]
+    reason: str
+    hint: str | None = None
+
+
 class Comparison(NamedTuple):
     """The changes that break something, and the additions, which break nothing.
 
-    `differs`: anything at all is different, comments included. `left_out` could not be compared.
+    `differs`: anything at all is different, comments included. `compared` is the number of
+    interfaces of the old version that were judged, `skipped` are those that could not be.
     """
 
     changes: tuple[Change, ...]
     additions: tuple[str, ...] = ()
     differs: bool = False
-    left_out: tuple[str, ...] = ()
+    compared: int = 0
+    skipped: tuple[Skipped, ...] = ()
 
     def placed(self, place: Callable[[str], str]) -> Comparison:
         """Return it with removed elements in the files that `place` makes of their paths."""
@@ -53,6 +63,7 @@ def combine(comparisons: Iterable[Comparison]) -> Comparison:
         tuple(change for comparison in parts for change in comparison.changes),
         tuple(name for comparison in parts for name in comparison.additions),
         any(comparison.differs for comparison in parts),
+        sum(comparison.compared for comparison in parts),
     )
 
 
@@ -76,7 +87,7 @@ def compare(before: Model, after: Model) -> Comparison:
             sides = Sides(section, counterpart, before, after)
             changes += [*field_changes(sides), *constant_changes(sides)]
             additions += added(sides)
-    return Comparison(tuple(changes), tuple(additions), differs or bool(changes))
+    return Comparison(tuple(changes), tuple(additions), differs or bool(changes), len(old))
 
 
 def _differ(old: ir.Interface, new: ir.Interface) -> bool:
@@ -88,12 +99,14 @@ def _differ(old: ir.Interface, new: ir.Interface) -> bool:
 def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
     """Return the changes since type hashes were recorded, the only facts of the old version."""
     changes = []
+    compared = 0
     paths = {str(own.name): ir.path_of(own) for own in after.own}
     for name in sorted(recorded):
         kind = name.split("/")[1]
         shorter = (name[:at] for at, character in enumerate(name) if character == "_")
         if kind != "msg" and any(own in recorded for own in shorter):
             continue  # follows from the interface that it is derived from
+        compared += 1
         if name not in paths:
             levels = frozenset[Level](LEVELS[:3])
             message = f"{_noun(kind)} `{name}` was removed"
@@ -105,7 +118,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
             change = Change(codes.HASH_CHANGED, name, message, levels, path=paths[name], hint=hint)
             changes.append(change)
     come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)
-    return Comparison(tuple(changes), come, bool(changes or come))
+    return Comparison(tuple(changes), come, bool(changes or come), compared)
 
 
 def _noun(kind: str) -> str:

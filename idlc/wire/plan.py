@@ -19,8 +19,8 @@ from idlc.wire.layout import Messages
 class Place(msgspec.Struct, frozen=True):
     """The location of a value: a slot of the object in a local variable, of structure `type`.
 
-    `path` has the names of all fields that lead to it, so that no other field changes it; `local`
-    is the variable of the value.
+    A value without an `owner` is only in its own variable. `path` has the names of all fields that
+    lead to it, so that no other field changes it; `local` is the variable of the value.
     """
 
     owner: str
@@ -31,8 +31,8 @@ class Place(msgspec.Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """The attribute expression."""
-        return f"{self.owner}.{self.slot}"
+        """The expression that the value is assigned to."""
+        return f"{self.owner}.{self.slot}" if self.owner else self.local
 
 
 class Number(msgspec.Struct, frozen=True):
@@ -178,11 +178,12 @@ def steps(
             plan.append(Enter(place, field.type.target, not nested.fields))
             plan += steps(nested, messages, names, place.local, inner)
         else:
-            plan.append(_step(field.type, place, messages, names))
+            plan.append(step_of(field.type, place, messages, names))
     return tuple(plan)
 
 
-def _step(type_: ir.FieldType, place: Place, messages: Messages, names: Locals) -> Step:
+def step_of(type_: ir.FieldType, place: Place, messages: Messages, names: Locals) -> Step:
+    """Return the step of a value that is not a single structure."""
     match type_:
         case ir.Primitive(name):
             return Number(place, CODES.get(name, type_.info.code), type_.info.size)

@@ -1,10 +1,7 @@
 """What setup(idlc_interfaces=True) installs and distributes, whatever `data_files` lists."""
 
-import importlib.util
 import sys
 import tarfile
-import venv
-from pathlib import Path
 
 import pytest
 
@@ -137,24 +134,21 @@ def test_a_keyword_compiles_and_installs_classes_that_are_new(package, tmp_path)
     assert (tmp_path / "prefix/share/demo/msg/Drive.json").is_file()
 
 
-def test_a_build_without_idlc_installs_what_was_committed(package, tmp_path):
-    (package / "demo/msg").mkdir()
-    (package / "demo/msg/__init__.py").write_text("# as it was committed\n")
-    environment = tmp_path / "venv"
-    venv.create(environment)
-    setuptools = Path(importlib.util.find_spec("setuptools").origin).parents[1]
-    borrowed = tmp_path / "borrowed"
-    borrowed.mkdir()
-    for pattern in ("setuptools*", "pkg_resources", "_distutils_hack"):
-        for path in setuptools.glob(pattern):
-            (borrowed / path.name).symlink_to(path)
-    python, prefix = environment / "bin/python", tmp_path / "prefix"
-    said = built_by_keyword(python, package, prefix, PYTHONPATH=str(borrowed))
-    assert "idlc_interfaces" in said
-    classes = prefix / "site/demo/msg/__init__.py"
-    assert classes.read_text() == "# as it was committed\n"
-    assert (prefix / INDEX / "packages/demo").is_file()
-    assert not (prefix / "share/demo").exists()
+def test_classes_of_removed_interfaces_are_not_built_again(package, tmp_path):
+    (package / "srv").mkdir()
+    (package / "srv/Ask.srv").write_text("---\n")
+    prefix = tmp_path / "prefix"
+    built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")
+    assert (prefix / "site/demo/srv/_ask.py").is_file()
+    (package / "srv/Ask.srv").unlink()
+    (package / "msg/Drive.msg").rename(package / "msg/Go.msg")
+    built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")
+    assert not (prefix / "site/demo/srv").exists()
+    modules = {path.name for path in (prefix / "site/demo/msg").glob("*.py")}
+    assert modules == {"__init__.py", "_go.py", "_go__codec.py"}
+    assert sorted(path.name for path in (prefix / "share/demo/msg").iterdir()) == [
+        f"Go.{ending}" for ending in ("idl", "json", "msg")
+    ]
 
 
 def test_packages_need_not_name_what_a_package_comes_with(package, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -341,6 +342,51 @@ def test_one_file_is_not_blamed_for_what_the_others_need(capsys):
     write_all({"msg/B.msg": "int8 b\n"})
     assert codes(capsys) == ["IDL460", "IDL452"]
     assert codes(capsys, "msg/A.msg") == []
+
+
+#: Projects whose generated code is not in the package, and the commands that generate it.
+_OUTPUTS = {
+    "library with settings": (
+        {"pyproject.toml": '[tool.idlc]\npaths = ["m"]\nout = "src/kit/ros"\nvendor-deps = true\n'},
+        "gen",
+    ),
+    "library without settings": (
+        {"pyproject.toml": "[project]\nname = 'kit'\n"},
+        "gen m --package kit_msgs -o src/kit/ros --vendor-deps",
+    ),
+    "setup.py alone": ({"setup.py": ""}, "gen m -o kit"),
+    "out of a workspace": (
+        {
+            "pyproject.toml": "[tool.idlc]\npaths = ['m', 'n']\nout = 'lib'\n",
+            "m/package.xml": "<package format='3'><name>m_msgs</name></package>\n",
+            "n/package.xml": "<package format='3'><name>n_msgs</name></package>\n",
+            "n/msg/C.msg": "int8 c\n",
+        },
+        "gen",
+    ),
+}
+
+
+@pytest.mark.parametrize("project", _OUTPUTS)
+def test_outdated_code_is_found_wherever_it_is_kept(project, capsys):
+    files, command = _OUTPUTS[project]
+    write_all({"m/msg/A.msg": "int8 a\n", "m/msg/B.msg": "std_msgs/Header b\n", **files})
+    assert main(shlex.split(command)) == 0
+    capsys.readouterr()
+    for change in (
+        lambda: write_all({"m/msg/A.msg": "int16 a\n"}),
+        lambda: Path("m/msg/B.msg").rename("m/msg/D.msg"),
+        lambda: write_all({"m/srv/E.srv": "---\n"}),
+        lambda: Path("m/srv/E.srv").unlink(),
+    ):
+        change()
+        said = check(capsys, "m", "--select", "IDL460")[1]
+        assert said.count("[IDL460]") == 1
+        (hint,) = re.findall(r"hint: run `idlc (.*)`", said)
+        assert main(shlex.split(hint)) == 0
+        capsys.readouterr()
+        assert "IDL460" not in check(capsys, "m", "--select", "IDL460")[1]
+    assert len([*Path().rglob("idlc.lock")]) == (2 if "n/msg/C.msg" in files else 1)
 
 
 def test_an_entry_point_that_leads_nowhere_is_found(capsys):

@@ -597,3 +597,34 @@ def test_gen_names_the_idl_files_that_it_leaves_out(capsys, monkeypatch):
     assert len(notes("inst", "-o", "out/inst")) == 1
     assert notes("inst/msg/A", "-o", "out/inst") == []
     assert len(notes("inst/msg/A", "--ament", "overlay")) == 1
+
+
+#: Ctrl-C while a module is imported.
+INTERRUPTED = """
+import sys
+
+class Finder:
+    def find_spec(self, name, *_):
+        if name == sys.argv[1]:
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Finder())
+from idlc.cli.main import main
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [
+        ("idlc.cli.exit_status", ["--version"]),
+        ("idlc.cli.direct", ["check"]),
+        ("idlc.cli.app", ["list"]),
+        ("idlc.editor.server", ["lsp"]),
+        ("click", ["list"]),
+    ],
+)
+def test_ctrl_c_while_modules_are_imported(module, words, here):
+    command = [sys.executable, "-c", INTERRUPTED, module, *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=here)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")

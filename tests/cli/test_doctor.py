@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from idlc.cli.main import main
 from idlc.project import prefixes
 
 HERE = Path(sys.executable).parent
+MODULES = prefixes.modules_folder()
 
 
 @pytest.fixture(autouse=True)
@@ -112,30 +114,120 @@ def test_a_package_that_colcon_installed_from_other_files():
     (lock,) = Path("install").rglob("idlc.lock")
     lock.unlink()  # setuptools installs none
     prefix = str(Path("install/demo").resolve())
-    good, bad = findings(AMENT_PREFIX_PATH=prefix)
+    python = str(next(Path("install").resolve().glob("*/lib/*/*-packages")))
+    good, bad = findings(AMENT_PREFIX_PATH=prefix, PYTHONPATH=python)
     assert bad == []
-    assert ("package", f"demo is installed in {prefix}/share/demo") in good
+    assert ("package", f"demo in {prefix}/share/demo has these interfaces") in good
     assert ("prefix", f"{prefix}: 1 package with interfaces") in good
     package(text="float64 speed\nfloat64 more\n")
-    _, bad = findings(AMENT_PREFIX_PATH=prefix)
+    _, bad = findings(AMENT_PREFIX_PATH=prefix, PYTHONPATH=python)
     text = f"demo in {prefix}/share/demo was built from different interface files"
     assert bad == [("package", text, "build and install it again")]
 
 
 def test_prefixes_that_hide_one_another_or_are_incomplete():
     package()
-    for prefix in ("../first", "../the second"):
+    names = ("../first", "../the second")
+    for prefix in names:
         assert main(["gen", "demo", "--ament", prefix]) == 0
-    both = os.pathsep.join(str(Path(name).resolve()) for name in ("../first", "../the second"))
-    good, bad = findings(AMENT_PREFIX_PATH=both)
+    both = os.pathsep.join(str(Path(name).resolve()) for name in names)
+    python = os.pathsep.join(str(Path(name, MODULES).resolve()) for name in names)
+    good, bad = findings(AMENT_PREFIX_PATH=both, PYTHONPATH=python)
     assert bad == []
     assert any("demo in" in text and "hides" in text for _, text in good)
     for library in Path("../the second/lib").glob("*.so"):
         library.write_bytes(b"")
-    _, bad = findings(AMENT_PREFIX_PATH=both)
+    _, bad = findings(AMENT_PREFIX_PATH=both, PYTHONPATH=python)
     assert prefixes.machine() == "" or [subject for subject, _, _ in bad] == ["prefix"]
     for _, _, hint in bad:
         assert main(shlex.split(hint.split("`")[1])[1:]) == 1
+
+
+def colcon_package(path="ws/src/demo", *, is_python=True):
+    """Write a package into a workspace, and return its folder."""
+    name = Path(path).name
+    package(path)
+    built = "<export><build_type>ament_python</build_type></export>" if is_python else ""
+    text = f"<package format='3'><name>{name}</name>{built}</package>\n"
+    Path(path, "package.xml").write_text(text)
+    if is_python:
+        Path(path, "setup.py").write_text("from setuptools import setup\n")
+    return Path(path).resolve()
+
+
+def install(prefix, name="demo", modules=MODULES):
+    """Install a package as colcon does, and return what Python searches."""
+    folder = Path(prefix, modules, name, "msg")
+    folder.mkdir(parents=True)
+    for place in (folder, folder.parent):
+        (place / "__init__.py").write_text("raise SystemExit('it ran')\n")
+    Path(prefix, "share", name, "msg").mkdir(parents=True)
+    shutil.copy(f"ws/src/{name}/msg/A.msg", f"{prefix}/share/{name}/msg/A.msg")
+    if Path("ws/install").is_dir():
+        Path("ws/install/setup.bash").write_text("")
+    return str(Path(prefix, modules).resolve())
+
+
+def of_packages(**environment):
+    _, bad = findings(**environment)
+    return [(text, hint) for subject, text, hint in bad if subject == "package"]
+
+
+def test_packages_that_python_does_not_find(monkeypatch):
+    home = colcon_package()
+    [(ungenerated, hint), (unbuilt, advice)] = of_packages()
+    assert ungenerated == "demo has no classes for its .msg files"
+    assert hint == "`idlc gen ws/src/demo` writes them"
+    assert main(shlex.split(hint.split("`")[1])[1:]) == 0
+    assert of_packages() == [(unbuilt, advice)]
+    assert unbuilt == "demo is not built, so Python cannot import it"
+    assert "`colcon build --packages-select demo`" in advice
+    assert "`pip install -e ws/src/demo`" in advice
+    path = install("ws/install/demo")
+    prefix = Path("ws/install/demo").resolve()
+    ((unsourced, source),) = of_packages()
+    assert unsourced == f"demo is built in {prefix}, but not sourced, so Python cannot import it"
+    assert source == f"`source {prefix.parent}/setup.bash`"
+    ((half, _),) = of_packages(AMENT_PREFIX_PATH=str(prefix))
+    assert half == f"demo is in {prefix}, which is on AMENT_PREFIX_PATH, but not on PYTHONPATH"
+    assert of_packages(AMENT_PREFIX_PATH=str(prefix), PYTHONPATH=path) == []
+    # a merged installation, and a working folder that only `python -m` searches
+    monkeypatch.chdir(home)
+    shutil.move("../../install/demo/share", "../../install/share")
+    shutil.move("../../install/demo/lib", "../../install/lib")
+    ((unsourced, _),) = of_packages()
+    assert f"demo is built in {prefix.parent}, but not sourced" in unsourced
+
+
+@pytest.mark.parametrize("is_python", [True, False])
+def test_packages_that_another_copy_hides(is_python):
+    home = colcon_package(is_python=is_python)
+    if is_python:
+        assert main(["gen", str(home)]) == 0
+    own = install("ws/install/demo")
+    other = install("../elsewhere")
+    assert of_packages(PYTHONPATH=own) == []
+    assert of_packages(PYTHONPATH=os.pathsep.join((own, other))) == []
+    ((text, hint),) = of_packages(PYTHONPATH=os.pathsep.join((other, own)))
+    assert text == f"demo in {other}/demo hides the package in {own}/demo"
+    assert hint == f"uninstall the other copy, or put {own} before it on PYTHONPATH"
+    shutil.rmtree(f"{own}/demo/msg")
+    ((text, hint),) = of_packages(PYTHONPATH=own)
+    assert text == f"Python finds demo in {own}/demo, which has no `demo.msg`"
+
+
+def test_packages_of_another_python():
+    colcon_package(is_python=False)
+    install("ws/install/demo", modules="lib/python3.2/site-packages")
+    ((text, _),) = of_packages()
+    python = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    prefix = Path("ws/install/demo").resolve()
+    assert text == f"demo in {prefix} is for python3.2, and this is {python}"
+    shutil.rmtree(prefix)
+    path = install("ws/install/demo")
+    Path(path, "demo/demo_s__rosidl_typesupport_c.cpython-32-x86_64-linux-gnu.so").write_text("")
+    ((text, _),) = of_packages(PYTHONPATH=path)
+    assert text.startswith(f"demo in {path}/demo was built with cpython-32, and this is cpython-3")
 
 
 def test_people_read_one_line_for_each(capsys):

@@ -343,3 +343,17 @@ def test_what_was_answered_or_cancelled_leaves_nothing():
     assert kept.pop("_initialize")
     assert kept
     assert not any(kept.values())
+
+
+def test_lines_are_found_in_linear_time():
+    """In quadratic time, one of these texts takes hours."""
+    code = """
+import resource
+from idlc.editor.documents import lines_of
+resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
+for text in ("x", " ", "\\r", "\\n", "\\r\\n", "x\\n", "é"):
+    lines = lines_of(text * 1_000_000)
+    assert "".join(lines) == text * 1_000_000
+    assert not lines[-1].endswith(("\\r", "\\n"))
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -182,7 +182,9 @@ def test_what_files_say_is_no_command_of_githubs(pull_request):
         elif not heard and line == f"::{token}::":
             heard = True
         elif heard and line.strip().startswith("::error"):
-            assert "file=demo/msg/Drive.msg" in line
+            assert line.startswith(
+                ("::error file=demo/msg/Drive.msg,", "::error file=demo,title=IDL520")
+            )
     assert heard
 
 
@@ -240,7 +242,11 @@ def test_the_gitlab_snippet(here, text, status):
     for base in ("", git("rev-parse", "HEAD").strip()):
         words = ("sh", "-c", "set -e\n" + "\n".join(lines))
         assert run(*words, CI_MERGE_REQUEST_DIFF_BASE_SHA=base).returncode == status
-    assert len(json.loads((here / "gl-code-quality-report.json").read_text())) == status
+    codes = [
+        each["check_name"]
+        for each in json.loads((here / "gl-code-quality-report.json").read_text())
+    ]
+    assert codes == (["IDL201", "IDL460"] if status else [])
     assert f'failures="{status}"' in (here / "idlc.xunit.xml").read_text()
 
 

@@ -151,6 +151,21 @@ def test_messages_are_printed_and_malformed_ones_counted(robot, router, capsys, 
     assert "1 malformed messages" in err
 
 
+def test_fields_are_printed_without_the_rest(robot, router, capsys):
+    kind = standard("sensor_msgs/msg/JointState")
+    publish = robot.publisher("/joints", "sensor_msgs/msg/JointState", LATCHED)
+    for count in (0, 2):
+        publish(kind(name=["a", "b"][:count], position=[0.5] * count))
+    words = ["echo", router, "/joints", "--count", "2", "--format", "json", "--fields"]
+    assert main([*words, "name[1], position,header.stamp"]) == 0
+    assert list(map(json.loads, capsys.readouterr().out.splitlines())) == [
+        {"name[1]": None, "position": [], "header.stamp": {"sec": 0, "nanosec": 0}},
+        {"name[1]": "b", "position": [0.5, 0.5], "header.stamp": {"sec": 0, "nanosec": 0}},
+    ]
+    assert main([*words, "positoin"]) == 2
+    assert "did you mean `position`?" in capsys.readouterr().err
+
+
 def test_unknown_names_and_robots_are_errors(robot, router, capsys):
     robot.publisher("/words", "std_msgs/msg/String")
     assert main(["echo", router, "/word"]) == 2

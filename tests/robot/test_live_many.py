@@ -120,7 +120,9 @@ def test_all_commands_end(robot, capsys):
     assert main(["gen", ADDRESS, "-o", "out"]) in (0, 2)
     assert main(["check", ADDRESS]) == 0
     write_files("mine")
-    assert main(["breaking", "mine", "--against", ADDRESS]) in (0, 1)
+    # Robots whose nodes disagree break what is here; the others have nothing in common with it.
+    status = 1 if robot in (versions, actions, describers) else 2
+    assert main(["breaking", "mine", "--against", ADDRESS]) == status
 
 
 def test_names_are_completed(robot):

@@ -63,6 +63,18 @@ def test_messages_arrive_in_order_once_the_ends_are_matched(pair):
     assert type(received[0]) is String
 
 
+def test_a_raw_subscription_gets_bytes_that_a_reader_reads(pair):
+    left, right = pair
+    received = []
+    right.create_subscription(String, "chatter", received.append, 10, raw=True)
+    publisher = left.create_publisher(String, "chatter", 10)
+    spin_until(publisher.get_subscription_count, left)
+    publisher.publish(String(data="hello"))
+    spin_until(lambda: received, right)
+    assert received == [String(data="hello").serialize()]
+    assert idlc.reader(String, "data")(received[0]) == "hello"
+
+
 def test_a_slow_subscription_keeps_the_newest(pair):
     left, right = pair
     received = []

@@ -141,12 +141,16 @@ def _waits(client) -> bool:
 
 @pytest.mark.long
 def test_the_example_passes_its_own_tests(ros_environment):
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"],
-        cwd=EXAMPLE,
-        env=ros_environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    # On a busy machine, Fast DDS drops a response whose reader it has not met in time, and says so.
+    dropped, attempts = True, 0
+    while dropped and attempts < 3:
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"],
+            cwd=EXAMPLE,
+            env=ros_environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        dropped, attempts = "failed to send response (timeout)" in done.stdout, attempts + 1
     assert done.returncode == 0, done.stdout

@@ -16,6 +16,7 @@ import pytest
 from catkin_pkg.package import parse_package
 
 from idlc.cli.main import main
+from idlc.project.lock import BUILD_STEP
 from idlc.scaffold.roles import ROLES
 from tests.support import refresh
 from tests.support.paths import GOLDEN
@@ -24,7 +25,8 @@ from tests.support.tools import tool
 FOLDER = GOLDEN / "scaffold"
 CASES = sorted(path.parent for path in FOLDER.glob("*/commands"))
 #: Caches.
-_UNREAD = {"__pycache__", ".mypy_cache", ".ruff_cache"}
+#: Caches, and a copy of a file of idlc.
+_UNREAD = {"__pycache__", ".mypy_cache", ".ruff_cache", BUILD_STEP}
 
 
 def tree(folder: Path) -> dict[str, str]:

@@ -157,7 +157,7 @@ def test_what_is_not_installed_is_found_and_fixed_in_one_go(name, package, capsy
     after = path.read_bytes().decode()
     compile(after.removeprefix("\ufeff"), "setup.py", "exec")
     assert idlc(capsys, "check").startswith("no problems"), after
-    assert "_idlc" not in after
+    assert "_idlc" not in after.replace("_idlc_build.py", "")
     assert after.startswith("\ufeff") == FIXABLE[name].startswith("\ufeff")
     assert ("\r\n" in FIXABLE[name]) == ("\n" not in after.replace("\r\n", ""))
     before = [line.strip(" \t,") for line in FIXABLE[name].splitlines()]
@@ -186,7 +186,7 @@ def test_a_new_interface_is_installed_with_the_others(name, package, capsys):
     after = path.read_bytes().decode()
     found = re.findall(r"\[(IDL4(?:5[5-9]|6\d))\]", idlc(capsys, "check"))
     assert not found, (said, after)
-    assert "_idlc" not in after
+    assert "_idlc" not in after.replace("_idlc_build.py", "")
 
 
 def built(folder: Path, target: Path) -> tuple[int, str]:

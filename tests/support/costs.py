@@ -126,8 +126,22 @@ class Meter:
 
 
 def cpu_seconds() -> float:
-    """Return the CPU-seconds of this process and of the programs that it waited for."""
-    return sum(os.times()[:4])
+    """Return the CPU-seconds of this process and of all that it started, also what still runs."""
+    return sum(os.times()[:4]) + _of_children(os.getpid())
+
+
+def _of_children(process: int) -> float:
+    """Return the CPU-seconds of processes that run, and of the children that they waited for."""
+    total = 0.0
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        for child in path.read_text(encoding="ascii").split():
+            try:
+                stat = Path(f"/proc/{child}/stat").read_text(encoding="utf-8")
+            except FileNotFoundError:  # it ended meanwhile
+                continue
+            ticks = stat.rpartition(")")[2].split()[11:15]
+            total += sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") + _of_children(int(child))
+    return total
 
 
 def measured(folder: Path) -> dict[str, float]:

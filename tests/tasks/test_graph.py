@@ -221,9 +221,19 @@ def test_one_version_is_no_finding(say):
     assert said == "no breaking changes; compared 2 nodes, 1 topic, 0 services, 0 actions\n"
 
 
-def test_types_without_hash_are_no_finding_but_counted(say):
-    status, said = say(RecordedGraph([end("/a", "publisher", "/drive", TYPE, ""), *ends()]))
-    assert (status, said.count("1 endpoint without a type hash")) == (0, 1)
+def test_types_without_hash_are_not_compared(say, tmp_path):
+    silent = end("/a", "publisher", "/drive", TYPE, "")
+    known = end("/b", "publisher", "/other", "demo/msg/Other", hash_of(OLD, TYPE))
+    status, said = say(RecordedGraph([silent, known]))
+    assert (status, said.count("1 endpoint without a type hash")) == (1, 1)
+    assert f"idlc did not compare `{TYPE}`: nodes announce no type hash" in said
+    assert said.splitlines()[-1].startswith("1 not compared; no breaking changes in the rest; ")
+    status, said = say(RecordedGraph([silent]))
+    assert (status, "error[IDL521]" in said) == (2, True)
+    (tmp_path / "demo/msg").mkdir(parents=True)
+    (tmp_path / "demo/msg/Absent.msg").write_text("int8 a\n")
+    status, said = say(RecordedGraph([silent, known]), "demo")
+    assert (status, "error[IDL521]" in said) == (2, True)
 
 
 def test_files_here_are_a_version(say, tmp_path):
@@ -363,7 +373,12 @@ def test_names_from_the_network_do_no_harm(say):
         assert_harmless(said)
         status, said = say(RecordedGraph(found, told), "--format", "github")
         commands = said.splitlines()
-        assert [line.split()[0] for line in commands] == ["::error", "::error", "::notice"]
+        assert [line.split()[0] for line in commands] == [
+            "::error",
+            "::error",
+            "::error",
+            "::notice",
+        ]
         assert_harmless("\n".join(line.removeprefix("::") for line in commands))
 
 

@@ -135,14 +135,33 @@ def test_the_hash_is_said_to_change_exactly_when_it_does(seed):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("int8 a\n", "int8 a\r\n", "no breaking changes; the versions are the same"),
-        ("int8 a\n", "int8  a\n", "no breaking changes; raise the patch version"),
-        ("int8 a\n", "int8 a\n\n# the end", "no breaking changes; raise the patch version"),
-        ("int8 a\n", "int8 a  # [m]\n", "no breaking changes; raise the patch version"),
+        (
+            "int8 a\n",
+            "int8 a\r\n",
+            "no breaking changes; compared 1 interface; the versions are the same",
+        ),
+        (
+            "int8 a\n",
+            "int8  a\n",
+            "no breaking changes; compared 1 interface; raise the patch version",
+        ),
+        (
+            "int8 a\n",
+            "int8 a\n\n# the end",
+            "no breaking changes; compared 1 interface; raise the patch version",
+        ),
+        (
+            "int8 a\n",
+            "int8 a  # [m]\n",
+            "no breaking changes; compared 1 interface; raise the patch version",
+        ),
         (
             "int8 a\n",
             "int8 B=1\nint8 a\n",
-            "no breaking changes; added: constant `demo/msg/A.B`; raise the minor version",
+            (
+                "no breaking changes; compared 1 interface; added: constant `demo/msg/A.B`; "
+                "raise the minor version"
+            ),
         ),
     ],
 )
@@ -161,10 +180,16 @@ def test_a_lock_of_other_texts_is_not_the_same(tmp_path, monkeypatch, capsys):
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
     capsys.readouterr()
     assert main(["breaking", "demo", "--against", "out/demo/idlc.lock"]) == 0
-    assert capsys.readouterr().out == "no breaking changes; the versions are the same\n"
+    assert (
+        capsys.readouterr().out
+        == "no breaking changes; compared 1 interface; the versions are the same\n"
+    )
     write("demo/msg/A.msg", "int8 a 3\n")
     assert main(["breaking", "demo", "--against", "out/demo/idlc.lock"]) == 0
-    assert capsys.readouterr().out == "no breaking changes; raise the patch version\n"
+    assert (
+        capsys.readouterr().out
+        == "no breaking changes; compared 1 interface; raise the patch version\n"
+    )
     Path("demo/msg/A.msg").unlink()
     assert main(["breaking", "demo", "--against", "out/demo/idlc.lock"]) == 1
     assert "error[IDL501]" in capsys.readouterr().out

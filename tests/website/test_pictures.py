@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from benchmarks import results
-from maintenance.website.chart import chart
+from maintenance.website.chart import chart, fields_chart
 from maintenance.website.pictures import SCENES, picture
 from maintenance.website.plot import PAGE, plotted
 from tests.support import programs, refresh
@@ -22,6 +22,10 @@ def test_a_picture_shows_what_is_printed(name):
 
 def test_the_chart_shows_the_kept_run():
     holds(FOLDER / "speed.svg", chart(results.load()))
+
+
+def test_the_chart_of_fields_shows_the_kept_run():
+    holds(FOLDER / "fields.svg", fields_chart(results.load()))
 
 
 def test_the_chart_has_losses():

@@ -29,7 +29,7 @@ def test_it_answers_add_two_ints(start: Start, observer: Node) -> None:
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(start: Start, how: signal.Signals) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE)
     node.until_it_spins('add_two_ints_server')

@@ -72,7 +72,7 @@ def decode(
     packages.
     """
     bulk = is_bulk(steps)
-    decoder = _Decoder(tables, makers, foreign, "view" if bulk else "data")
+    decoder = Decoder(tables, makers, foreign, "view" if bulk else "data")
     decoder.line(f"{own}()", "message")
     for step in steps:
         decoder.step(step)
@@ -88,7 +88,7 @@ def decode(
     return (*first, *decoder.body, Line("return message"))
 
 
-class _Decoder(Builder):
+class Decoder(Builder):
     """Emits statements that read; `run` is not yet emitted, `position` is before it.
 
     `source` names the variable that buffers are slices of. `limited`: a check needs the buffer's
@@ -170,15 +170,20 @@ class _Decoder(Builder):
 
         It is shorter if the buffer is, which whatever is read next notices.
         """
+        start = self.pass_elements(count, align, size)
+        self.unchecked = True
+        return f"{source}{slice_of(start)}"
+
+    def pass_elements(self, count: str, align: int, size: int) -> str:
+        """Move after `count` elements, and return the position of the first."""
         if not self.position.alignment.is_at(align):
             self.store_position("at")
             self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
             self.position = self.position.with_alignment(multiple_of(4))
         start = self.start()
         self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
-        self.unchecked = True
         self.position = Cursor("end", 0, self.position.alignment.modulo(size & -size))
-        return f"{source}{slice_of(start)}"
+        return start
 
     def short_if(self, condition: str) -> None:
         """Emit a check that the buffer is long enough."""

@@ -69,6 +69,12 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
         """Return the bytes of each message."""
         raise NotImplementedError
 
+    def selected(self, mask: Any) -> Messages:
+        """Return the messages for which a mask is true."""
+        publish = None if self.publish_times is None else self.publish_times[mask]
+        raws = [raw for raw, chosen in zip(self.views(), mask, strict=True) if chosen]
+        return Separate(self.log_times[mask], publish, raws)
+
 
 class Ranges(Messages, frozen=True, eq=False):
     """Messages that are each a part of one buffer."""
@@ -82,9 +88,13 @@ class Ranges(Messages, frozen=True, eq=False):
         inside = window.holds(self.log_times)
         if inside is None or inside.all():
             return self
-        publish = None if self.publish_times is None else self.publish_times[inside]
-        starts, stops = self.starts[inside], self.stops[inside]
-        return Ranges(self.log_times[inside], publish, self.buffer, starts, stops)
+        return self.selected(inside)
+
+    def selected(self, mask: Any) -> Ranges:
+        """Return the messages for which a mask is true."""
+        publish = None if self.publish_times is None else self.publish_times[mask]
+        starts, stops = self.starts[mask], self.stops[mask]
+        return Ranges(self.log_times[mask], publish, self.buffer, starts, stops)
 
     def views(self) -> list[Raw]:
         """Return each message as a part of the buffer."""

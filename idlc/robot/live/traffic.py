@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -73,9 +73,13 @@ def find_version(
 
 
 def messages(
-    session: Session, ends: Sequence[Entity], kind: Any, count: int | None, report: Report
+    session: Session,
+    ends: Sequence[Entity],
+    read: Callable[[bytes], Any],
+    count: int | None,
+    report: Report,
 ) -> Iterator[Any]:
-    """Yield messages of a topic as they arrive, until there are `count`.
+    """Yield what is read of the messages of a topic as they arrive, until there are `count`.
 
     Malformed and lost ones are noted.
     """
@@ -87,7 +91,7 @@ def messages(
                 arrival = inbox.get(TICK)
                 if arrival and arrival.sample:
                     try:
-                        message = kind.deserialize(arrival.sample.payload)
+                        message = read(arrival.sample.payload)
                     except ValueError:
                         malformed += 1
                         continue

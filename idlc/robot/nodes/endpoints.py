@@ -235,6 +235,14 @@ class Subscription(Endpoint, Generic[M]):
         return self.count_others(Kind.PUBLISHER)
 
 
+class RawSubscription(Subscription[Any]):
+    """A subscription whose messages stay as they were sent."""
+
+    def decode(self, _kind: Any, payload: bytes) -> bytes:
+        """Return the bytes of a message, which may be anything."""
+        return payload
+
+
 class Stream(Subscription[M]):
     """A subscription that wakes a coroutine, and needs no executor."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, Literal, overload
 
 from idlc.robot import qos as profiles
 from idlc.robot.errors import RobotError
@@ -16,7 +16,14 @@ from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.clock import Clock, ClockType, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
 from idlc.robot.nodes.descriptions import SERVICE, describe
-from idlc.robot.nodes.endpoints import Endpoint, EventCallbacks, Publisher, Stream, Subscription
+from idlc.robot.nodes.endpoints import (
+    Endpoint,
+    EventCallbacks,
+    Publisher,
+    RawSubscription,
+    Stream,
+    Subscription,
+)
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger
@@ -196,6 +203,7 @@ class Node(HasParameters):
         publisher.watch(event_callbacks)
         return publisher
 
+    @overload
     def create_subscription(
         self,
         msg_type: type[M] | Interface,
@@ -205,9 +213,38 @@ class Node(HasParameters):
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: EventCallbacks | None = None,
-    ) -> Subscription[M]:
-        """Return a subscription; `callback` gets each message."""
-        subscription = Subscription[M](self, topic, msg_type, qos_profile, callback_group, callback)
+        raw: Literal[False] = False,
+    ) -> Subscription[M]: ...
+
+    @overload
+    def create_subscription(
+        self,
+        msg_type: type[Any] | Interface,
+        topic: str,
+        callback: Callable[[bytes], Any],
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: EventCallbacks | None = None,
+        raw: Literal[True],
+    ) -> Subscription[Any]: ...
+
+    def create_subscription(
+        self,
+        msg_type: type[Any] | Interface,
+        topic: str,
+        callback: Callable[[Any], Any],
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: EventCallbacks | None = None,
+        raw: bool = False,
+    ) -> Subscription[Any]:
+        """Return a subscription; `callback` gets each message, or its bytes if it is `raw`."""
+        kind: Any = RawSubscription if raw else Subscription
+        subscription: Subscription[Any] = kind(
+            self, topic, msg_type, qos_profile, callback_group, callback
+        )
         subscription.watch(event_callbacks)
         return subscription
 

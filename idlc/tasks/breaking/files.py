@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import datetime
+import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
@@ -16,19 +18,27 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
-from idlc.project.files import is_folder
-from idlc.project.find import RULES, InterfaceFile, find, list_files, no_interfaces
+from idlc.project.files import entries, is_file, is_folder
+from idlc.project.find import (
+    KIND_FOLDERS,
+    RULES,
+    InterfaceFile,
+    find,
+    list_files,
+    no_interfaces,
+)
 from idlc.project.git import GIT, Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
-from idlc.project.root import Root
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Config, Scope
 from idlc.versions.changes import LEVELS, Change
 from idlc.versions.distribution import compare_with_distro, is_distro
 from idlc.versions.packages import (
     Allowance,
     Comparison,
+    Skipped,
     against,
     allowances,
     combine,
@@ -41,7 +51,10 @@ from idlc.wire.layout import oversized
 
 #: The inputs of packages.
 Packages: TypeAlias = Sequence[Inputs]
+#: Names that are listed in a sentence.
+NAMED = 5
 _CHECK_OUT = "`git sparse-checkout disable` checks out all files"
+_SUBMODULES = "compare them in their own repository, or allow it in [[tool.idlc.breaking.allow]]"
 
 
 class BreakingOptions(msgspec.Struct, frozen=True):
@@ -61,7 +74,8 @@ class Verdict(NamedTuple):
 
     `added` breaks nothing; `not_compared` could not be compared. There is no part to raise without
     a difference, after an incomplete comparison, and for a comparison with a distribution.
-    `hidden` counts changes that break only other levels than the selected ones.
+    `hidden` counts changes that break only other levels than the selected ones, `compared`
+    interfaces of the old version.
     """
 
     levels: dict[str, int]
@@ -72,6 +86,12 @@ class Verdict(NamedTuple):
     added: tuple[str, ...] = ()
     not_compared: tuple[str, ...] = ()
     hidden: int = 0
+    compared: int = 0
+
+    @property
+    def seen(self) -> dict[str, int]:
+        """The number of compared items by kind."""
+        return {"interface": self.compared}
 
 
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
@@ -86,14 +106,40 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         # an empty folder is fine if its interfaces were removed
         report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
         return None
-    # unused allowances may be for what was left out
-    judged = judge(comparison.changes, options, report, is_all=not comparison.left_out)
-    is_version = not (comparison.left_out or is_distro(options.against))
+    is_complete = not comparison.skipped
+    skipped = report_skipped(comparison.skipped, options, report)
+    # unused allowances may be for what was skipped
+    judged = judge(comparison.changes, options, report, is_all=is_complete)
+    is_version = is_complete and not is_distro(options.against)
     part = part_to_raise(comparison) if is_version else None
     version = _version(packages, root, report)
     following = raised(version, part) if version and part else None
-    facts = comparison.additions, comparison.left_out, judged.hidden
-    return Verdict(judged.levels, judged.allowed, part, version, following, *facts)
+    allowed = judged.allowed + sum(len(each.names) for each in comparison.skipped) - len(skipped)
+    facts = comparison.additions, skipped, judged.hidden, comparison.compared
+    return Verdict(judged.levels, allowed, part, version, following, *facts)
+
+
+def report_skipped(
+    skipped: Iterable[Skipped], options: BreakingOptions, report: Report
+) -> tuple[str, ...]:
+    """Report IDL520 for what could not be compared, and return its names; some can be allowed."""
+    names: list[str] = []
+    for each in skipped:
+        changes = [Change(codes.NOT_COMPARED, name, "", frozenset()) for name in each.names]
+        left = [change.subject for change in not_allowed(changes, options, report)]
+        if left:
+            listed = first_few((f"`{name}`" for name in left), NAMED)
+            message = f"idlc did not compare {listed}: {each.reason}"
+            place = options.paths[0] if options.paths else options.against
+            report.add(codes.NOT_COMPARED.of(place, message, hint=each.hint))
+        names += left
+    return tuple(sorted(names))
+
+
+def report_nothing(options: BreakingOptions, reason: str, hint: str, report: Report) -> None:
+    """Report IDL521 for a comparison in which no interface has two versions."""
+    message = f"idlc compared nothing: {reason}"
+    report.add(codes.NOTHING_COMPARED.of(options.against, message, hint=hint))
 
 
 class Judged(NamedTuple):
@@ -147,7 +193,12 @@ def not_allowed(
 
 def _against(options: BreakingOptions, packages: Packages, report: Report) -> Comparison | None:
     if is_distro(options.against):
-        return compare_with_distro(options.against, packages, options.scope, report)
+        comparison = compare_with_distro(options.against, packages, options.scope, report)
+        if comparison and not (comparison.compared or comparison.additions):
+            reason = "the interfaces use no standard interface"
+            report_nothing(options, reason, "without PATH, idlc compares all of them", report)
+            return None
+        return comparison
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], options.scope.root, report) as revision:
@@ -168,12 +219,13 @@ class Side(NamedTuple):
     """One of two versions: the models of its packages, without broken interfaces.
 
     `broken` are the interfaces that have errors, and their users; `error` is the first error in
-    words.
+    words. `skipped` are interfaces whose version is not known.
     """
 
     models: Mapping[str, Model]
     broken: frozenset[ir.TypeName]
     error: str
+    skipped: tuple[Skipped, ...] = ()
 
     @property
     def interfaces(self) -> list[ir.Interface]:
@@ -191,30 +243,20 @@ def _compare(
 ) -> Comparison | None:
     before = _before(options, packages, revision, report)
     problems = Report()
-    after = _side(packages, {}, options.scope, problems)
+    after = _side(packages, {}, _newer_scope(options), problems)
     report.extend(problems.errors)
     if before is None or any(problem.code in codes.USAGE for problem in report):
         return None
-    others, submodules, skipped = set[ir.TypeName](), set[str](), set[ir.TypeName]()
+    skipped = [
+        Skipped(tuple(map(str, sorted(before.broken))), _errors_in(options.against), before.error),
+        *before.skipped,
+    ]
     if revision:
-        earlier, present = before.names, after.names
-        others = {
-            name
-            for package in packages
-            for file in (entry.file for entry in package.files)
-            if (name := ir.TypeName(package.package, file.kind, file.name)) not in earlier
-            and not revision.holds(file.path)
-        }
-        submodules = {*revision.unknown(options.paths)}
-        skipped = {
-            own.name
-            for own in before.interfaces
-            if own.name not in present and own.source and revision.is_skipped(own.source.path)
-        }
-    out = before.broken | after.broken | others | skipped
+        skipped += _outside(options, packages, before, after, revision)
+    out = {name for each in skipped for name in each.names} | {*map(str, after.broken)}
     old, new = (
         {
-            package: model.only({interface.name for interface in model.own} - out)
+            package: model.only({own.name for own in model.own if str(own.name) not in out})
             for package, model in side.models.items()
         }
         for side in (before, after)
@@ -231,32 +273,56 @@ def _compare(
         places = rule_folders(homes)
         changes = with_rules(whole.changes, old, new, places, options.scope.root)
         whole = whole._replace(changes=changes)
-    elsewhere = {*map(str, others), *submodules}
-    for names, reason, hint in (
-        (map(str, before.broken), f"`{options.against}` contains errors", before.error),
-        (elsewhere, "their history is in other git repositories", None),
-        (map(str, skipped), "this sparse checkout omits them", _CHECK_OUT),
-    ):
-        if listed := first_few(sorted(f"`{name}`" for name in names), 5):
-            message = f"idlc did not compare {listed}: {reason}"
-            report.add(codes.NOT_COMPARED.of(options.paths[0], message, hint=hint))
-    return whole._replace(left_out=tuple(sorted({*map(str, out), *elsewhere})))
+    rest = out.difference(*(each.names for each in skipped))
+    skipped += [Skipped(tuple(sorted(rest)), "they contain errors")]
+    return whole._replace(skipped=tuple(each for each in skipped if each.names))
+
+
+def _errors_in(version: str) -> str:
+    return f"`{version}` contains errors"
+
+
+def _outside(
+    options: BreakingOptions, packages: Packages, before: Side, after: Side, revision: Revision
+) -> Iterator[Skipped]:
+    """Yield the interfaces whose old version, or new version, is not in the repository's files."""
+    earlier, present = before.names, after.names
+    others = {
+        str(name)
+        for package in packages
+        for file in (entry.file for entry in package.files)
+        if (name := ir.TypeName(package.package, file.kind, file.name)) not in earlier
+        and not revision.holds(file.path)
+    }
+    places = (*sorted(others), *revision.unknown(options.paths))
+    yield Skipped(places, "their history is in other git repositories", _SUBMODULES)
+    absent = (own for own in before.interfaces if own.name not in present)
+    hidden = [own for own in absent if own.source and revision.is_skipped(own.source.path)]
+    names = tuple(sorted(str(own.name) for own in hidden))
+    yield Skipped(names, "this sparse checkout omits them", _CHECK_OUT)
 
 
 def _before(
     options: BreakingOptions, packages: Packages, revision: Revision | None, report: Report
 ) -> Side | None:
     scope = options.scope
+    skipped: Sequence[Skipped] = ()
+    problems = Report()
     if revision is None:
         files = find([options.against], scope.root, report, scope.exclude)
+        old = inputs.packages(files, scope, problems)
     else:
         files = revision.files(options.paths, scope.exclude, report)
         include = tuple(revision.counterpart(path) or path for path in scope.include)
         scope = msgspec.structs.replace(
             scope, include=include, exclude=scope.exclude.seen_from(revision.folder, revision.top)
         )
-    problems = Report()
-    old = inputs.packages(files, scope, problems)
+        old = inputs.packages(files, scope, problems)
+        moved, skipped = _moved(packages, old, revision, options)
+        if moved:
+            files += moved
+            problems = Report()
+            old = inputs.packages(files, scope, problems)
     if len(old) == len(packages) == 1 and old[0].package != packages[0].package:
         # two single packages get one name, unless both are named by a package.xml
         folders = [package.folders[0] for package in (*old, *packages) if package.folders]
@@ -269,7 +335,108 @@ def _before(
     homes = (
         {package.home: files for package in old} if scope.package else by_home(files, scope.root)
     )
-    return _side(old, homes, scope, problems)
+    if revision is None:
+        beside = tuple(_beside(packages, old, scope))
+        scope = msgspec.structs.replace(scope, include=(*beside, *scope.include))
+    again = Report()
+    again.extend(problems)
+    side = _side(old, homes, scope, problems)
+    if revision and side.broken:  # a package that they use may have moved
+        include = (*scope.include, revision.folder.as_posix())
+        side = _side(old, homes, msgspec.structs.replace(scope, include=include), again)
+    return side._replace(skipped=tuple(skipped))
+
+
+def _moved(
+    packages: Packages, old: Packages, revision: Revision, options: BreakingOptions
+) -> tuple[tuple[InterfaceFile, ...], list[Skipped]]:
+    """Return files of packages that were outside of the paths, and interfaces without a history.
+
+    Packages are found by their names. If several had the name, the one that is gone has moved.
+    """
+    scope = options.scope
+    known = {name for package in old for name in package.names}
+    missing = {each.package: each.names - known for each in packages if each.names - known}
+    if not missing:
+        return (), []
+    top = revision.top.as_posix()
+    whole = revision.files([top], scope.exclude, Report())
+    candidates: dict[str, list[tuple[Inputs, Sequence[InterfaceFile]]]] = {}
+    unnamed = msgspec.structs.replace(scope, package=None)
+    for files in by_home(whole, scope.root).values():
+        for package in inputs.packages(files, unnamed, Report()):
+            candidates.setdefault(package.package, []).append((package, files))
+    present = {package.package for package in old}
+    submodules = {*revision.unknown([top])}.difference(revision.unknown(options.paths))
+    moved: list[InterfaceFile] = []
+    skipped: list[Skipped] = []
+    for package in (each for each in packages if each.package in missing):
+        name, names = package.package, missing[package.package]
+        places = candidates.get(name, [])
+        if len(places) > 1:
+            gone = [each for each in places if not revision.is_present(each[0].home)]
+            places = gone if len(gone) == 1 else places
+        listed = tuple(map(str, sorted(names)))
+        if len(places) > 1:
+            folders = " and ".join(f"`{revision.shown(each.home)}`" for each, _ in places)
+            skipped.append(Skipped(listed, f"package `{name}` is in {folders}"))
+        elif places:
+            home, own = places[0][0].home, places[0][1]
+            wanted = (
+                [] if name in present else [home / part for part in _parts(package, scope.root)]
+            )
+            for file in own:
+                is_missing = ir.TypeName(name, file.kind, file.name) in names
+                if is_missing or any(file.path.is_relative_to(part) for part in wanted):
+                    moved.append(file)
+        elif submodules:
+            gone_from = first_few((f"`{each}`" for each in sorted(submodules)), NAMED)
+            skipped.append(Skipped(listed, f"they may come from the submodule {gone_from}"))
+    return tuple(moved), skipped
+
+
+def _parts(package: Inputs, root: Root) -> set[Path]:
+    """Return the parts of a package that arguments mean, relative to its folder."""
+    arguments = {root.absolute(entry.file.argument) for entry in package.files}
+    return {
+        argument.relative_to(package.home) if argument.is_relative_to(package.home) else Path()
+        for argument in arguments
+    }
+
+
+def _beside(packages: Packages, old: Packages, scope: Scope) -> Iterator[str]:
+    """Yield folders of the old version that stand for the folders of -I in the new version."""
+    homes = {package.package: package.home for package in packages}
+    for home, new in ((each.home, homes.get(each.package)) for each in old):
+        siblings = entries(home.parent) if scope.include else []
+        yield from (entry.as_posix() for entry in siblings if entry != home and _is_package(entry))
+        for folder in scope.include if new else ():
+            with suppress(ValueError):  # another drive
+                place = home / os.path.relpath(scope.root.absolute(folder), new)
+                if is_folder(place):
+                    yield os.path.normpath(place)
+
+
+def _is_package(folder: Path) -> bool:
+    return is_file(folder / MANIFEST) or any(is_folder(folder / kind) for kind in KIND_FOLDERS)
+
+
+def _newer_scope(options: BreakingOptions) -> Scope:
+    """Return the scope in which dependencies near the old version come last."""
+    scope = options.scope
+    old = scope.root.absolute(options.against)
+    new = [scope.root.absolute(path) for path in options.paths]
+
+    def is_older(folder: str) -> bool:
+        place = scope.root.absolute(folder)
+        return _common(place, old) > max((_common(place, path) for path in new), default=0)
+
+    return msgspec.structs.replace(scope, include=tuple(sorted(scope.include, key=is_older)))
+
+
+def _common(path: Path, other: Path) -> int:
+    """Return the number of the first parts that two paths have in common."""
+    return len(Path(os.path.commonpath((path, other))).parts) if path.drive == other.drive else 0
 
 
 def _side(
@@ -324,14 +491,20 @@ def _compare_with_lock(
         named = msgspec.structs.replace(options.scope, package=record.package)
         files = find(options.paths, named.root, report, named.exclude)
         mine = list(inputs.packages(files, named, report))
-    models = error_free_models(mine, options.scope, report)
+    others = [package for package in packages if len(packages) > 1 and package not in mine]
+    models = error_free_models([*mine, *others], options.scope, report)
+    if not record.types:
+        hint = "`idlc gen` writes a lock with the type hashes"
+        report_nothing(options, "the lock has no type hashes", hint, report)
     if report.had_errors:
         return None
     model = models.get(record.package) or Model(record.package, (), {})
     same = bool(mine) and mine[0].digests == record.inputs
     with stage("compare", options.against):
         comparison = compare_hashes(record.types, model)
-        return comparison._replace(differs=comparison.differs or not same)
+        new = [compare(Model(each.package, (), {}), models[each.package]) for each in others]
+        whole = combine([comparison, *new])
+        return whole._replace(differs=whole.differs or not same)
 
 
 def _version(packages: Packages, root: Root, report: Report) -> str | None:

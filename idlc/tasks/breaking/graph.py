@@ -47,7 +47,14 @@ from idlc.robot.live.graph import (
 )
 from idlc.robot.live.types import ask
 from idlc.robot.session import Session
-from idlc.tasks.breaking.files import BreakingOptions, error_free_models, judge
+from idlc.tasks.breaking.files import (
+    BreakingOptions,
+    error_free_models,
+    judge,
+    report_nothing,
+    report_skipped,
+)
+from idlc.versions.packages import Skipped
 from idlc.wire.layout import oversized
 
 #: A graph that never comes to rest is watched for this many times the patience.
@@ -231,6 +238,7 @@ def _robot_endpoints(end: RobotEntity) -> Iterator[Endpoint]:
 
 #: A structure's full name and type hash.
 Key = tuple[str, str]
+_HASHES = "nodes announce type hashes from Iron on"
 _NO_NODE = "no node has the interface's description"
 _SERVICE_EVENTS = (
     "a node describes a service only to nodes with the same version; to see the difference, add "
@@ -242,7 +250,7 @@ class GraphVerdict(NamedTuple):
     """The result: the number of findings by broken level, and of compared items by kind.
 
     `seen` counts nodes, topics, services and actions, `silent` endpoints without a type hash,
-    `hidden` findings that break only other levels than the selected ones.
+    `hidden` findings that break only other levels than the selected ones. `not_compared` are types.
     """
 
     levels: dict[str, int]
@@ -251,6 +259,7 @@ class GraphVerdict(NamedTuple):
     silent: int
     endpoints: tuple[Endpoint, ...]
     hidden: int
+    not_compared: tuple[str, ...]
 
 
 def compare_with_graph(
@@ -297,13 +306,22 @@ def compare_with_graph(
         changes = list(several_types(endpoints))
         for several in versions:
             changes += version_changes(several, models, problems, seen)
+    files = {name for name, version in local.items() if version.in_files}
+    meant = [each for each in endpoints if not has_paths or each.structure in files]
+    silent = [endpoint for endpoint in meant if not endpoint.hash]
+    if not changes and len(silent) == len(meant):
+        reason = "no node announces the hash of one of these types"
+        report_nothing(options, reason, _HASHES, report)
+    names = sorted({str(interface_of(endpoint.structure)) for endpoint in silent})
+    skipped = Skipped(tuple(names), "nodes announce no type hash", _HASHES)
+    left = report_skipped([skipped], options, report)
     judged = judge(changes, options, report)
-    silent = sum(not endpoint.hash for endpoint in endpoints)
     named: set[tuple[str, str]] = {(endpoint.entity, endpoint.name) for endpoint in endpoints}
     named |= {("node", endpoint.node) for endpoint in endpoints if endpoint.node}
     numbers = Counter(kind for kind, _ in named)
     counts = {kind: numbers[kind] for kind in ("node", *get_args(Entity))}
-    return GraphVerdict(judged.levels, judged.allowed, counts, silent, endpoints, judged.hidden)
+    facts = len(silent), endpoints, judged.hidden, left
+    return GraphVerdict(judged.levels, judged.allowed, counts, *facts)
 
 
 def _local_versions(

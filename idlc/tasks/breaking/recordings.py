@@ -3,27 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import NamedTuple
+
+import msgspec
 
 from idlc.api.sources import read_source
 from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import find
-from idlc.recordings.types import NAMED, LocalTypes, recorded_types, topics_of, versions
-from idlc.tasks.breaking.files import BreakingOptions, error_free_models, judge
+from idlc.recordings.definitions import RecordedDefinition
+from idlc.recordings.types import (
+    DefinedTopic,
+    LocalTypes,
+    RecordedTypes,
+    recorded_types,
+    topics_of,
+    versions,
+)
+from idlc.tasks.breaking.files import (
+    BreakingOptions,
+    error_free_models,
+    judge,
+    report_nothing,
+    report_skipped,
+)
 from idlc.versions.changes import Change
-from idlc.versions.packages import Comparison, compare
+from idlc.versions.packages import Comparison, Skipped, compare
 
 
 class RecordedVerdict(NamedTuple):
     """The result: the number of changes by broken level, and of compared items by kind.
 
     `others` counts changes without effect on readers if no level was selected, `hidden` changes
-    that break only other levels than the selected ones.
+    that break only other levels than the selected ones. `not_compared` are types and topics.
     """
 
     levels: dict[str, int]
@@ -31,31 +48,35 @@ class RecordedVerdict(NamedTuple):
     others: int
     seen: dict[str, int]
     hidden: int
+    not_compared: tuple[str, ...]
 
 
 def compare_with_recordings(
-    options: BreakingOptions, recordings: Sequence[str], report: Report
+    options: BreakingOptions, recordings: Sequence[str], newer: Sequence[str], report: Report
 ) -> RecordedVerdict | None:
     """Report changes since recordings were made; `None` if something could not be read.
 
-    The interfaces of PATHs are compared, or without PATHs the ones of this machine. Without levels,
-    only changes that affect readers are reported.
+    The new versions are in the `newer` recordings, in the interfaces of PATHs, or without both on
+    this machine. Without levels, only changes that affect readers are reported.
     """
     files = find(options.paths, options.scope.root, report, options.scope.exclude)
     problems = Report()
     packages = inputs.packages(files, options.scope, problems)
     report.extend(problems)
-    topics = topics_of(read_source, recordings, (), options.scope.root, report)
-    if topics is None or report.had_errors:
+    topics, newer_topics = (
+        topics_of(read_source, words, (), options.scope.root, report)
+        for words in (recordings, newer)
+    )
+    if topics is None or newer_topics is None or report.had_errors:
         return None
     local = _LocalVersions(packages, options, report)
+    later = _Recorded(newer_topics, local.types, report) if newer else None
+    earlier = _Recorded(topics, local.types, report)
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
-    for version in versions(topics):
-        types = recorded_types(version, local.types, report)
-        models = types.models.values()
-        report.extend(types.errors)
-        for old, new in local.pairs(models, types.texts):
+    for models, recorded in earlier.versions:
+        pairs = later.pairs(models, recorded) if later else local.pairs(models, recorded)
+        for old, new in pairs:
             seen |= {interface.name for interface in old.own}
             with stage("compare", old.package):
                 new_ones = local.compared(old, new).changes
@@ -63,17 +84,76 @@ def compare_with_recordings(
                 **{(change.subject, change.message): change for change in new_ones},
                 **changes,
             }
-    if local.unknown:
-        names = first_few((f"`{name}`" for name in sorted(local.unknown)), NAMED)
-        report.notes.append(
-            f"idlc did not find these interfaces, and did not compare them: {names}"
-        )
-    if packages and not seen:
-        report.notes.append("the recordings contain none of these interfaces")
-    counts = {"interface": len(seen), "recording": len(recordings)}
+    unknown = (earlier.names - seen) if later else local.unknown
+    where = "the other recordings do not contain them" if later else "idlc did not find them"
+    if packages and not later:  # what else was recorded is not meant
+        earlier.undefined = {
+            topic: name
+            for topic, name in earlier.undefined.items()
+            if name and name.package in local.packages
+        }
+    skipped = [
+        Skipped(tuple(map(str, sorted(unknown))), where),
+        Skipped(tuple(sorted(earlier.undefined)), "their types are not defined"),
+    ]
+    if later:
+        skipped.append(Skipped(tuple(sorted(later.undefined)), "their types are not defined"))
+    if not seen:
+        reason = "the recordings contain none of these interfaces"
+        hint = "`idlc show` lists the types of a recording; name the folder of these interfaces"
+        report_nothing(options, reason, hint, report)
+    names = report_skipped(skipped, options, report)
+    counts = {"interface": len(seen), "recording": len(recordings) + len(newer)}
     judged = judge([*changes.values()], options, report, concerns=concerns_readers)
     others, hidden = (0, judged.hidden) if options.levels else (judged.hidden, 0)
-    return RecordedVerdict(judged.levels, judged.allowed, others, counts, hidden)
+    return RecordedVerdict(judged.levels, judged.allowed, others, counts, hidden, names)
+
+
+class _Recorded:
+    """The versions of types in recordings: for each, its models and the definitions in them.
+
+    `undefined` are topics, each with the name of its type, without a definition to compare.
+    """
+
+    def __init__(
+        self, topics: Sequence[RecordedDefinition], local: LocalTypes, report: Report
+    ) -> None:
+        self.versions: list[tuple[list[Model], Container[ir.TypeName]]] = []
+        self.undefined: dict[str, ir.TypeName | None] = {}
+        for version in versions(topics):
+            types = recorded_types(version, local, report)
+            report.extend(types.errors)
+            self.versions.append((list(types.models.values()), types.texts))
+            defined = {
+                typed.recorded.topic.name for typed in types.topics if _is_sure(typed, types)
+            }
+            self.undefined |= {
+                topic.topic.name: topic.interface
+                for topic in version.topics
+                if topic.topic.name not in defined
+            }
+
+    @property
+    def names(self) -> set[ir.TypeName]:
+        """The names of all defined interfaces."""
+        every = chain.from_iterable(models for models, _ in self.versions)
+        return {name for model in every for name in _names(model)}
+
+    def pairs(
+        self, models: Iterable[Model], recorded: Container[ir.TypeName]
+    ) -> Iterator[tuple[Model, Model]]:
+        """Yield each package of an older version, and each newer version of its interfaces."""
+        for old in (model.only(recorded) for model in models):
+            for newer, texts in self.versions:
+                for new in (each.only(texts) for each in newer if each.package == old.package):
+                    if shared := _names(old) & _names(new):
+                        yield old.only(shared), new.only(shared)
+
+
+def _is_sure(typed: DefinedTopic, types: RecordedTypes) -> bool:
+    """Return whether the recorded type is known: by its definition, or by its hash."""
+    digest = typed.recorded.topic.hash
+    return typed.interface in types.texts or bool(digest and digest == types.hash(typed))
 
 
 class _LocalVersions:
@@ -82,9 +162,12 @@ class _LocalVersions:
     def __init__(
         self, packages: Sequence[inputs.Inputs], options: BreakingOptions, report: Report
     ) -> None:
-        self.types = LocalTypes(options.scope, report)
+        scope = options.scope
+        homes = tuple(package.home.as_posix() for package in packages)
+        near = msgspec.structs.replace(scope, include=(*homes, *scope.include))
+        self.types = LocalTypes(near, report)
         self._root = options.scope.root
-        self._packages = {package.package: package for package in packages}
+        self.packages = {package.package: package for package in packages}
         self._models = error_free_models(packages, options.scope, report)
         #: Interfaces that could not be compared.
         self.unknown: set[ir.TypeName] = set()
@@ -95,12 +178,12 @@ class _LocalVersions:
         """Yield each recorded package, and the local version of the same interfaces."""
         for model in models:
             old = model.only(recorded)
-            if not self._packages:
+            if not self.packages:
                 new = self.types.model(model.package, _names(old))
                 self.unknown |= _names(old) - _names(new)
-            elif model.package in self._packages:
+            elif model.package in self.packages:
                 new = self._models[model.package]
-                if self._packages[model.package].is_whole(self._root):
+                if self.packages[model.package].is_whole(self._root):
                     yield old, new  # missing interfaces were removed
                     continue
             else:
@@ -109,7 +192,7 @@ class _LocalVersions:
 
     def compared(self, old: Model, new: Model) -> Comparison:
         """Return the changes, with the path of the missing file for removed interfaces."""
-        comparison, package = compare(old, new), self._packages.get(old.package)
+        comparison, package = compare(old, new), self.packages.get(old.package)
         if package is None:
             return comparison
         home = self._root.shown(package.home)

@@ -1,10 +1,15 @@
 """Install demo: `colcon build` and `pip install` both run this file."""
 
 from glob import glob
+from importlib.util import find_spec
+from runpy import run_path
 
 from setuptools import find_packages, setup
 
 package_name = 'demo'
+
+if not find_spec('idlc'):  # this build stops if `idlc gen` was not run after a change
+    run_path('demo/_idlc_build.py')
 
 setup(
     name=package_name,
@@ -23,7 +28,7 @@ setup(
         ('share/' + package_name + '/srv', glob('srv/*.srv')),
         ('share/' + package_name + '/action', glob('action/*.action')),
     ],
-    idlc_interfaces=True,  # if idlc is installed, compile msg/, srv/ and action/
+    idlc_interfaces=True,  # where idlc is installed, compile msg/, srv/ and action/
     install_requires=['numpy', 'setuptools'],
     zip_safe=False,
     maintainer='Your Name',

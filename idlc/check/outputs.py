@@ -1,0 +1,103 @@
+"""The rule on generated code that is kept: it belongs to the interfaces of today."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.project.files import is_file
+from idlc.project.find import CLOSING, SKIPPED
+from idlc.project.inputs import Inputs
+from idlc.project.lock import FILE, Lock, load_lock
+from idlc.project.settings import Scope
+
+
+def outdated(
+    path: str, before: Mapping[str, str], now: Mapping[str, str], words: Sequence[str]
+) -> Iterator[Diagnostic]:
+    """Yield the problem of generated code whose lock at `path` records other interfaces.
+
+    `words` are the arguments of idlc that generate it again.
+    """
+    changed = []
+    for name in sorted(before.keys() | now.keys()):
+        if name not in before:
+            changed.append(f"`{name}` was added")
+        elif name not in now:
+            changed.append(f"`{name}` was removed")
+        elif before[name] != now[name]:
+            changed.append(f"`{name}` changed")
+    if changed:
+        message = f"the generated code is out of date: {first_few(changed, 3)}"
+        hint = f"run `idlc {shlex.join(words)}`"
+        yield codes.STALE_GENERATED_CODE.of(path, message, hint=hint)
+
+
+def outputs(package: Inputs, scope: Scope) -> dict[Path, Lock]:
+    """Return the generated code of a package outside of its folder, or of one without package.xml.
+
+    It is where `[tool.idlc] out` says. Without this setting, the project is searched.
+    """
+    root = scope.root
+    is_ros = root.manifest(package.home) is not None
+    folders: Iterable[Path] = ()
+    if scope.out:
+        out = root.absolute(scope.out)
+        folders = (out, out / package.package)
+    elif not is_ros:
+        folders = _generated(package.home)
+    records = {folder: load_lock(folder, "", Report()) for folder in folders}
+    return {
+        folder: record
+        for folder, record in records.items()
+        if record and (record.package == package.package or (not is_ros and _fits(record, package)))
+    }
+
+
+def _fits(record: Lock, package: Inputs) -> bool:
+    """Return whether a lock seems to be of these interfaces, under another package name."""
+    now = package.digests
+    return record.inputs.keys() == now.keys() or bool(record.inputs.items() & now.items())
+
+
+def _generated(home: Path) -> Iterator[Path]:
+    """Yield the folders of generated code in the Python project around a folder."""
+    marks = ("pyproject.toml", "setup.py", "setup.cfg")
+    places = (home, *home.parents)
+    projects = (place for place in places if any(is_file(place / mark) for mark in marks))
+    project = next(projects, None)
+    for place, folders, names in os.walk(project) if project else ():
+        if not CLOSING.isdisjoint((*folders, *names)):
+            folders.clear()
+            continue
+        folders[:] = [name for name in folders if name[0] != "." and name not in SKIPPED]
+        if FILE in names:
+            yield Path(place)
+
+
+def current_outputs(
+    package: Inputs, records: Mapping[Path, Lock], scope: Scope
+) -> Iterator[Diagnostic]:
+    """Yield a problem for each folder of generated code that does not match a package."""
+    root = scope.root
+    is_whole = package.is_whole(root)
+    for folder, record in records.items():
+        manifest = root.manifest(package.home)
+        if manifest is not None and folder.is_relative_to(manifest.parent):
+            continue  # the rules of packages judge it
+        before, now = record.inputs, package.digests
+        if not is_whole:  # the other files are not known
+            before = {name: before[name] for name in before.keys() & now.keys()}
+            now = {name: now[name] for name in before}
+        words = ["gen"]
+        if not (scope.paths and scope.out and folder.is_relative_to(root.absolute(scope.out))):
+            words += [root.shown(package.home), "-o", root.shown(folder)]
+            words += [] if manifest else ["--package", record.package]
+            words += {"": [], "private": ["--vendor-deps"], "beside": ["--vendor-deps=beside"]}[
+                record.vendoring
+            ]
+        yield from outdated(root.shown(folder / FILE), before, now, words)

@@ -1,0 +1,1 @@
+"""idlc on clones of public repositories."""

@@ -1,0 +1,145 @@
+"""Messages that match a condition, and their fields, without decoding the others."""
+
+import operator
+import pickle
+from datetime import timedelta
+
+import numpy as np
+import pytest
+
+import idlc
+from idlc.cli.main import main
+from idlc.recordings.containers.source import RecordingError
+from tests.support import recordings as made
+
+MESSAGES = made.messages()
+OPERATORS = {"==": "eq", "!=": "ne", "<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
+
+
+@pytest.fixture(scope="module", params=["mcap", "db3"])
+def recording(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    if request.param == "mcap":
+        path = made.by_mcap(folder / "rec.mcap", MESSAGES, chunk_size=3000)
+    else:
+        path = made.by_rosbags(folder / "bag", MESSAGES, "sqlite3")
+    with idlc.Recording(path) as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("sign", OPERATORS)
+def test_each_operator_selects_what_python_selects(recording, sign):
+    topic, compare = recording["/camera/image"], getattr(operator, OPERATORS[sign])
+    expected = [time for time, message in topic if compare(message.width, 4)]
+    chosen = topic.where("width", sign, 4)
+    assert [time for time, _ in chosen] == expected
+    assert chosen.to_columns()["log_time"].tolist() == expected
+    assert chosen.to_arrow()["log_time"].cast("int64").to_pylist() == expected
+    assert [time for part in topic.where("width", sign, "4").parts(500)
+            for time, _ in pickle.loads(pickle.dumps(part)).messages()] == expected  # fmt: skip
+
+
+def test_conditions_combine_and_messages_without_the_field_are_counted(recording):
+    topic = recording["/joints"]
+    lengths = [len(message.position) for _, message in topic]
+    chosen = topic.where("position[2]", ">=", 0.25).where("header.frame_id", "!=", "frame")
+    expected = [
+        time
+        for time, message in topic
+        if len(message.position) > 2
+        and message.position[2] >= 0.25
+        and message.header.frame_id != "frame"
+    ]
+    assert [time for time, _ in chosen] == expected
+    assert chosen.absent == sum(length < 3 for length in lengths) > 0
+    chosen.to_columns()
+    assert chosen.absent == sum(length < 3 for length in lengths)
+    none = topic.where("position[9]", "==", 0)
+    assert list(none) == []
+    assert len(none.to_columns()) == none.to_arrow().num_rows == 0
+
+
+def test_times_of_a_header_select_as_log_times_do(recording):
+    topic = recording["/imu"]
+    stamps = [
+        message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for _, message in topic
+    ]
+    first, last = stamps[3], stamps[7]
+    chosen = topic.between(first, last, by="header.stamp")
+    assert [time for time, _ in chosen] == [time for time, _ in topic][3:7]
+    assert [time for time, _ in topic.between(np.datetime64(first, "ns"), by="header.stamp")] == [
+        time for time, _ in topic
+    ][3:]
+    later = topic.between("1", timedelta(seconds=2), by="header.stamp")
+    assert 0 < len(list(later)) < len(stamps)
+
+
+def test_fields_of_messages(recording):
+    topic = recording["/camera/image"]
+    messages = [message for _, message in topic]
+    assert [value for _, value in topic.messages(fields="width")] == [m.width for m in messages]
+    pairs = [values for _, values in topic.messages(fields=["width", "header.frame_id"])]
+    assert pairs == [(message.width, message.header.frame_id) for message in messages]
+    with pytest.raises(RecordingError, match=r"message \d+ of `/joints` is broken: position\[3\]"):
+        list(recording["/joints"].messages(fields="position[3]"))
+
+
+WRONG = {
+    ("widht", "<", 3): "did you mean `width`",
+    ("width", "=", 3): "is not one of",
+    ("width", "<", "many"): "not compared with 'many'",
+    ("width", "<", True): "not compared with True",
+    ("width", "<", None): "not compared with None",
+    ("encoding", "==", 3): "not compared with 3",
+    ("data", "==", 3): "not a single value",
+    ("data[*]", "==", 3): "many values",
+    ("header", "==", 3): "not a single value",
+    ("header.stamp", "==", True): "not compared with True",
+}
+
+
+@pytest.mark.parametrize(("path", "sign", "value"), WRONG)
+def test_a_wrong_condition_is_refused_at_once(recording, path, sign, value):
+    with pytest.raises(ValueError, match=WRONG[path, sign, value]):
+        recording["/camera/image"].where(path, sign, value)
+
+
+def test_a_broken_message_is_named_after_those_before_it(tmp_path):
+    broken = [
+        one._replace(data=one.data[:12]) if number == 15 else one
+        for number, one in enumerate(MESSAGES[::3])
+    ]
+    path = made.by_mcap(tmp_path / "rec.mcap", broken)
+    with idlc.Recording(path) as recording:
+        topic = recording["/imu"]
+        for messages in (
+            topic.messages(),
+            topic.messages(fields="linear_acceleration.z"),
+            topic.where("linear_acceleration.z", ">=", -1).messages(),
+        ):
+            times = []
+            with pytest.raises(RecordingError, match="message 15 of `/imu` is broken"):  # noqa: PT012
+                for time, _ in messages:
+                    times.append(time)
+            assert len(times) == 15
+
+
+def test_columns_takes_conditions(tmp_path, monkeypatch, capsys):
+    from pyarrow import parquet
+
+    monkeypatch.chdir(tmp_path)
+    made.by_mcap(tmp_path / "rec.mcap", MESSAGES)
+    words = ["columns", "rec.mcap", "/joints", "-o", "a.parquet", "--force", "--where"]
+    assert main([*words, "position[0] > 0.5", "--where", "header.frame_id == ''"]) == 0
+    assert "messages do not have a field of --where" in capsys.readouterr().err
+    with idlc.Recording("rec.mcap") as recording:
+        chosen = recording["/joints"].where("position[0]", ">", 0.5)
+        expected = len(list(chosen.where("header.frame_id", "==", "")))
+    assert parquet.read_table("a.parquet").num_rows == expected > 0
+    for text, problem in {
+        "position": "is not a condition",
+        "__import__('os')": "is not a condition",
+        "positoin[0] > 1": "did you mean `position`",
+    }.items():
+        assert main([*words, text]) == 2
+        assert problem in capsys.readouterr().err

@@ -1,0 +1,179 @@
+"""Builds in environments without idlc install today's classes, or stop and say why."""
+
+import importlib.util
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from idlc.cli.main import main
+from tests.support.files import write_all
+from tests.support.programs import clean_environment, ended
+
+SCAFFOLD = ["scaffold", "package", "demo", "--maintainer", "A", "--email", "a@example.com"]
+FILES = {
+    "msg/Drive.msg": "float64 speed\n",
+    "msg/Stop.msg": "bool now\n",
+    "srv/Ask.srv": "int8 a\n---\nint8 b\n",
+}
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory):
+    """Return a package as a user commits it, and a folder with setuptools alone."""
+    folder = tmp_path_factory.mktemp("template")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(SCAFFOLD) == 0
+        patch.chdir("demo")
+        write_all(FILES)
+        assert main(["gen"]) == 0
+    borrowed = folder / "borrowed"
+    borrowed.mkdir()
+    setuptools = Path(importlib.util.find_spec("setuptools").origin).parents[1]
+    for pattern in ("setuptools*", "pkg_resources", "_distutils_hack"):
+        for path in setuptools.glob(pattern):
+            (borrowed / path.name).symlink_to(path)
+    return folder
+
+
+@pytest.fixture
+def package(template, tmp_path, monkeypatch):
+    shutil.copytree(template / "demo", tmp_path / "demo")
+    monkeypatch.chdir(tmp_path / "demo")
+    return template
+
+
+def build(template, *words):
+    """Return the status and the output of a build without idlc."""
+    environment = {**clean_environment(), "PYTHONPATH": str(template / "borrowed")}
+    words = words or ("-q", "build", "--build-base", "build")
+    return ended(sys.executable, "-S", "setup.py", *words, environment=environment, cwd=Path.cwd())
+
+
+def rename(old, new):
+    Path(new).parent.mkdir(parents=True, exist_ok=True)
+    Path(old).rename(new)
+
+
+def damage_lock():
+    Path("demo/idlc.lock").write_text('{"inputs": [}')
+
+
+def nothing():
+    pass
+
+
+#: Changes after `idlc gen`, and what the build says of each.
+OUTDATED = {
+    "edited": (lambda: Path("msg/Drive.msg").write_text("float32 speed\n"), "Drive.msg` changed"),
+    "comment": (
+        lambda: Path("srv/Ask.srv").write_text("# a\n" + FILES["srv/Ask.srv"]),
+        "Ask.srv` changed",
+    ),
+    "deleted": (lambda: Path("msg/Stop.msg").unlink(), "`msg/Stop.msg` was removed"),
+    "renamed": (lambda: rename("msg/Stop.msg", "msg/Halt.msg"), "`msg/Stop.msg` was removed"),
+    "added": (lambda: write_all({"action/Go.action": "---\n---\n"}), "Go.action` was added"),
+    "moved and edited": (
+        lambda: write_all({"msg/more/Stop.msg": "bool soon\n", "msg/Stop.msg": "bool soon\n"}),
+        "`msg/Stop.msg` changed",
+    ),
+    "all renamed": (
+        lambda: [rename(path, f"{Path(path).parent}/X{Path(path).name}") for path in FILES],
+        "`msg/Drive.msg` was removed",
+    ),
+    "lock damaged": (damage_lock, "`demo/idlc.lock` is damaged"),
+    "lock lost": (lambda: Path("demo/idlc.lock").unlink(), "`msg/Drive.msg` has no classes"),
+    "classes lost": (lambda: shutil.rmtree("demo/srv"), "`srv/__init__.py` is missing"),
+}
+
+
+@pytest.mark.parametrize("change", OUTDATED)
+def test_a_build_stops_at_classes_that_are_out_of_date(change, package):
+    make, reason = OUTDATED[change]
+    make()
+    status, said = build(package)
+    assert status == 1
+    assert "error: the classes in `demo` are out of date: " in said
+    assert reason in said
+    assert "hint: run `idlc gen`, or install idlc where the package is built" in said
+    assert "Traceback" not in said
+    assert not Path("build").exists()
+
+
+#: What is no reason to stop.
+CURRENT = {
+    "nothing": nothing,
+    "other line ends": lambda: Path("msg/Drive.msg").write_bytes(b"float64 speed\r\n"),
+    "interfaces left out": lambda: [shutil.rmtree(folder) for folder in ("msg", "srv")],
+    "interfaces of another package": lambda: write_all(
+        {"nested/package.xml": "<package/>", "nested/msg/Other.msg": "bool a\n"}
+    ),
+    "interfaces moved": lambda: rename("srv/Ask.srv", "interfaces/srv/Ask.srv"),
+    "an excluded interface": lambda: write_all(
+        {"msg/Old.msg": "bad", "pyproject.toml": '[tool.idlc]\nexclude = ["Old.msg"]\n'}
+    ),
+    "results of a build": lambda: write_all({"build/x/msg/Drive.msg": "int8 a\n"}),
+}
+
+
+@pytest.mark.parametrize("change", CURRENT)
+def test_a_build_installs_current_classes(change, package):
+    CURRENT[change]()
+    status, said = build(package)
+    assert status == 0, said
+    assert "Unknown distribution option" not in said
+    assert Path("build/lib/demo/msg/_drive.py").is_file()
+
+
+def test_what_is_gone_is_not_built_again(package):
+    assert build(package)[0] == 0
+    assert Path("build/lib/demo/srv/_ask.py").is_file()
+    Path("build/lib/demo/of_users.py").write_text("")
+    Path("srv/Ask.srv").unlink()
+    Path("msg/Stop.msg").unlink()
+    assert main(["gen"]) == 0
+    assert build(package)[0] == 0
+    assert not Path("build/lib/demo/srv").exists()
+    assert not Path("build/lib/demo/msg/_stop.py").exists()
+    assert Path("build/lib/demo/msg/_drive.py").is_file()
+    assert Path("build/lib/demo/of_users.py").is_file()
+
+
+def test_interfaces_that_are_gone_are_not_installed_again(package, tmp_path):
+    prefix = tmp_path / "prefix"
+    words = ("-q", "install_data", "--install-dir", str(prefix))
+    assert build(package, *words)[0] == 0
+    rename("msg/Stop.msg", "msg/Halt.msg")
+    Path("srv/Ask.srv").unlink()
+    (prefix / "share/demo/msg/of_users.txt").write_text("")
+    assert main(["gen"]) == 0
+    Path("msg/Stop.msg").symlink_to("nowhere")  # as `colcon build --symlink-install` leaves it
+    status, said = build(package, *words)
+    assert status == 0, said
+    names = {path.name for path in (prefix / "share/demo").rglob("*") if path.is_file()}
+    installed = {"package.xml", "demo_launch.py", "Drive.msg", "Halt.msg", "of_users.txt"}
+    assert names == installed
+    for folder in ("msg", "srv"):  # as on a robot
+        shutil.rmtree(folder)
+    assert build(package, *words)[0] == 0
+    assert (prefix / "share/demo/msg/Drive.msg").is_file()
+
+
+def test_questions_about_a_package_are_answered(package):
+    Path("msg/Drive.msg").write_text("float32 speed\n")
+    status, said = build(package, "--version")
+    assert (status, said.strip()) == (0, "0.1.0")
+    assert build(package, "--help-commands")[0] == 0
+
+
+def test_a_new_package_is_built_before_it_has_interfaces(package):
+    for folder in ("msg", "srv", "demo/msg", "demo/srv", "demo/_idlc"):
+        shutil.rmtree(folder)
+    Path("demo/idlc.lock").unlink()
+    assert build(package)[0] == 0
+    write_all({"msg/First.msg": "bool a\n"})
+    status, said = build(package)
+    assert status == 1
+    assert "`msg/First.msg` has no classes" in said
