@@ -9,12 +9,15 @@ from functools import partial
 from itertools import count
 from typing import Any, Generic
 
+import msgspec
+
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
 from idlc.robot.nodes.endpoints import Bounded, Endpoint
 from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
+from idlc.robot.qos import HistoryPolicy
 from idlc.robot.transport import Closeable, Request, Sample
 from idlc.runtime.names import DecodeError
 
@@ -34,7 +37,9 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the service."""
-        self._queue: Bounded[tuple[Request, Attachment]] = Bounded(self.qos_profile)
+        # unlike in rclpy, which drops requests beyond the depth
+        every = msgspec.structs.replace(self.qos_profile, history=HistoryPolicy.KEEP_ALL)
+        self._queue: Bounded[tuple[Request, Attachment]] = Bounded(every)
         #: The ids of the request objects that wait or are being answered.
         self._open: set[int] = set()
         return (self.node.transport.service(self.entity, self._receive),)
