@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from concurrent import futures
 from functools import partial
 from itertools import count
-from typing import Any, Generic
+from typing import Any, ClassVar, Generic
 
-import msgspec
+from msgspec.structs import replace
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
@@ -17,7 +17,6 @@ from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
 from idlc.robot.nodes.endpoints import Bounded, Endpoint
 from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
-from idlc.robot.qos import HistoryPolicy
 from idlc.robot.transport import Closeable, Request, Sample
 from idlc.runtime.names import DecodeError
 
@@ -34,12 +33,13 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
     """Answers requests: `callback` gets the request and an empty response, and returns it."""
 
     kind = Kind.SERVICE
+    #: The requests that wait, if these are more than the announced depth.
+    depth: ClassVar[int] = 0
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the service."""
-        # unlike in rclpy, which drops requests beyond the depth
-        every = msgspec.structs.replace(self.qos_profile, history=HistoryPolicy.KEEP_ALL)
-        self._queue: Bounded[tuple[Request, Attachment]] = Bounded(every)
+        profile = replace(self.qos_profile, depth=self.depth or self.qos_profile.depth)
+        self._queue: Bounded[tuple[Request, Attachment]] = Bounded(profile)
         #: The ids of the request objects that wait or are being answered.
         self._open: set[int] = set()
         return (self.node.transport.service(self.entity, self._receive),)
@@ -89,6 +89,12 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
         super().destroy()
         while (item := self._queue.pop()) is not None:
             self._drop(item[0])
+
+
+class DeepService(Service[RequestT, ResponseT]):
+    """A service that programs ask many questions at once."""
+
+    depth = 1000
 
 
 class Client(Endpoint, Generic[RequestT, ResponseT]):
