@@ -15,7 +15,7 @@ from typing import NamedTuple
 from idlc.diagnostics.text import did_you_mean
 from idlc.generate.python.decode import UNENDED, Decoder, slice_of
 from idlc.generate.python.lines import Block, Group, Line, call, text_of
-from idlc.generate.python.positions import Cursor, Tables
+from idlc.generate.python.positions import Cursor, NamedExpressions
 from idlc.model import ir
 from idlc.model.python_names import Locals
 from idlc.wire import plan
@@ -204,7 +204,7 @@ def _repeated(step: plan.Step) -> plan.Fixed | None:
 class _Makers(dict[ir.TypeName, str]):
     """The functions that make empty structures, each defined when it is first needed."""
 
-    def __init__(self, tables: Tables) -> None:
+    def __init__(self, tables: NamedExpressions) -> None:
         super().__init__()
         self.tables = tables
 
@@ -219,7 +219,7 @@ class _FieldReader(Decoder):
         self, messages: Messages, nanoseconds: bool, positions: bool, shares: bool
     ) -> None:
         self.names = Locals()
-        tables = Tables(self.names)
+        tables = NamedExpressions(self.names)
         super().__init__(tables, _Makers(tables), {}, "view")
         self.messages = messages
         self.nanoseconds = nanoseconds
