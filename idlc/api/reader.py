@@ -16,7 +16,7 @@ from idlc.generate.python.reader import Part, Path, PathError, is_time, paths_of
 from idlc.model import ir
 from idlc.model.from_description import message_of
 from idlc.runtime.cdr import NATIVE
-from idlc.runtime.checked import validate_element, validate_list
+from idlc.runtime.checked import validate_count, validate_element
 from idlc.runtime.codec import FAILURES, READINGS, deserialize, maker, text_of_view
 from idlc.runtime.names import DecodeError, ValidationError, owner_of, slot_name
 from idlc.runtime.typeinfo import FieldInfo, Structure, structure_of
@@ -382,9 +382,13 @@ def _numbers(path: str, field: FieldInfo, value: Any) -> Iterator[Any]:
         validate_element(value, field, path, wire_only=True)
         yield value
     else:
-        validate_list(value, field, path, wire_only=True)
+        if isinstance(value, (str, Mapping)) or not hasattr(value, "__len__"):
+            raise ValidationError(path, "a sequence", value)
+        validate_count(value, field, path)
         is_octets = isinstance(value, (bytes, bytearray)) and not field.is_numeric
-        yield from (bytes((octet,)) for octet in value) if is_octets else value
+        for element in (bytes((octet,)) for octet in value) if is_octets else value:
+            validate_element(element, field, path, wire_only=True)
+            yield element
 
 
 def _parts(path: str, field: FieldInfo, structure: Structure, value: Any) -> list[Any]:

@@ -52,15 +52,12 @@ def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> 
             raise ValidationError(path or "message", f"a {structure.name}", message)
         value = getattr(message, field.slot)
         if field.is_list:
-            validate_list(value, field, place, wire_only)
+            _list(value, field, place, wire_only)
         else:
             validate_element(value, field, place, wire_only)
 
 
-def validate_list(
-    values: Any, field: FieldInfo, path: str, wire_only: bool = False
-) -> None:
-    """Raise ValidationError if a field cannot hold a list."""
+def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
     if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
         raise ValidationError(path, "a sequence", values)
     validate_count(values, field, path)
@@ -168,7 +165,7 @@ def refused(message: Any, name: str, values: Any, error: Exception) -> Validatio
         or not hasattr(values, "__len__")
     ):
         try:
-            validate_list(values, field, name, wire_only=True)
+            _list(values, field, name, wire_only=True)
         except ValidationError as exact:
             failure = exact
     raised = ValidationError
@@ -229,7 +226,7 @@ def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
         return  # the default
     if _converts(owner, field) and not isinstance(value, (str, Mapping)):
         return
-    check = validate_list if field.is_list else validate_element
+    check = _list if field.is_list else validate_element
     try:
         check(value, field, field.public, wire_only=True)
     except ValidationError as error:
