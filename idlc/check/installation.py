@@ -136,7 +136,12 @@ def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind:
 
 
 def _data_files_problem(
-    code: codes.Code, message: str, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
+    code: codes.DiagnosticCode,
+    message: str,
+    setup: Setup,
+    lines: Sequence[str],
+    *,
+    uses_glob: bool = False,
 ) -> Diagnostic:
     """Return a problem with the hint and the edits that add entries to `data_files`."""
     glob, imports = setup_edits.imported(setup, "glob", "glob") if uses_glob else ("glob", ())

@@ -21,7 +21,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
-from idlc.project.library import Library, Texts
+from idlc.project.library import InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
@@ -144,7 +144,7 @@ class Contents:
     def __init__(self) -> None:
         self._contents: dict[tuple[ir.TypeName, str, bool], Hashable] = {}
 
-    def agree(self, some: Texts, others: Texts) -> bool:
+    def agree(self, some: InterfaceTexts, others: InterfaceTexts) -> bool:
         """Return whether no name has different definitions in both."""
         return all(
             self.same(name, source, others[name]) for name, source in some.items() if name in others
@@ -185,7 +185,9 @@ class DefinedTopic(NamedTuple):
 class LocalTypes:
     """The types that are defined locally, without any recording; `texts` take precedence."""
 
-    def __init__(self, scope: Scope, report: Report, texts: Texts = MappingProxyType({})) -> None:
+    def __init__(
+        self, scope: Scope, report: Report, texts: InterfaceTexts = MappingProxyType({})
+    ) -> None:
         self.scope = scope
         self.near = inputs.nearby_packages(scope.root)
         self.library = Library(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -68,6 +68,10 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         recordings, others = split_recordings(options.paths, options.scope.root)
         if recordings:
             return _with_recordings(recordings, others, options, report)
+    return _check_files(options, report)
+
+
+def _check_files(options: CheckOptions, report: Report) -> CheckResult:
     fixed = 0
     texts: dict[str, tuple[str, str]] = {}
     scope, selection = options.scope, options.selection
@@ -76,11 +80,7 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         looked = Report()
         listing = list_files(paths, scope.root, looked, scope.exclude)
         packages = inputs.packages(listing.files, scope, looked, listing.packages)
-        for path in listing.empty:
-            folder = scope.root.absolute(path)
-            if not any(package.home.is_relative_to(folder) for package in packages):
-                also = "package.xml and no "
-                looked.add(no_interfaces(path, scope.root, scope.exclude, also=also))
+        looked.extend(_without_packages(listing.empty, packages, scope))
         checking = checkers(packages, scope)
         problems, models = check_all(checking, packages, selection)
         edits = [change for problem in problems for change in problem.edits]
@@ -107,6 +107,16 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
     looked_at = filter(None, map(first.package_facts, packages))
     notes = tuple(filter(None, map(cmake_lists.unknown, looked_at)))
     return CheckResult(files, len(packages), fixed, distros, notes, texts)
+
+
+def _without_packages(
+    paths: Iterable[str], packages: Collection[inputs.Inputs], scope: Scope
+) -> Iterator[Diagnostic]:
+    """Yield a problem for each path without interfaces in which there is no package either."""
+    for path in paths:
+        folder = scope.root.absolute(path)
+        if not any(package.home.is_relative_to(folder) for package in packages):
+            yield no_interfaces(path, scope.root, scope.exclude, also="package.xml and no ")
 
 
 def _with_packages(paths: Sequence[str], root: Root) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ class Sides(NamedTuple):
 
     def change(
         self,
-        code: codes.Code,
+        code: codes.DiagnosticCode,
         element: ir.Field | ir.Constant,
         message: str,
         levels: Iterable[Level],

@@ -1,14 +1,14 @@
 """Every node of the example, each in a process of its own, does what the tutorial says."""
 
 import signal
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.support.nodes import nodes
+from tests.support import programs
+from tests.support.nodes import next_without_drop, nodes
 from tests.support.paths import EXAMPLE
 
 
@@ -141,16 +141,9 @@ def _waits(client) -> bool:
 
 @pytest.mark.long
 def test_the_example_passes_its_own_tests(ros_environment):
-    # On a busy machine, Fast DDS drops a response whose reader it has not met in time, and says so.
-    dropped, attempts = True, 0
-    while dropped and attempts < 3:
-        done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"],
-            cwd=EXAMPLE,
-            env=ros_environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        dropped, attempts = "failed to send response (timeout)" in done.stdout, attempts + 1
-    assert done.returncode == 0, done.stdout
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
+    attempts = (
+        programs.ended(*command, cwd=EXAMPLE, environment=ros_environment) for _ in range(3)
+    )
+    status, output = next_without_drop(attempts)
+    assert status == 0, output

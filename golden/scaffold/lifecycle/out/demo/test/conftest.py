@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+from typing import Any
 
 import pytest
 from rcl_interfaces.srv import GetParameters
@@ -63,8 +64,14 @@ class Running:
     def until_it_spins(self, name: str) -> None:
         """Spin the observer until the node answers; a signal would break its imports before."""
         client = self._observer.create_client(GetParameters, f'{name}/get_parameters')
-        self.until(client.service_is_ready)
-        self.until(client.call_async(GetParameters.Request()).done)
+        # a node that has not discovered the observer yet drops its response: ask again
+        answers: list[Any] = []
+        timer = self._observer.create_timer(
+            0.2,
+            lambda: answers.append(client.call_async(GetParameters.Request())),
+        )
+        self.until(lambda: any(answer.done() for answer in answers))
+        self._observer.destroy_timer(timer)
 
     def leave(self) -> None:
         """Terminate the node; others would see a killed node for some time."""
