@@ -51,12 +51,12 @@ def _summary(
         consequence = _CONSEQUENCES[next(iter(broken))][isinstance(verdict, RecordedVerdict)]
         parts.append(f"{counted(number, 'breaking change')} ({levels_of}): {consequence}")
     elif verdict.hidden:
-        at = f" at level {', '.join(levels)}"
+        at = f" at {', '.join(levels)} level"
     nothing = any(problem.code == codes.NOTHING_COMPARED.id for problem in report)
     if not (broken or nothing) and (added or any(verdict.seen.values())):
         parts.append(f"no breaking changes{' in the rest' if verdict.not_compared else ''}{at}")
     if verdict.hidden:
-        parts.append(f"--level hides {counted(verdict.hidden, 'change')}")
+        parts.append(f"`levels` in [tool.idlc.breaking] hides {counted(verdict.hidden, 'change')}")
     if verdict.allowed:
         parts.append(f"{verdict.allowed} allowed")
     parts.append(
@@ -68,8 +68,9 @@ def _summary(
         parts += _advice(verdict)
     elif isinstance(verdict, RecordedVerdict):
         if verdict.others:
-            others = counted(verdict.others, "change")
-            parts.append(f"hidden: {others} without effect on readers (see --level)")
+            others = counted(verdict.others, "more change")
+            verb = "does" if verdict.others == 1 else "do"
+            parts.append(f"{others} {verb} not affect readers")
     elif verdict.silent:
         parts.append(f"{counted(verdict.silent, 'endpoint')} without a type hash")
     return "; ".join(parts)
@@ -87,10 +88,11 @@ def _advice(verdict: Verdict) -> Iterator[str]:
 
 
 EPILOG = options.example(
-    "mkdir -p old/msg new/msg",
+    "mkdir -p old/msg",
     "echo 'float64 speed 0.5  # [m/s]' > old/msg/Drive.msg",
-    "echo 'float64 speed 0.7  # [m/s]' > new/msg/Drive.msg",
-    "idlc breaking new --against old --level hash",
+    "cp -r old new",
+    "echo 'string text' > new/msg/Note.msg",
+    "idlc breaking new --against old",
 )
 EPILOG += "\n" + options.example(
     "[[tool.idlc.breaking.allow]]",
@@ -119,15 +121,6 @@ EPILOG += "\n" + options.example(
     help="With --against graph or ADDRESS, stop waiting for nodes and replies after this time.  "
     "[default: 5]",
 )
-@click.option(
-    "--level",
-    "levels",
-    multiple=True,
-    type=click.Choice(("wire", "hash", "source", "behaviour")),
-    help="Report only changes with this level. May be repeated. By default, idlc reports all "
-    "changes. If you compare with recordings, it reports only changes that affect programs that "
-    "read recordings.",
-)
 @options.packages
 @options.distro
 @options.report_style
@@ -135,7 +128,6 @@ def command(
     paths: tuple[str, ...],
     against: str | None,
     timeout: float | None,
-    levels: tuple[str, ...],
     style: str,
     **scoping: Any,
 ) -> int:
@@ -171,6 +163,7 @@ def command(
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)
+    levels = packages.levels(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
         raise click.UsageError(

@@ -14,7 +14,6 @@ def check_paths(
     diff: bool = False,
     strict: bool = False,
     style: str = "text",
-    statistics: bool = False,
     prefix: str | None = None,
     package: str | None = None,
     include: tuple[str, ...] = (),
@@ -51,9 +50,8 @@ def check_paths(
             paint = output.painter(stream)
             for name, (old, new) in checked.texts.items() if diff else ():
                 output.diff(name, old, new, sys.stdout)
-            if not statistics:
-                output.show(report, style, stream, fixable=True)
-            if statistics or len(report) > terminal.MANY:
+            output.show(report, style, stream, fixable=True)
+            if len(report) > terminal.MANY:
                 stream.writelines(terminal.statistics(report))
             done = f"{fixed} {'would be fixed' if diff else 'fixed'}, " if fixed else ""
             what = counted(len(files), "file")

@@ -110,7 +110,7 @@ def network(tmp_path_factory):
             stack.callback(process.kill)
             return process
 
-        router = start("router", "-m", "idlc", "robot", "router", "--listen", endpoint)
+        router = start("router", "-m", "idlc", "router", "--listen", endpoint)
 
         def listens():
             assert router.poll() is None, logs["router"].read_text()
@@ -190,7 +190,7 @@ def test_each_counts_its_messages(network, name):
     graph = node.graph
     (publisher,) = graph.entities(Kind.PUBLISHER, name=f"/{name}/seen")
     samples = []
-    receiver = node.transport.subscriber(publisher.key, QoSProfile(depth=1), samples.append)
+    receiver = node.transport.subscriber(publisher, samples.append)
     state = JointState.from_dict(STATE)
     payload = state.serialize()
 
