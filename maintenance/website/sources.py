@@ -9,10 +9,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 START = "docs/index.md"
+README = "README.md"
 #: Where documents outside of docs/ are on the site; the others keep their names, in lower case.
 PLACES = {
     START: "contents.md",
-    "README.md": "about.md",
+    README: "about.md",
     "examples/my_robot_controller/README.md": "tutorial.md",
 }
 #: The pages of rules, which `maintenance.website.rules` makes.
@@ -38,7 +39,8 @@ def place(path: str) -> str:
 def files() -> dict[str, bytes]:
     """Return by its place every page, and every file that pages link to."""
     found: dict[str, bytes] = {}
-    wanted = [START]
+    readme = (ROOT / README).read_text(encoding="utf-8")  # its parts are on the home page
+    wanted = [START, *(path for path in links(README, readme) if not path.startswith(RULES))]
     seen = set(wanted)
     while wanted:
         path = wanted.pop()
