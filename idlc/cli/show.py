@@ -158,8 +158,9 @@ def command(
     For a recording, idlc lists each topic with its type, message count and type hash, and shows
     whether your local type matches. With TOPIC, it shows the recorded definitions of these topics.
 
-    REC can also be the address of a robot, such as tcp/robot:7447. idlc lists the robot's topics,
-    services and actions, and the nodes that use them. It also reports incompatible endpoints.
+    REC can also be the address of a robot, such as `dds` or tcp/robot:7447. idlc lists the robot's
+    topics, services and actions, and the nodes that use them. It also reports incompatible
+    endpoints.
 
     With --format hash, idlc prints the hashes of all TYPE, PATH and REC arguments, and for a
     service or action those of the messages that ROS 2 derives from it.

@@ -114,6 +114,13 @@ _WRITING = frozenset({"configure_file", "execute_process", "file"})
 _LONGEST_WORD, _LONGEST_VALUE, _MOST = 1024, 256, 1_000_000
 
 
+def _runs_another_file(call: Call) -> bool:
+    """Return whether a command runs commands that the file does not contain."""
+    if call.name == "include":
+        return re.search(r"[/$.]", " ".join(call.words)) is not None
+    return call.name in ("add_subdirectory", "cmake_language")
+
+
 class Script:
     """The arguments that a CMakeLists.txt passes to rosidl and ament.
 
@@ -181,9 +188,7 @@ class Script:
             self.exported = self._added(self.exported, self._expanded(words, call.places))
         elif name.startswith("ament_auto_"):
             self.found = self.exported = None
-        elif name in ("add_subdirectory", "cmake_language") or (
-            name == "include" and re.search(r"[/$.]", " ".join(words))
-        ):
+        elif _runs_another_file(call):
             self.files = self.found = self.exported = None
             self._lists, self.reads_others = {}, True
         elif name not in _BLOCKS and not name.startswith(_HARMLESS):

@@ -94,8 +94,8 @@ SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
 #: The name of a type or package, as ROS 2, Python or C++ writes it.
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
-#: A configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
-_ADDRESS = re.compile(r"zenoh:|(?:tcp|tls|quic|udp|ws)/")
+#: DDS, a configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
+_ADDRESS = re.compile(r"dds(?:[:/]|\Z)|zenoh:|(?:tcp|tls|quic|udp|ws)/")
 NOTHING = Exclusions()
 
 
