@@ -394,7 +394,7 @@ def _numbers(path: str, field: FieldInfo, value: Any) -> Iterator[Any]:
 def _parts(path: str, field: FieldInfo, structure: Structure, value: Any) -> list[Any]:
     """Return the values for the fields of a structure."""
     names = [part.name for part in structure.fields]
-    if _is_time(structure) and isinstance(value, int):
+    if _is_time(structure) and type(value) is int:
         return [*divmod(value, 10**9)]
     if not isinstance(value, Mapping):
         validate_element(value, field, path, wire_only=True)

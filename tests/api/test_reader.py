@@ -279,6 +279,7 @@ REFUSED = [
     ("header.stamp.sec", 1.5, "header.stamp.sec"),
     ("header.stamp", {"sec": 1}, "a dictionary of sec, nanosec"),
     ("header.stamp", 1 << 80, "header.stamp.sec"),
+    ("header.stamp", True, "must be a builtin_interfaces/msg/Time"),
     ("orientation_covariance", [1.0], "needs 9"),
     ("orientation.x", "1", "orientation.x"),
     ("orientation.x", None, "orientation.x"),
