@@ -67,8 +67,11 @@ def _line(package: Generated, check: bool, paint: Paint) -> str:
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
 
-    is_all = not check and package.written >= package.files and not package.removed
-    note = "" if is_all else f" ({'up to date' if check else package.changes})"
+    note = f" ({package.changes})"
+    if check:
+        note = " (up to date)"
+    elif package.written >= package.files and not package.removed:
+        note = ""
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
         f"{paint('good', package.package)}: {counted(package.interfaces, 'interface')} → "
@@ -186,9 +189,7 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     With --ament, `source PREFIX/setup.bash` makes the packages available to ROS 2.
     """
     from idlc.cli import output
-    from idlc.project.find import is_path
     from idlc.project.settings import scope, settings_here
-    from idlc.recordings.find import split_recordings
     from idlc.tasks.gen import GenOptions, in_package, with_settings
 
     settings, report = settings_here()
@@ -204,6 +205,22 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     arguments["vendoring"] = arguments["vendoring"] or ""
     typed = GenOptions(**arguments, scope=scope(settings, *words), again=again)
     request = in_package(with_settings(typed, settings))
+    _refuse_what_has_no_effect(request, package)
+    if request.check and (watch or request.force):
+        raise click.UsageError("--check cannot be combined with --watch or --force")
+    if watch and style in options.DOCUMENTS:
+        raise click.UsageError("--watch needs --format text or json")
+    if watch:
+        return run_again(request, style)
+    return once(request, style)
+
+
+def _refuse_what_has_no_effect(request: GenOptions, package: str | None) -> None:
+    """Raise a usage error without inputs or an output, and for options that do not apply."""
+    from idlc.cli import output
+    from idlc.project.find import is_path
+    from idlc.recordings.find import split_recordings
+
     if not request.paths or not (request.out or request.ament):
         missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
         message = f"missing {missing}; add it, or set it in [tool.idlc] of pyproject.toml"
@@ -213,7 +230,6 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
             message = f"this folder contains several packages; run `{' && '.join(commands)}`"
         raise click.UsageError(message)
     root = request.scope.root
-    # which may have no effect on the paths
     judged = request.paths if package or request.topics else ()
     recordings, others = split_recordings(judged, root)
     if request.topics and not recordings:
@@ -221,10 +237,3 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if package and not any(is_path(word, root) for word in others):
         what = "a recording" if recordings else "an installed package"
         raise click.UsageError(f"--package applies to files, but {what} keeps its own package name")
-    if request.check and (watch or request.force):
-        raise click.UsageError("--check cannot be combined with --watch or --force")
-    if watch and style in options.DOCUMENTS:
-        raise click.UsageError("--watch needs --format text or json")
-    if watch:
-        return run_again(request, style)
-    return once(request, style)

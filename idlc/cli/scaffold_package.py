@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from idlc.cli import options
 from idlc.cli.scaffold import common, finish
+
+if TYPE_CHECKING:
+    from idlc.project.root import Root
+    from idlc.scaffold.package import Package
 
 EPILOG = options.example(
     "idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com",
@@ -47,11 +51,10 @@ def command(
     """
     from idlc.cli.output import program
     from idlc.diagnostics.report import Report
-    from idlc.project.git import setting
     from idlc.project.root import Root
     from idlc.scaffold.changes import Settings
     from idlc.scaffold.interface import starter
-    from idlc.scaffold.package import Package, check_package_name, package
+    from idlc.scaffold.package import check_package_name, package
 
     if starters and not interfaces_only:
         raise click.UsageError("INTERFACE needs --interfaces")
@@ -61,17 +64,26 @@ def command(
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report, root = Report(), Root.here()
-    requested = Package(
-        name,
-        arguments["description"] or f"The package {name}.",
-        arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
-        arguments["email"] or setting("user.email", root.base) or "you@example.com",
-        arguments["licence"] or LICENSES[0],
-        "ament_cmake" if interfaces_only else "ament_python",
-    )
+    build_type = "ament_cmake" if interfaces_only else "ament_python"
+    requested = _requested(name, arguments, build_type, root)
     shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
     chosen |= {"starters"} if starters else set()
     result = package(requested, Settings(root, **shared), report, examples, chosen)
     example = f"{program()} scaffold interface msg Status 'float32 battery'"
     return finish(result, report, (f"cd {name}", example))
+
+
+def _requested(name: str, arguments: dict[str, Any], build_type: str, root: Root) -> Package:
+    """Return the package with the defaults for what was not set."""
+    from idlc.project.git import setting
+    from idlc.scaffold.package import Package
+
+    return Package(
+        name,
+        arguments["description"] or f"The package {name}.",
+        arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
+        arguments["email"] or setting("user.email", root.base) or "you@example.com",
+        arguments["licence"] or LICENSES[0],
+        build_type,
+    )
