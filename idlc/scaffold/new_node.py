@@ -96,8 +96,13 @@ def node_entry(
     added = {} if start in texts else {start: ""}
     if CONFTEST not in texts:
         added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja")
-    if not launch:
-        return Entry(added, edits, tuple(notes))
+    entry = Entry(added, edits, tuple(notes))
+    return _with_launch(entry, node, texts) if launch else entry
+
+
+def _with_launch(entry: Entry, node: spec.Node, texts: Mapping[str, str]) -> Entry:
+    """Return an entry that also adds the node to a launch file, which setup.py installs."""
+    added, edits, notes = {**entry.added}, {**entry.edits}, [*entry.notes]
     file = next((name for name in texts if name.startswith("launch/")), "")
     template = "package/launch.py.jinja"
     old = texts[file] if file else rendered_for(node.package, template)
@@ -178,17 +183,23 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     result = None if edited is None else project.write(entry.added, edited)
     if result is None:
         return None
+    notes = _notes(planned, entry, project)
+    used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
+    compiled = any(interface.package == own for interface in used_names)
+    missing = not project.has(f"{home}/_type_data.py")
+    after = project.generation() if missing and compiled else ()
+    return result._replace(notes=tuple(notes), following=after)
+
+
+def _notes(planned: Plan, entry: Entry, project: Project) -> list[str]:
+    """Return what is left to do by hand, and the packages that cannot be imported here."""
     notes = [f"`{project.shown(path)}` {text}" for path, text in entry.notes]
     absent = [package for package in planned.packages if not python_folders(package)]
     if absent and python_folders("rclpy"):
         listed = ", ".join(f"`{package}`" for package in absent)
         distro = BY_NAME.get(distribution().name, DEFAULT)
         notes.append(f"{listed} cannot be imported here: {distro.installing(absent)}")
-    used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
-    compiled = any(interface.package == own for interface in used_names)
-    missing = not project.has(f"{home}/_type_data.py")
-    after = project.generation() if missing and compiled else ()
-    return result._replace(notes=tuple(notes), following=after)
+    return notes
 
 
 def _is_cmake(project: Project) -> bool:
