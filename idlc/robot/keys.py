@@ -66,7 +66,7 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
     name: str = ""
     type: str = ""
     hash: str = ""
-    qos: QoSProfile = QoSProfile()
+    qos: QoSProfile = msgspec.field(default_factory=QoSProfile)
     token: str = ""
 
     def __post_init__(self) -> None:
