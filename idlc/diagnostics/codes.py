@@ -165,6 +165,7 @@ MISSING_FIND_PACKAGE = DiagnosticCode("IDL466", "missing-find-package", WARNING,
 UNUSED_CMAKE_DEPENDENCY = DiagnosticCode("IDL467", "unused-cmake-dependency", WARNING, PACKAGE)
 RUNTIME_NOT_EXPORTED = DiagnosticCode("IDL468", "runtime-not-exported", WARNING, PACKAGE)
 DEPRECATED_ARGUMENT = DiagnosticCode("IDL469", "deprecated-argument", WARNING, PACKAGE)
+CANNOT_BUILD = DiagnosticCode("IDL470", "cannot-build", WARNING, PACKAGE)
 
 # remarks
 UNUSED_IGNORE = DiagnosticCode("IDL490", "unused-ignore", WARNING)
