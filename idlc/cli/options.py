@@ -155,24 +155,26 @@ def scoped(
     return decorate
 
 
-def on_robot(command: Callable[..., None]) -> Callable[..., int]:
+def on_robot(command: Callable[..., bool | None]) -> Callable[..., int]:
     """Have a command called with the `session` with a robot whose ADDRESS is given, and a `report`.
 
-    The report is written after it.
+    `include` has the folders of -I and of the settings. The report is written after it.
+    If it returns True, it failed.
     """
 
     @wraps(command)
-    def run(address: str, **arguments: Any) -> int:
+    def run(address: str, include: tuple[str, ...], **arguments: Any) -> int:
         from idlc.cli import output
-        from idlc.diagnostics.report import Report
+        from idlc.project.settings import settings_here
         from idlc.robot.live.connect import connected
 
-        report = Report()
+        settings, report = settings_here()
+        folders, failed = (*include, *settings.include), False
         with connected(address, report) as session:
-            if session:
-                command(session=session, report=report, **arguments)
+            if session and not report.had_errors:
+                failed = bool(command(session=session, report=report, include=folders, **arguments))
         output.show(report, "text", sys.stderr)
         output.notes(report, sys.stderr)
-        return output.status(report)
+        return output.status(report) or int(failed)
 
-    return click.argument("address", metavar="ADDRESS")(run)
+    return click.argument("address", metavar="ADDRESS")(include(run))

@@ -92,9 +92,12 @@ def channel(
     number: int, schema_number: int, topic: bytes, encoding: bytes, metadata: dict[bytes, bytes]
 ) -> bytes:
     """Return the content of a channel's record."""
-    pairs = b"".join(text_field(part) for pair in metadata.items() for part in pair)
     head = pack("<HH", number, schema_number)
-    return head + text_field(topic) + text_field(encoding) + text_field(pairs)
+    return head + text_field(topic) + text_field(encoding) + _pairs(metadata)
+
+
+def _pairs(metadata: dict[bytes, bytes]) -> bytes:
+    return text_field(b"".join(text_field(part) for pair in metadata.items() for part in pair))
 
 
 class McapWriter:
@@ -241,6 +244,13 @@ class ChunkWriter(McapWriter):
         self._records += record(op, content)
         if len(self._records) >= CHUNK:
             self.flush()
+
+    def add_metadata(self, name: str, values: dict[bytes, bytes]) -> None:
+        """Append named facts."""
+        self.flush()
+        content = text_field(name.encode()) + _pairs(values)
+        self.index_other(records.METADATA_OP, memoryview(content), len(content))
+        self.write(record(records.METADATA_OP, content))
 
     def flush(self) -> None:
         """Write the records that were collected."""
