@@ -97,14 +97,20 @@ class Finding(NamedTuple):
     proposal: str = ""
 
 
+ElementChange: TypeAlias = Literal[
+    "as is", "float", "int", "number", "byte as float", "byte", "nested"
+]
+
+
 class Step(NamedTuple):
     """The way from an old value to a new one.
 
-    `element` says what is done with each element: `as is`, `float`, `int` (of a bool), `number` (of
-    a byte), `byte` (of a number) or `nested`. `wraps` makes an array of one value.
+    `element` says what is done with each element: `as is`, `float`, `int` (of a bool), `number` or
+    `byte as float` (of a byte), `byte` (of a number) or `nested`. `wraps` makes an array of one
+    value.
     """
 
-    element: Literal["as is", "float", "int", "number", "byte", "nested"] = "as is"
+    element: ElementChange = "as is"
     nested: Plan | None = None
     wraps: bool = False
     #: The bytes are the same, and so is the value in Python.
@@ -466,16 +472,16 @@ class _Planner:
         return "the values are of another kind"
 
 
-_OCTETS = frozenset({"uint8", "char"})
+OCTETS = frozenset({"uint8", "char"})
 
 
 def _number(before: str, after: str) -> Step | str:
     """Return the way from one primitive to another, or the reason why values may not fit."""
-    if before == after or {before, after} <= _OCTETS:
+    if before == after or {before, after} <= OCTETS:
         return Step()
-    if before == "byte" and after in _OCTETS:
+    if before == "byte" and after in OCTETS:
         return Step("number", alike=False)
-    if after == "byte" and before in _OCTETS:
+    if after == "byte" and before in OCTETS:
         return Step("byte", alike=False)
     old, new = (ir.PRIMITIVES["uint8" if name == "byte" else name] for name in (before, after))
     changed = Step("number" if before == "byte" else "as is", same=False, alike=False)
@@ -491,7 +497,8 @@ def _number(before: str, after: str) -> Step | str:
     if new.low is None:
         # digits of the mantissa
         fits = old.high < 1 << (24 if new.size == 4 else 53)
-        return changed._replace(element="float") if fits else "not every number fits exactly"
+        element: ElementChange = "byte as float" if before == "byte" else "float"
+        return changed._replace(element=element) if fits else "not every number fits exactly"
     assert new.high is not None
     fits = new.low <= old.low and old.high <= new.high
     return changed if fits else "not every number fits"

@@ -38,8 +38,9 @@ from idlc.recordings.types import (
 )
 from idlc.tasks.upgrade.targets import Target, compiled, target_of
 from idlc.versions.conversion import Finding, Plan, Version, make_plan
-from idlc.versions.converters import Payloads, RunRules
+from idlc.versions.converters import RunRules
 from idlc.versions.distribution import PREFIX
+from idlc.versions.exact import Payloads
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 #: Called with a recording, and how much of it is done.
@@ -328,7 +329,7 @@ def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Convers
             continue
         convert = None
         if not plan.same:
-            way = ways[id(plan)] = ways.get(id(plan)) or Payloads.of(plan, run)
+            way = ways[id(plan)] = ways.get(id(plan)) or Payloads(plan, run)
             convert = partial(converted, way, entry.topic)
         definition, new = definition_of(plan.new), plan.new.key
         conversions[entry.topic] = Conversion(new.type, MSG, definition, new.hash, convert)
