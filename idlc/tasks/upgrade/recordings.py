@@ -37,6 +37,7 @@ from idlc.recordings.types import (
     versions,
 )
 from idlc.tasks.upgrade.targets import Target, compiled, target_of
+from idlc.versions.constants import renumbered
 from idlc.versions.conversion import Finding, Plan, Version, make_plan
 from idlc.versions.converters import RunRules
 from idlc.versions.distribution import PREFIX
@@ -199,6 +200,7 @@ def _of_types(
         if (topic.name, name) not in plans:
             new = Version(models, name)
             is_same = old.key == new.key and not _differs(old, new, target)
+            is_same = is_same and not _renumbers(old, new)
             plans[topic.name, name] = None if is_same else make_plan(old, new, rules)
         plan = plans[topic.name, name]
         if plan is not None:
@@ -235,6 +237,13 @@ def _differs(old: Version, new: Version, target: Target) -> bool:
         for version in (old, new)
     )
     return before != after
+
+
+def _renumbers(old: Version, new: Version) -> bool:
+    """Return whether a constant of a type has another value in a version of the same hash."""
+    return any(
+        renumbered(old.of(name).message, new.of(name).message) for name in old.reached & new.reached
+    )
 
 
 def _judge(
