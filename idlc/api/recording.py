@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
+from msgspec.structs import replace
+
+from idlc.model.distros import BY_NAME, unknown_distro
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
-from idlc.recordings.containers.file import CDR, START, unread_reason
+from idlc.recordings.containers.file import CDR, START, full_name, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
     Messages,
     Raw,
     Window,
+    in_order,
     join_messages,
 )
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.lengths import SAMPLE, check_lengths
 from idlc.recordings.times import moment
 
 if TYPE_CHECKING:
@@ -28,6 +35,7 @@ if TYPE_CHECKING:
 
     from idlc.api.upgrade import Upgrade
     from idlc.recordings.load import TopicType
+    from idlc.runtime.typeinfo import Structure
 
 
 class Reading(NamedTuple):
@@ -35,6 +43,13 @@ class Reading(NamedTuple):
 
     kind: Any
     rules: Any = None
+
+
+def checked_distro(name: str | None) -> str | None:
+    """Return the name of a distribution; raise RecordingError if there is none of that name."""
+    if name is not None and name not in BY_NAME:
+        raise RecordingError(f"no such distribution: `{name}`", unknown_distro(name))
+    return name
 
 
 def readings(as_: Any, rules: Any) -> dict[str, Reading]:
@@ -48,6 +63,7 @@ def readings(as_: Any, rules: Any) -> dict[str, Reading]:
 
 
 Kind = TypeVar("Kind")
+Selected = TypeVar("Selected", bound="Selection")
 #: The path in errors of many messages: the index of a message, and the path in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
 #: The columns of a message besides its fields.
@@ -80,7 +96,15 @@ class Selection:
     idlc generated is given; that must be of the same type as the recorded one. `include` are
     folders in which types are looked for that the recording does not define. With `reading`, they
     are converted to another version of the type first.
+
+    `distro` is the distribution of such types, and `others` are topics of other versions.
     """
+
+    distro: str | None = None
+    others: tuple[Topic, ...] = ()
+    #: The messages whose lengths were compared with the type, and whether one does not fit.
+    _compared = 0
+    _differs = False
 
     def __init__(
         self, topic: Topic, include: tuple[str, ...] = (), reading: Reading | None = None
@@ -97,10 +121,10 @@ class Selection:
         """Yield the messages, many at a time, in the version that they are read as."""
         done = 0
         for batch in self.recorded():
-            yield self._read_as(batch, done)
+            yield self.read_as(batch, done)
             done += len(batch)
 
-    def _read_as(self, batch: Messages, first: int = 0) -> Messages:
+    def read_as(self, batch: Messages, first: int = 0) -> Messages:
         """Return messages in the version that they are read as."""
         if self.reading is None or self._upgrade.plan.same:
             return batch
@@ -116,11 +140,67 @@ class Selection:
         assert self.reading is not None
         return upgrade(self._type.kind, *self.reading)
 
+    @property
+    def structure(self) -> Structure:
+        """The type of the messages as they are recorded."""
+        return self._type.structure
+
     @cached_property
     def _type(self) -> TopicType:
         from idlc.recordings.load import type_of
 
-        return type_of(self.topic, self.include)
+        return type_of(self.topic, self.include, self.distro, self._sample)
+
+    def _sample(self) -> list[Raw]:
+        """Return some messages as they are recorded."""
+        raws: list[Raw] = []
+        for batch in self.recorded():
+            raws += batch.views()[: SAMPLE - len(raws)]
+            if len(raws) >= SAMPLE:
+                break
+        return raws
+
+    def compare_lengths(self, batch: Messages | None = None, kind: Any = None) -> None:
+        """Compare the lengths of the first messages with their type: see `_judge`."""
+        if self._compared >= SAMPLE or self.topic.encoding != CDR:
+            return
+        from idlc.recordings.columns import unread_bytes
+
+        raws = self._sample() if batch is None else batch.views()[: SAMPLE - self._compared]
+        structure = self._structure(kind)
+        unread = unread_bytes(structure, raws)
+        self._compared += len(raws)
+        self._judge(structure, unread, raws)
+
+    def _structure(self, kind: Any) -> Structure:
+        """Return the type that recorded messages are read as."""
+        is_recorded = kind is None or self.reading is not None
+        if is_recorded:
+            return self._type.structure
+        from idlc.runtime.typeinfo import structure_of
+
+        return structure_of(kind)
+
+    def _judge(self, structure: Structure, unread: Any, raws: Sequence[Raw]) -> None:
+        """Warn, once, if messages are longer than their type; raise if they are of another one."""
+        if self._differs or not raws:
+            return
+        from idlc.recordings.load import OtherDefinitionWarning, known_versions
+
+        known = known_versions(self.topic, self.include, self.others)
+        if problem := check_lengths(self.topic, structure, unread, raws[:SAMPLE], known):
+            self._differs = True
+            warnings.warn(problem, OtherDefinitionWarning, stacklevel=4)
+
+    def _on_unread(self, kind: Any, batch: Messages) -> Callable[[Any], None]:
+        """Return what judges messages whose lengths were compared as they were read."""
+        self.compare_lengths(batch, kind)
+        return lambda unread: self._judge(self._structure(kind), unread, batch.views()[:SAMPLE])
+
+    def like(self, other: Selected) -> Selected:
+        """Return another selection with the same lookup of types."""
+        other.distro, other.others = self.distro, self.others
+        return other
 
     @property
     def kind(self) -> Any:
@@ -155,8 +235,10 @@ class Selection:
     def messages(self, kind: Any = None) -> Iterator[Stamped[Any]]:
         """Yield each message with its time, in the order in which they were recorded."""
         self._source(kind)
-        kind, done = kind or self.kind, 0
-        for batch in self.batches():
+        known, kind, done = kind, kind or self.kind, 0
+        for recorded in self.recorded():
+            self.compare_lengths(recorded, known)
+            batch = self.read_as(recorded, done)
             for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
                 with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
                     message = kind.deserialize(view)
@@ -175,9 +257,10 @@ class Selection:
 
         source = self._source(kind)
         recorded = join_messages(list(self.recorded()))
-        batch = self._read_as(recorded)
+        batch = self.read_as(recorded)
+        judge = self._on_unread(kind, recorded)
         with _at(self.topic, recorded.views):
-            table = to_columns(source, batch, fields)
+            table = to_columns(source, batch, fields, on_unread=judge)
         times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
         columns = {name: values for name, values in times if values is not None}
         codes = {**dict.fromkeys(columns, "M8[ns]"), **table.times}
@@ -204,21 +287,25 @@ class Selection:
         """
         pa = arrow()
         source = self._source(kind)
-        tables = list(self._tables(source, options))
+        tables = list(self._tables(source, options, kind))
         return pa.concat_tables(tables) if tables else _table(source, options)
 
     def to_reader(self, kind: Any = None, **options: Any) -> pa.RecordBatchReader:
         """Return the same piece by piece, without the whole table in memory."""
         pa = arrow()
         source = self._source(kind)
-        batches = (batch for table in self._tables(source, options) for batch in table.to_batches())
+        batches = (
+            batch for table in self._tables(source, options, kind) for batch in table.to_batches()
+        )
         return pa.RecordBatchReader.from_batches(_table(source, options).schema, batches)
 
-    def _tables(self, source: Any, options: Any) -> Iterator[pa.Table]:
+    def _tables(self, source: Any, options: Any, kind: Any) -> Iterator[pa.Table]:
         done = 0
         for batch in self.recorded():
+            judge = self._on_unread(kind, batch)
             with _at(self.topic, batch.views, done):
-                table = _table(source, options, self._read_as(batch, done))
+                more = {**options, "on_unread": judge}
+                table = _table(source, more, self.read_as(batch, done))
             yield table
             done += len(batch)
 
@@ -297,7 +384,8 @@ class Part(Selection):
 
     def __reduce__(self) -> tuple[Any, ...]:
         where = self.place, self.ids, self.pieces, self.window
-        return Part, (self.topic, *where, self.include, self.reading)
+        state = {"distro": self.distro}
+        return Part, (self.topic, *where, self.include, self.reading), state
 
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
@@ -330,10 +418,12 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         index: bool = True,
         check: bool = False,
         include: Iterable[str] = (),
+        distro: str | None = None,
         as_: Any = (),
         rules: Any = None,
     ) -> None:
         self._readings = readings(as_, rules)
+        self._distro = checked_distro(distro)
         self._include = tuple(map(str, include))
         self._container: Container = open_recording(path, index=index, check=check)
         self._topics: dict[str, list[Topic]] = {}
@@ -357,11 +447,77 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
 
             hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
             raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
-        if len(topics) > 1:
-            kinds = ", ".join(sorted({topic.type for topic in topics}))
-            raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
+        return self._selected(topics)
+
+    def topic(self, name: str, type_name: str | None = None) -> RecordedTopic:
+        """Return the messages of a topic, only those of one type if several were recorded."""
+        if type_name is None:
+            return self[name]
+        topics = [
+            topic for topic in self._topics.get(name, ()) if topic.type == full_name(type_name)
+        ]
+        if not topics:
+            kinds = ", ".join(sorted({topic.type for topic in self._topics.get(name, ())}))
+            what = f"`{name}` has no messages of `{type_name}`"
+            raise RecordingError(what, f"it has {kinds}" if kinds else None)
+        return self._selected(topics)
+
+    def _selected(self, topics: list[Topic]) -> RecordedTopic:
+        """Return the messages of topics of one name, which must be of one type."""
+        name, kinds = topics[0].name, {topic.type for topic in topics}
+        if len(kinds) > 1 or len({topic.encoding for topic in topics}) > 1:
+            listed = ", ".join(sorted(kinds))
+            hint = "select one of them with --type, or recording.topic(name, type)"
+            what = f"`{name}` has messages of several types, {listed}"
+            raise RecordingError(what, hint if len(kinds) > 1 else None)
         reading = self._readings.get(topics[0].type)
-        return RecordedTopic(self._container, topics[0], ALWAYS, self._include, reading)
+        groups: dict[str, list[RecordedTopic]] = {}
+        for single in self._apart(topics):
+            digest = single.structure.hash if len(topics) > 1 else ""
+            groups.setdefault(digest, []).append(single)
+        versions = [self._joined(group) for group in groups.values()]
+        if len(versions) == 1:
+            return versions[0]
+        if reading is not None:
+            return RecordedVersions(self._container, ALWAYS, versions)
+        places = (f"{digest} ({', '.join(self._files(group))})" for digest, group in groups.items())
+        hint = "convert them to one version: `idlc upgrade REC... --to PATH -o DIR`; or use as_="
+        raise RecordingError(
+            f"`{name}` has messages of {len(versions)} versions of {topics[0].type}: "
+            f"{' and '.join(places)}",
+            hint,
+        )
+
+    def _apart(self, topics: Iterable[Topic]) -> Iterator[RecordedTopic]:
+        """Yield the messages of each definition by themselves."""
+        every = tuple(topics)
+        for topic in every:
+            reading = self._readings.get(topic.type)
+            single = RecordedTopic(self._container, topic, ALWAYS, self._include, reading)
+            single.distro = self._distro
+            single.others = tuple(
+                other for other in every if other is not topic and other.type == topic.type
+            )
+            yield single
+
+    def definitions(self) -> Iterator[RecordedTopic]:
+        """Yield the messages of each topic, those of different definitions apart."""
+        for topics in self._topics.values():
+            yield from self._apart(topics)
+
+    def _joined(self, group: list[RecordedTopic]) -> RecordedTopic:
+        """Return the messages of topics whose types are the same."""
+        if len(group) == 1:
+            return group[0]
+        topic = self._container.joined([each.topic for each in group])
+        return group[0].like(
+            RecordedTopic(self._container, topic, ALWAYS, self._include, group[0].reading)
+        )
+
+    def _files(self, group: list[RecordedTopic]) -> list[str]:
+        """Return the names of the files that have messages of some topics."""
+        places = (place for each in group for place in self._container.places(each.topic))
+        return list(dict.fromkeys(Path(file.name).name for file, *_ in places))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -414,11 +570,16 @@ class RecordedTopic(Selection):
         start of the recording, `1700000000.5` is a time of ROS in seconds, `2026-11-22T07:30` is
         in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
         """
+        window = self._narrowed(start, end)
+        return self.like(
+            RecordedTopic(self._container, self.topic, window, self.include, self.reading)
+        )
+
+    def _narrowed(self, start: Any, end: Any) -> Window:
         first, last = (
             None if time is None else moment(time, self._container.start) for time in (start, end)
         )
-        window = self._window.narrowed(first, last)
-        return RecordedTopic(self._container, self.topic, window, self.include, self.reading)
+        return self._window.narrowed(first, last)
 
     def recorded(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
@@ -431,7 +592,55 @@ class RecordedTopic(Selection):
         """
         how = self._window, self.include, self.reading
         return [
-            Part(self.topic, file.place, tuple(numbers), pieces, *how)
+            self.like(Part(self.topic, file.place, tuple(numbers), pieces, *how))
             for file, numbers, _ in self._container.places(self.topic)
             for pieces in file.parts(numbers, self._window, size)
         ]
+
+
+class RecordedVersions(RecordedTopic):
+    """The messages of several versions of one type, read as one of them."""
+
+    def __init__(self, container: Container, window: Window, versions: list[RecordedTopic]) -> None:
+        first, count = versions[0], sum(version.topic.count for version in versions)
+        topic = replace(first.topic, count=count)
+        super().__init__(container, topic, window, first.include, first.reading)
+        self.versions = versions
+
+    def between(self, start: Any = None, end: Any = None) -> RecordedVersions:
+        """Return those of a time: see `RecordedTopic.between`."""
+        window = self._narrowed(start, end)
+        versions = [version.between(start, end) for version in self.versions]
+        return RecordedVersions(self._container, window, versions)
+
+    def parts(self, size: int = PART) -> list[Part]:
+        """Return pieces for others to read, those of each version apart."""
+        return [part for version in self.versions for part in version.parts(size)]
+
+    def compare_lengths(self, batch: Messages | None = None, kind: Any = None) -> None:
+        """Compare nothing: `recorded` compares the lengths of each version."""
+
+    def _on_unread(self, _kind: Any, _batch: Messages) -> Callable[[Any], None]:
+        return lambda _: None
+
+    def read_as(self, batch: Messages, first: int = 0) -> Messages:  # noqa: ARG002
+        """Return messages as they are: `recorded` has converted them."""
+        return batch
+
+    def recorded(self) -> Iterator[Messages]:
+        """Yield the messages as one version; those that are stored together in order of time."""
+        numbers: dict[int, list[tuple[RecordedTopic, list[int]]]] = {}
+        for version in self.versions:
+            for file, mine, _ in self._container.places(version.topic):
+                numbers.setdefault(id(file), []).append((version, mine))
+        for file in self._container.files:
+            owners = numbers.get(id(file), [])
+            every = [number for _, mine in owners for number in mine]
+            for pieces in file.parts(every, self._window, PART) if every else ():
+                batches = []
+                for version, mine in owners:
+                    for batch in file.messages(mine, pieces, self._window):
+                        version.compare_lengths(batch)
+                        batches.append(version.read_as(batch))
+                if batches:
+                    yield in_order(batches) if len(owners) > 1 else join_messages(batches)

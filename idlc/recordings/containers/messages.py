@@ -113,6 +113,15 @@ def times_of(values: Any, what: str) -> Any:
     return values.astype(np.int64)
 
 
+def in_order(parts: Sequence[Messages]) -> Messages:
+    """Return the messages of all parts in the order of their log times."""
+    joined = join_messages(parts)
+    order = np.argsort(joined.log_times, kind="stable")
+    publish = None if joined.publish_times is None else joined.publish_times[order]
+    raws = joined.views()
+    return Separate(joined.log_times[order], publish, [raws[at] for at in order.tolist()])
+
+
 def join_messages(parts: Sequence[Messages]) -> Messages:
     """Return the messages of all parts, in memory once more only if they are small."""
     if len(parts) == 1:

@@ -19,15 +19,20 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
 from idlc.model import ir
 from idlc.project.files import is_folder
-from idlc.project.find import RULES
+from idlc.project.find import RULES, is_address
 from idlc.project.git import GIT
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.recordings.columns import unread_bytes
+from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.conversion import Conversion
-from idlc.recordings.containers.file import MSG
+from idlc.recordings.containers.file import CDR, MSG
+from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definition_text import definition_text
 from idlc.recordings.definitions import interface_of
+from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
+from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
     DefinedTopic,
     LocalTypes,
@@ -36,6 +41,7 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
+from idlc.runtime.typeinfo import Structure
 from idlc.tasks.upgrade.targets import Target, compiled, target_of
 from idlc.versions.constants import renumbered
 from idlc.versions.conversion import Finding, Plan, Version, make_plan
@@ -174,8 +180,38 @@ def _plans(
             continue
         types = recorded_types(version, local, report)
         report.extend(types.errors)
+        if not is_address(recording):
+            _check_lengths(recording, types, options, report)
         with stage("plan", recording):
             yield from _of_types(recording, types, target, rules, report)
+
+
+def _check_lengths(
+    recording: str, types: RecordedTypes, options: UpgradeOptions, report: Report
+) -> None:
+    """Report topics whose messages are of another version than their definition."""
+    models = dict(types.models)
+    with open_recording(options.scope.root.path(recording)) as container:
+        for typed in types.topics:
+            topic, package = typed.recorded.topic, typed.name.package
+            if topic.encoding != CDR or typed.name not in models[package].messages:
+                continue
+            structure = TopicType(models, typed.name).structure
+            raws: list[Any] = []
+            for batch in container.messages(topic, ALWAYS):
+                raws += batch.views()[: SAMPLE - len(raws)]
+                if len(raws) >= SAMPLE:
+                    break
+            known = known_versions(topic, options.scope.include, ())
+            hint = "if the recording has no definition, add --from with the publisher's version"
+            unread = unread_bytes(structure, raws)
+            try:
+                problem = check_lengths(topic, structure, unread, raws, known, hint) if raws else ""
+            except RecordingError as error:
+                report.add(codes.CONVERSION_FAILED.of(recording, error.message, hint=error.hint))
+            else:
+                if problem:
+                    report.add(codes.CONVERSION_FAILED.of(recording, problem, hint=hint))
 
 
 def _of_types(
@@ -339,14 +375,27 @@ def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Convers
         convert = None
         if not plan.same:
             way = ways[id(plan)] = ways.get(id(plan)) or Payloads(plan, run)
-            convert = partial(converted, way, entry.topic)
+            structure = TopicType(dict(plan.old.models), plan.old.name).structure
+            convert = partial(converted, way, structure, entry.topic)
         definition, new = definition_of(plan.new), plan.new.key
         conversions[entry.topic] = Conversion(new.type, MSG, definition, new.hash, convert)
     return conversions
 
 
 def converted(
-    way: Payloads, topic: str, payloads: Sequence[Any], times: Sequence[int]
+    way: Payloads,
+    structure: Structure,
+    topic: str,
+    payloads: Sequence[Any],
+    times: Sequence[int],
 ) -> list[bytes]:
-    """Return new payloads; errors name the topic and the time of the message."""
+    """Return new payloads; errors name the topic and the time of the message.
+
+    A message that is longer than its type is an error.
+    """
+    unread = unread_bytes(structure, payloads)
+    if unread is not None and (unread > MOST_PADDING).any():
+        number = int((unread > MOST_PADDING).argmax())
+        what = f"{unread[number]:,} bytes that the definition of {structure.name} does not read"
+        raise RecordingError(f"`{topic}` at {times[number]} ns has {what}")
     return way.many(payloads, lambda number: f"`{topic}` at {times[number]} ns")
