@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,13 @@ from pathlib import Path
 from idlc.project.atomic import ended_by_errors, make_folder, move_new, uninterrupted
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.container import is_db3
-from idlc.recordings.containers.conversion import Conversion, Recorded, RewrittenTopic
+from idlc.recordings.containers.conversion import (
+    Conversion,
+    Conversions,
+    Recorded,
+    RewrittenTopic,
+)
+from idlc.recordings.containers.db3_to_mcap import as_mcap
 from idlc.recordings.containers.source import RecordingError
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
@@ -27,19 +33,24 @@ Progress = Callable[[str, int, int], object]
 BESIDE = ("-journal", "-shm", "-wal")
 
 
+def mcap_name(path: Path) -> str:
+    """Return the name of the MCAP file that a recording becomes."""
+    return path.with_suffix(".mcap").name if path.suffix == ".db3" else path.name
+
+
 def rewrite(
     source: str,
     target: str,
-    conversions: Mapping[str, Conversion],
+    conversions: Conversions,
     progress: Progress = lambda *_: None,
     *,
     index: bool = True,
 ) -> dict[str, RewrittenTopic]:
     """Write a recording with conversions of topics, by their names, to a path that is free.
 
-    Both are files of one format, or folders of bags. Without `index`, the counts in MCAP files are
-    not used. Returns the fate of each topic. Raises RecordingError, and what `convert` raises:
-    then nothing is left of the target.
+    Files that are written are MCAP, and folders are those of bags. Without `index`, the counts in
+    MCAP files are not used. Returns the fate of each topic. Raises RecordingError, and what
+    `convert` raises: then nothing is left of the target.
     """
     start, end = Path(source), Path(target)
     if os.path.lexists(end):
@@ -86,9 +97,7 @@ def _draft(target: Path) -> Iterator[Path]:
 class _Rewriting:
     """The files of one recording; `topics` sums up what was written."""
 
-    def __init__(
-        self, conversions: Mapping[str, Conversion], index: bool, progress: Progress
-    ) -> None:
+    def __init__(self, conversions: Conversions, index: bool, progress: Progress) -> None:
         self.conversions = conversions
         self.index = index
         self.progress = progress
@@ -99,9 +108,10 @@ class _Rewriting:
         """Write a file."""
         progress = partial(self.progress, path.name)
         if is_db3(path):
-            from idlc.recordings.containers.db3_rewrite import rewrite_db3
+            from idlc.recordings.containers.db3_to_mcap import convert_db3
 
-            topics = rewrite_db3(path, target, self.conversions, self.recorded, progress)
+            with target.open("xb") as file:
+                topics = convert_db3(path, file, self.conversions, self.recorded, progress)
         else:
             from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
 
@@ -112,19 +122,25 @@ class _Rewriting:
         for name, own in topics.items():
             before = self.topics.get(name, RewrittenTopic(0, 0, own.converted))
             count, size = before.messages + own.messages, before.size + own.size
-            self.topics[name] = RewrittenTopic(count, size, own.converted)
+            is_converted = own.converted or before.converted
+            self.topics[name] = RewrittenTopic(count, size, is_converted)
 
     def folder(self, folder: Path, target: Path) -> None:
         """Write a bag, with all that is in its folder."""
         paths, _ = bag.files_of(folder)
         beside = {f"{path.name}{suffix}" for path in paths for suffix in BESIDE}
-        types = {name: (own.type, own.type_hash) for name, own in self.conversions.items()}
+        types: dict[str, tuple[str, str]] = {}
+        for name, new in self.conversions.items():
+            last = new if isinstance(new, Conversion) else new[-1]
+            types[name] = last.type, last.type_hash
         target.mkdir()
         for path in sorted(folder.iterdir()):
             if path in paths:
-                self.file(path, target / path.name)
-            elif path.name == bag.METADATA and (new := bag.retyped(path, types)) is not None:
-                (target / path.name).write_bytes(new)
+                self.file(path, target / mcap_name(path))
+            elif path.name == bag.METADATA and (data := bag.retyped(path, types)) is not None:
+                is_sqlite = any(path.suffix == ".db3" for path in paths)
+                data = as_mcap(data.decode()).encode() if is_sqlite else data
+                (target / path.name).write_bytes(data)
             elif path.name not in beside:
                 _copy(path, target / path.name)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -71,12 +72,17 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
 
 
 class TopicPlan(NamedTuple):
-    """A recorded topic, and the plan of its messages; without a plan, the type was removed."""
+    """A recorded topic, and the plan of its messages; without a plan, the type was removed.
+
+    `definition` is the recorded one, and `several` says that the topic has others, too.
+    """
 
     recording: str
     topic: str
     type: str
     plan: Plan | None
+    definition: str = ""
+    several: bool = False
 
     @property
     def findings(self) -> list[Finding]:
@@ -93,16 +99,20 @@ class TopicPlan(NamedTuple):
 
 
 class Result(NamedTuple):
-    """The plans of changed topics, the recordings that were written, and new files of rules."""
+    """The plans of changed topics, the recordings that were written, and new files of rules.
+
+    `undefined` are unchanged topics whose definitions the recording lacks, by its path.
+    """
 
     plans: list[TopicPlan]
     written: list[tuple[str, str, Any]]
     stubs: list[str]
+    undefined: dict[str, list[tuple[str, Version]]]
 
 
 def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progress) -> Result:
     """Plan the upgrade of recordings, and write them unless something is in the way of it."""
-    result = Result([], [], [])
+    result = Result([], [], [], {})
     with ExitStack() as opened:
         target = opened.enter_context(target_of(options.to, options.scope, report))
         local = _local(options, opened, report)
@@ -113,7 +123,10 @@ def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progre
             return result
         found = _found(target, named, options.scope.root)
         for recording in options.recordings:
-            result.plans.extend(_plans(recording, options, target, local, Known(named), report))
+            undefined = result.undefined.setdefault(recording, [])
+            known_rules = Known(named)
+            every = _plans(recording, options, target, local, known_rules, report, undefined)
+            result.plans.extend(every)
         if report.errors:
             return result
         if options.write_rules is not None:
@@ -165,12 +178,17 @@ def _plans(
     local: LocalTypes,
     rules: Known,
     report: Report,
+    undefined: list[tuple[str, Version]],
 ) -> Iterator[TopicPlan]:
-    """Yield the plan of each topic of a recording whose type is another one in the target."""
+    """Yield the plan of each topic of a recording whose type is another one in the target.
+
+    Unchanged topics whose definitions the recording lacks are added to `undefined`.
+    """
     topics = topics_of(read_source, [recording], (), options.scope.root, report)
     if topics is None:
         return
     selected = set(options.topics)
+    definitions = Counter(topic.topic.name for topic in topics)
     for version in versions(topics):
         version = msgspec.structs.replace(
             version,
@@ -183,7 +201,8 @@ def _plans(
         if not is_address(recording):
             _check_lengths(recording, types, options, report)
         with stage("plan", recording):
-            yield from _of_types(recording, types, target, rules, report)
+            for each in _of_types(recording, types, target, rules, report, undefined):
+                yield each._replace(several=definitions[each.topic] > 1)
 
 
 def _check_lengths(
@@ -215,7 +234,12 @@ def _check_lengths(
 
 
 def _of_types(
-    recording: str, types: RecordedTypes, target: Target, rules: Known, report: Report
+    recording: str,
+    types: RecordedTypes,
+    target: Target,
+    rules: Known,
+    report: Report,
+    undefined: list[tuple[str, Version]],
 ) -> Iterator[TopicPlan]:
     compiler = target.compiler(types.texts)
     known: list[tuple[DefinedTopic, Version, ir.TypeName]] = []
@@ -238,9 +262,12 @@ def _of_types(
             is_same = old.key == new.key and not _differs(old, new, target)
             is_same = is_same and not _renumbers(old, new)
             plans[topic.name, name] = None if is_same else make_plan(old, new, rules)
-        plan = plans[topic.name, name]
+        plan, recorded = plans[topic.name, name], topic.recorded.topic
         if plan is not None:
-            yield TopicPlan(recording, topic.recorded.topic.name, str(topic.name), plan)
+            definition = recorded.schema.text if recorded.schema else ""
+            yield TopicPlan(recording, recorded.name, str(topic.name), plan, definition)
+        elif recorded.schema is None:
+            undefined.append((recorded.name, old))
 
 
 def _name_in(library: Any, old: Version, rules: Known) -> ir.TypeName | None:
@@ -336,13 +363,13 @@ def _write(
     result: Result, options: UpgradeOptions, run: RunRules, report: Report, progress: Progress
 ) -> None:
     """Write each recording; report those that cannot be, and go on with the others."""
-    from idlc.recordings.rewrite import rewrite
+    from idlc.recordings.rewrite import mcap_name, rewrite
 
     root = options.scope.root
     out = Path(root.path(options.out or "."))
     targets: dict[str, str] = {}
     for recording in options.recordings:
-        name = Path(os.path.normpath(root.path(recording))).name
+        name = mcap_name(Path(os.path.normpath(root.path(recording))))
         shown = f"{str(options.out).rstrip('/')}/{name}"
         if os.path.lexists(out / name) or shown in targets.values():
             what = "is the name of two recordings" if shown in targets.values() else "exists"
@@ -354,19 +381,40 @@ def _write(
     for recording, shown in targets.items():
         plans = [each for each in result.plans if each.recording == recording]
         try:
-            summary = rewrite(
-                root.path(recording), root.path(shown), _conversions(plans, run), progress
-            )
+            conversions = _definitions(result.undefined[recording]) | _conversions(plans, run)
+            summary = rewrite(root.path(recording), root.path(shown), conversions, progress)
         except (RecordingError, UpgradeError) as error:
             advice = getattr(error, "hint", None)
             report.add(codes.CONVERSION_FAILED.of(recording, str(error), hint=advice))
         else:
             result.written.append((recording, shown, summary))
+            if _has_db3(Path(root.path(recording))):
+                report.notes.append(PLUGIN)
+    report.notes[:] = dict.fromkeys(report.notes)
 
 
-def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Conversion]:
-    """Return the conversion of each topic; raise UpgradeError if rules cannot be run."""
-    conversions: dict[str, Conversion] = {}
+#: The note about MCAP files that were .db3 files.
+PLUGIN = (
+    "the new recordings are MCAP files; ROS 2 Humble plays them if the package "
+    "ros-humble-rosbag2-storage-mcap is installed"
+)
+
+
+def _has_db3(path: Path) -> bool:
+    return path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3")))
+
+
+def _definitions(topics: Iterable[tuple[str, Version]]) -> dict[str, Any]:
+    """Return what adds the definitions of topics that do not change."""
+    return {
+        topic: Conversion(version.key.type, MSG, definition_of(version), version.key.hash)
+        for topic, version in topics
+    }
+
+
+def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Any]:
+    """Return the conversions of each topic; raise UpgradeError if rules cannot be run."""
+    conversions: dict[str, Any] = {}
     ways: dict[int, Payloads] = {}
     for entry in plans:
         plan = entry.plan
@@ -378,7 +426,12 @@ def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Convers
             structure = TopicType(dict(plan.old.models), plan.old.name).structure
             convert = partial(converted, way, structure, entry.topic)
         definition, new = definition_of(plan.new), plan.new.key
-        conversions[entry.topic] = Conversion(new.type, MSG, definition, new.hash, convert)
+        own = Conversion(new.type, MSG, definition, new.hash, convert)
+        if entry.several:
+            others = conversions.get(entry.topic, ())
+            conversions[entry.topic] = (*others, own._replace(old=entry.definition))
+        else:
+            conversions[entry.topic] = own
     return conversions
 
 
