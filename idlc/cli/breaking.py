@@ -140,6 +140,7 @@ def command(
 
     With a recording, idlc reports changes that prevent programs with your interfaces from reading
     the recording. Without PATH, it compares every recorded type that it also finds on this machine.
+    If PATH is a recording, too, it compares the recorded types.
 
     With graph or the address of a robot, idlc reports types of which running nodes use different
     versions. It also compares these versions with your files and your installed packages.

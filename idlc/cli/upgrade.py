@@ -89,14 +89,14 @@ EPILOG += "\n" + options.example(
 )
 @click.option(
     "--to",
-    metavar="PATH|git:REF|distro:NAME",
-    help="The types to upgrade to: a package folder, a git revision, or the standard interfaces "
-    "of a distribution. By default, idlc uses the types of this machine.",
+    metavar="PATH|REC|git:REF|distro:NAME",
+    help="The types to upgrade to: a package folder, another recording, a git revision, or the "
+    "standard interfaces of a distribution. By default, idlc uses the types of this machine.",
 )
 @click.option(
     "--from",
     "old",
-    metavar="PATH|git:REF|distro:NAME",
+    metavar="PATH|REC|git:REF|distro:NAME",
     help="The old types, for recordings that do not contain their definitions, such as .db3 files "
     "of Humble.",
 )

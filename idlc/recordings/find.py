@@ -68,10 +68,13 @@ def recordings_of(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the recordings that --against means, which may be a pattern, and the other paths.
 
-    A shell that expands the pattern itself leaves all but the first among the paths.
+    A shell that expands the pattern itself leaves all but the first among the paths; but if these
+    are nothing but recordings, they are what is compared.
     """
     matches = expand(against)
     if not split_recordings(matches, root)[0]:
         return (), paths
     more, others = split_recordings(paths, root)
+    if not others:
+        return tuple(dict.fromkeys(matches)), tuple(more)
     return tuple(dict.fromkeys((*matches, *more))), tuple(others)

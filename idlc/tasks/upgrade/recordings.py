@@ -32,6 +32,7 @@ from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definition_text import definition_text
 from idlc.recordings.definitions import interface_of
+from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
@@ -147,7 +148,10 @@ def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalT
     scope = options.scope
     if options.old is None:
         return LocalTypes(scope, report)
-    if options.to is not None and not options.to.startswith((GIT, PREFIX)):
+    is_folder_of_packages = options.to is not None and not (
+        options.to.startswith((GIT, PREFIX)) or is_recording(options.to, scope.root)
+    )
+    if options.to is not None and is_folder_of_packages:
         # a revision of what `--to` names
         scope = msgspec.structs.replace(scope, paths=(options.to,))
     old = opened.enter_context(target_of(options.old, scope, report))
