@@ -6,14 +6,21 @@ Whatever is not of a changed topic keeps its content, order and compression.
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
-from idlc.project.atomic import ended_by_errors, make_folder, move_new, uninterrupted
+from idlc.project.atomic import (
+    ended_by_errors,
+    locked,
+    make_folder,
+    move_new,
+    uninterrupted,
+)
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.container import is_db3
 from idlc.recordings.containers.conversion import (
@@ -77,21 +84,37 @@ def rewrite(
 def _draft(target: Path) -> Iterator[Path]:
     """Give a path in a hidden folder beside the target, which is removed at the end."""
     created: list[Path] = []
-    folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    with ended_by_errors():
+    folder = target.parent
+    with ended_by_errors(), ExitStack() as held:
         try:
             make_folder(target.parent, created)
-            folder.mkdir()
+            _remove_abandoned(target)
+            while True:
+                folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+                folder.mkdir()
+                if held.enter_context(locked(folder)) is not False and folder.exists():
+                    break
             yield folder / target.name
             created = []
         except OSError as error:
             reason = error.strerror or error
             raise RecordingError(f"`{target}` cannot be written: {reason}") from None
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            if folder != target.parent:
+                shutil.rmtree(folder, ignore_errors=True)
             for path in reversed(created):
                 with suppress(OSError):
                     path.rmdir()
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove the drafts of runs that were killed: nobody has locked them anymore."""
+    name = re.compile(re.escape(f".{target.name}.") + "[0-9a-f]{8}")
+    for folder in target.parent.iterdir():
+        if name.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
+            with locked(folder) as is_mine:
+                if is_mine:
+                    shutil.rmtree(folder, ignore_errors=True)
 
 
 class _Rewriting:

@@ -15,6 +15,7 @@ from contextlib import suppress
 import pytest
 import zstandard
 
+from idlc.project.atomic import locked
 from idlc.recordings.containers.compression import MOST_IN_A_CHUNK
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.messages import ALWAYS
@@ -102,6 +103,20 @@ def test_a_full_disk(size, machine, source):
     assert done(machine, before) == {}
     assert run(machine, name)["status"] == 0
     assert done(machine, before)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
+def test_the_draft_of_a_killed_run_is_removed_by_the_next(tmp_path):
+    """But not that of a run that has not ended."""
+    made.by_mcap(tmp_path / "a.mcap", MESSAGES, "")
+    out = tmp_path / "out"
+    for name in (".a.mcap.00112233", ".a.mcap.44556677", ".a.mcap.backup", ".b.mcap.00112233"):
+        (out / name).mkdir(parents=True)
+        (out / name / "a.mcap").write_bytes(b"x")
+    with locked(out / ".a.mcap.44556677"):
+        rewrite(str(tmp_path / "a.mcap"), str(out / "a.mcap"), {})
+    left = [".a.mcap.44556677", ".a.mcap.backup", ".b.mcap.00112233", "a.mcap"]
+    assert sorted(path.name for path in out.iterdir()) == left
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
