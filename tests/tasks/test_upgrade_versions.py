@@ -80,3 +80,27 @@ def test_recordings_are_compared_with_each_other(files, capsys):
     # nothing can be compared
     assert main(["breaking", "--against", "2023.mcap"]) != 0
     assert "compared no interface" in capsys.readouterr().out
+
+
+def test_definitions_are_written_as_files(files, capsys):
+    """They compile to the recorded types, and nothing is replaced."""
+    write(files / "a.mcap", [(same("plain"), 1, body(1.0))])
+    assert main(["show", "a.mcap", "--format", "msg", "-o", "defs"]) == 0
+    assert capsys.readouterr().out.split() == [
+        "defs/demo_msgs/msg/Out.msg",
+        "defs/demo_msgs/msg/In.msg",
+        "defs/builtin_interfaces/msg/Time.msg",
+    ]
+    assert (files / "defs/demo_msgs/msg/In.msg").read_text() == "float64 x\n"
+    with idlc.Recording("a.mcap") as recording:
+        digest = recording["/t"].structure.hash
+    assert main(["hash", "defs/demo_msgs"]) == 0
+    assert digest in capsys.readouterr().out
+    assert main(["show", "a.mcap", "/t", "--format", "msg", "-o", "defs"]) == 0
+    (files / "defs/demo_msgs/msg/In.msg").write_text("mine\n")
+    assert main(["show", "a.mcap", "--format", "msg", "-o", "defs"]) != 0
+    assert (files / "defs/demo_msgs/msg/In.msg").read_text() == "mine\n"
+    assert main(["show", "both.mcap", "--format", "msg", "-o", "both"]) == 1
+    assert "IDL653" in capsys.readouterr().err
+    for words in (["a.mcap", "--format", "msg"], ["a.mcap", "-o", "x"], ["std_msgs", "-o", "x"]):
+        assert main(["show", *words]) == 2
