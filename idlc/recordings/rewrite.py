@@ -34,6 +34,8 @@ from idlc.recordings.containers.source import RecordingError
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
 
+#: New drafts that are made if other runs remove them as abandoned before they are locked.
+ATTEMPTS = 3
 #: Called with a file's name, how much of it is done, and its size.
 Progress = Callable[[str, int, int], object]
 #: The files that SQLite has beside a database, whose content is in the copy of that.
@@ -89,11 +91,12 @@ def _draft(target: Path) -> Iterator[Path]:
         try:
             make_folder(target.parent, created)
             _remove_abandoned(target)
-            while True:
+            for _ in range(ATTEMPTS):
                 folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
                 folder.mkdir()
-                if held.enter_context(locked(folder)) is not False and folder.exists():
-                    break
+                is_locked = held.enter_context(locked(folder))
+                if is_locked is not False and folder.exists():
+                    break  # no other run has taken it for an abandoned one meanwhile
             yield folder / target.name
             created = []
         except OSError as error:
