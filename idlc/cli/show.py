@@ -179,9 +179,10 @@ def command(
     if (style == "msg") != (out is not None) or (style == "msg" and not is_of_recording):
         raise click.UsageError("`--format msg` and `-o DIR` belong together, and need a recording")
     if out is not None:
-        from idlc.tasks.recorded_files import write_definitions
+        from idlc.api.sources import read_source
+        from idlc.recordings.packages import write_definitions
 
-        for path in write_definitions(subject, topics, out, scope, report):
+        for path in write_definitions(read_source, subject, topics, out, scope, report):
             sys.stdout.write(f"{path}\n")
         return
     if not is_of_recording:

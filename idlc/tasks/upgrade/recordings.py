@@ -30,8 +30,7 @@ from idlc.recordings.containers.conversion import Conversion
 from idlc.recordings.containers.file import CDR, MSG
 from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definition_text import definition_text
-from idlc.recordings.definitions import interface_of
+from idlc.recordings.definitions import definition_text, interface_of
 from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
 from idlc.recordings.load import TopicType, known_versions
