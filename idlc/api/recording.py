@@ -25,7 +25,7 @@ from idlc.recordings.containers.messages import (
     join_messages,
 )
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.lengths import SAMPLE, check_lengths
+from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
 from idlc.recordings.times import moment
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Selection:
         """Return some messages as they are recorded."""
         raws: list[Raw] = []
         for batch in self.recorded():
-            raws += batch.views()[: SAMPLE - len(raws)]
+            raws += batch.first_views(SAMPLE - len(raws))
             if len(raws) >= SAMPLE:
                 break
         return raws
@@ -166,7 +166,8 @@ class Selection:
             return
         from idlc.recordings.columns import unread_bytes
 
-        raws = self._sample() if batch is None else batch.views()[: SAMPLE - self._compared]
+        count = SAMPLE - self._compared
+        raws = self._sample() if batch is None else batch.first_views(count)
         structure = self._structure(kind)
         unread = unread_bytes(structure, raws)
         self._compared += len(raws)
@@ -195,7 +196,12 @@ class Selection:
     def _on_unread(self, kind: Any, batch: Messages) -> Callable[[Any], None]:
         """Return what judges messages whose lengths were compared as they were read."""
         self.compare_lengths(batch, kind)
-        return lambda unread: self._judge(self._structure(kind), unread, batch.views()[:SAMPLE])
+
+        def judge(unread: Any) -> None:
+            if (unread > MOST_PADDING).any():
+                self._judge(self._structure(kind), unread, batch.first_views(SAMPLE))
+
+        return judge
 
     def like(self, other: Selected) -> Selected:
         """Return another selection with the same lookup of types."""

@@ -69,6 +69,10 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
         """Return the bytes of each message."""
         raise NotImplementedError
 
+    def first_views(self, count: int) -> list[Raw]:
+        """Return the bytes of the first messages."""
+        return self.views()[:count]
+
 
 class Ranges(Messages, frozen=True, eq=False):
     """Messages that are each a part of one buffer."""
@@ -88,8 +92,12 @@ class Ranges(Messages, frozen=True, eq=False):
 
     def views(self) -> list[Raw]:
         """Return each message as a part of the buffer."""
+        return self.first_views(len(self))
+
+    def first_views(self, count: int) -> list[Raw]:
+        """Return each of the first messages as a part of the buffer."""
         view = memoryview(self.buffer)
-        pairs = zip(self.starts.tolist(), self.stops.tolist(), strict=True)
+        pairs = zip(self.starts[:count].tolist(), self.stops[:count].tolist(), strict=True)
         return [view[start:stop] for start, stop in pairs]
 
 

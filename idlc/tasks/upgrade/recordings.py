@@ -221,7 +221,7 @@ def _check_lengths(
             structure = TopicType(models, typed.name).structure
             raws: list[Any] = []
             for batch in container.messages(topic, ALWAYS):
-                raws += batch.views()[: SAMPLE - len(raws)]
+                raws += batch.first_views(SAMPLE - len(raws))
                 if len(raws) >= SAMPLE:
                     break
             known = known_versions(topic, options.scope.include, ())
