@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
+import shlex
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 from msgspec.structs import replace
@@ -487,7 +487,15 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         if reading is not None:
             return RecordedVersions(self._container, ALWAYS, versions)
         places = (f"{digest} ({', '.join(self._files(group))})" for digest, group in groups.items())
-        hint = "convert them to one version: `idlc upgrade REC... --to PATH -o DIR`; or use as_="
+        files = [self._files(group) for group in groups.values()]
+        target = "PATH"
+        if (
+            not set(files[-1]).intersection(name for own in files[:-1] for name in own)
+            and len(files[-1]) == 1
+        ):
+            target = shlex.quote(files[-1][0])
+        olds = " ".join(map(shlex.quote, dict.fromkeys(name for own in files[:-1] for name in own)))
+        hint = f"convert them: `idlc upgrade {olds} --to {target} -o upgraded`; or use `as_=`"
         raise RecordingError(
             f"`{name}` has messages of {len(versions)} versions of {topics[0].type}: "
             f"{' and '.join(places)}",
@@ -521,9 +529,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         )
 
     def _files(self, group: list[RecordedTopic]) -> list[str]:
-        """Return the names of the files that have messages of some topics."""
+        """Return the paths of the files that have messages of some topics."""
         places = (place for each in group for place in self._container.places(each.topic))
-        return list(dict.fromkeys(Path(file.name).name for file, *_ in places))
+        return list(dict.fromkeys(file.name for file, *_ in places))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)

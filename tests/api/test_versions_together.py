@@ -122,7 +122,8 @@ def test_versions_without_as_are_named(place, files):
         recording["/t"]
     assert caught.value.message.count("RIHS01_") == 2
     assert ".mcap" in caught.value.message
-    assert "idlc upgrade" in caught.value.hint
+    target = "2024.mcap" if isinstance(place, list) else "PATH"
+    assert f"--to {target} -o upgraded`" in caught.value.hint
 
 
 def test_one_of_two_types_is_selected(files, capsys):
