@@ -75,7 +75,14 @@ from idlc.cli import completion, options
     show_default=True,
     help="Use the indexes of MCAP files.",
 )
+@click.option(
+    "--type",
+    "type_name",
+    metavar="NAME",
+    help="Select the messages of this type, if a topic has messages of several types.",
+)
 @options.include
+@options.distro
 @click.option("--force", is_flag=True, help="Replace existing files.")
 def command(subject: str, fields: str | None, conditions: tuple[str, ...], **arguments: Any) -> int:
     """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.

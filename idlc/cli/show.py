@@ -140,12 +140,26 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @options.output_style(
-    ("text", "json", "ros2idl", "jsonschema", "mcap"),
-    "Output format: text, JSON facts, IDL, JSON Schema or an MCAP schema.",
+    ("text", "json", "ros2idl", "jsonschema", "mcap", "msg"),
+    "Output format: text, JSON facts, IDL, JSON Schema, an MCAP schema, or the files of the "
+    "recorded definitions (see --out).",
+)
+@click.option(
+    "-o",
+    "--out",
+    metavar="DIR",
+    type=click.Path(file_okay=False),
+    help="With --format msg, the folder to write a recording's .msg, .srv, .action and .idl files "
+    "to: a package in each folder.",
 )
 @options.scoped(options.package, options.include, options.distro)
 def command(
-    subject: str, topics: tuple[str, ...], style: str, scope: Scope, report: Report
+    subject: str,
+    topics: tuple[str, ...],
+    style: str,
+    out: str | None,
+    scope: Scope,
+    report: Report,
 ) -> None:
     """Show an interface with its nested messages and all comments.
 
@@ -161,7 +175,17 @@ def command(
     from idlc.recordings.find import is_recording
     from idlc.tasks import show
 
-    if not is_recording(subject, scope.root):
+    is_of_recording = is_recording(subject, scope.root)
+    if (style == "msg") != (out is not None) or (style == "msg" and not is_of_recording):
+        raise click.UsageError("`--format msg` and `-o DIR` belong together, and need a recording")
+    if out is not None:
+        from idlc.api.sources import read_source
+        from idlc.recordings.packages import write_definitions
+
+        for path in write_definitions(read_source, subject, topics, out, scope, report):
+            sys.stdout.write(f"{path}\n")
+        return
+    if not is_of_recording:
         if topics:
             raise click.UsageError(
                 f"`{subject}` is not a recording; TOPIC selects from an .mcap or .db3 file or a bag"

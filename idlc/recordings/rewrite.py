@@ -6,40 +6,60 @@ Whatever is not of a changed topic keeps its content, order and compression.
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
-from idlc.project.atomic import ended_by_errors, make_folder, move_new, uninterrupted
+from idlc.project.atomic import (
+    ended_by_errors,
+    locked,
+    make_folder,
+    move_new,
+    uninterrupted,
+)
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.container import is_db3
-from idlc.recordings.containers.conversion import Conversion, Recorded, RewrittenTopic
+from idlc.recordings.containers.conversion import (
+    Conversion,
+    Conversions,
+    Recorded,
+    RewrittenTopic,
+)
+from idlc.recordings.containers.db3_to_mcap import as_mcap
 from idlc.recordings.containers.source import RecordingError
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
 
+#: New drafts that are made if other runs remove them as abandoned before they are locked.
+ATTEMPTS = 3
 #: Called with a file's name, how much of it is done, and its size.
 Progress = Callable[[str, int, int], object]
 #: The files that SQLite has beside a database, whose content is in the copy of that.
 BESIDE = ("-journal", "-shm", "-wal")
 
 
+def mcap_name(path: Path) -> str:
+    """Return the name of the MCAP file that a recording becomes."""
+    return path.with_suffix(".mcap").name if path.suffix == ".db3" else path.name
+
+
 def rewrite(
     source: str,
     target: str,
-    conversions: Mapping[str, Conversion],
+    conversions: Conversions,
     progress: Progress = lambda *_: None,
     *,
     index: bool = True,
 ) -> dict[str, RewrittenTopic]:
     """Write a recording with conversions of topics, by their names, to a path that is free.
 
-    Both are files of one format, or folders of bags. Without `index`, the counts in MCAP files are
-    not used. Returns the fate of each topic. Raises RecordingError, and what `convert` raises:
-    then nothing is left of the target.
+    Files that are written are MCAP, and folders are those of bags. Without `index`, the counts in
+    MCAP files are not used. Returns the fate of each topic. Raises RecordingError, and what
+    `convert` raises: then nothing is left of the target.
     """
     start, end = Path(source), Path(target)
     if os.path.lexists(end):
@@ -66,29 +86,44 @@ def rewrite(
 def _draft(target: Path) -> Iterator[Path]:
     """Give a path in a hidden folder beside the target, which is removed at the end."""
     created: list[Path] = []
-    folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    with ended_by_errors():
+    folder = target.parent
+    with ended_by_errors(), ExitStack() as held:
         try:
             make_folder(target.parent, created)
-            folder.mkdir()
+            _remove_abandoned(target)
+            for _ in range(ATTEMPTS):
+                folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+                folder.mkdir()
+                is_locked = held.enter_context(locked(folder))
+                if is_locked is not False and folder.exists():
+                    break  # no other run has taken it for an abandoned one meanwhile
             yield folder / target.name
             created = []
         except OSError as error:
             reason = error.strerror or error
             raise RecordingError(f"`{target}` cannot be written: {reason}") from None
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            if folder != target.parent:
+                shutil.rmtree(folder, ignore_errors=True)
             for path in reversed(created):
                 with suppress(OSError):
                     path.rmdir()
 
 
+def _remove_abandoned(target: Path) -> None:
+    """Remove the drafts of runs that were killed: nobody has locked them anymore."""
+    name = re.compile(re.escape(f".{target.name}.") + "[0-9a-f]{8}")
+    for folder in target.parent.iterdir():
+        if name.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
+            with locked(folder) as is_mine:
+                if is_mine:
+                    shutil.rmtree(folder, ignore_errors=True)
+
+
 class _Rewriting:
     """The files of one recording; `topics` sums up what was written."""
 
-    def __init__(
-        self, conversions: Mapping[str, Conversion], index: bool, progress: Progress
-    ) -> None:
+    def __init__(self, conversions: Conversions, index: bool, progress: Progress) -> None:
         self.conversions = conversions
         self.index = index
         self.progress = progress
@@ -99,9 +134,10 @@ class _Rewriting:
         """Write a file."""
         progress = partial(self.progress, path.name)
         if is_db3(path):
-            from idlc.recordings.containers.db3_rewrite import rewrite_db3
+            from idlc.recordings.containers.db3_to_mcap import convert_db3
 
-            topics = rewrite_db3(path, target, self.conversions, self.recorded, progress)
+            with target.open("xb") as file:
+                topics = convert_db3(path, file, self.conversions, self.recorded, progress)
         else:
             from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
 
@@ -112,19 +148,25 @@ class _Rewriting:
         for name, own in topics.items():
             before = self.topics.get(name, RewrittenTopic(0, 0, own.converted))
             count, size = before.messages + own.messages, before.size + own.size
-            self.topics[name] = RewrittenTopic(count, size, own.converted)
+            is_converted = own.converted or before.converted
+            self.topics[name] = RewrittenTopic(count, size, is_converted)
 
     def folder(self, folder: Path, target: Path) -> None:
         """Write a bag, with all that is in its folder."""
         paths, _ = bag.files_of(folder)
         beside = {f"{path.name}{suffix}" for path in paths for suffix in BESIDE}
-        types = {name: (own.type, own.type_hash) for name, own in self.conversions.items()}
+        types: dict[str, tuple[str, str]] = {}
+        for name, new in self.conversions.items():
+            last = new if isinstance(new, Conversion) else new[-1]
+            types[name] = last.type, last.type_hash
         target.mkdir()
         for path in sorted(folder.iterdir()):
             if path in paths:
-                self.file(path, target / path.name)
-            elif path.name == bag.METADATA and (new := bag.retyped(path, types)) is not None:
-                (target / path.name).write_bytes(new)
+                self.file(path, target / mcap_name(path))
+            elif path.name == bag.METADATA and (data := bag.retyped(path, types)) is not None:
+                is_sqlite = any(path.suffix == ".db3" for path in paths)
+                data = as_mcap(data.decode()).encode() if is_sqlite else data
+                (target / path.name).write_bytes(data)
             elif path.name not in beside:
                 _copy(path, target / path.name)
 

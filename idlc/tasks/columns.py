@@ -201,6 +201,8 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
     use_index: bool = True
     force: bool = False
     include: tuple[str, ...] = ()
+    distro: str | None = None
+    type_name: str | None = None
 
 
 class WrittenFile(NamedTuple):
@@ -235,6 +237,7 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
             index=options.use_index,
             check=options.check,
             include=options.include,
+            distro=options.distro,
         ) as recording,
     ):
         report.notes += recording.notes
@@ -273,7 +276,8 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
     for name in names:
         # a topic that was not selected by name does not keep others from being written
         with nullcontext() if options.topics else _problems(options, report):
-            topics.append(recording[name].between(options.start, options.end))
+            topic = recording.topic(name, options.type_name)
+            topics.append(topic.between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
     if problem := _problem(jobs, options):
         message, hint = problem

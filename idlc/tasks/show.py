@@ -245,7 +245,7 @@ def shown(interface: ir.Interface, model: Model, style: str) -> str:
     """Return an interface in a format."""
     from idlc.generate import schemas
     from idlc.model import idl_text
-    from idlc.recordings import definition_text
+    from idlc.recordings.definitions import mcap_text
 
     match style:
         case "json":
@@ -255,7 +255,7 @@ def shown(interface: ir.Interface, model: Model, style: str) -> str:
         case "jsonschema":
             return json.dumps(schemas.json_schema(interface, model), indent=2) + "\n"
         case "mcap":
-            return definition_text.mcap(interface, model)
+            return mcap_text(interface, model)
     has_hashes = model.distro.has_hashes
     head = [f"# {model.describer.hash(str(interface.name))}"] if has_hashes else []
     lines = (f"# {interface.name}", *head, "", *outline(interface, model))

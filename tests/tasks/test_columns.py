@@ -98,7 +98,7 @@ def test_a_name_may_stand_for_topics_of_several_types(here, capfd):
     assert lines[0]["hash"] == lines[2]["hash"] != lines[1]["hash"]
     assert run("rec.mcap", "-o", "out/") == 1
     said = capfd.readouterr().err
-    assert "`/x` has messages of several definitions, of a_msgs/msg/A, a_msgs/msg/B" in said
+    assert "`/x` has messages of several types, a_msgs/msg/A, a_msgs/msg/B" in said
     assert "/y: 2 messages → out/y.parquet" in said
     assert [path.name for path in (here / "out").iterdir()] == ["y.parquet"]
     assert run("rec.mcap", "/x", "/y", "-o", "other/") == 1

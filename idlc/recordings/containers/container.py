@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
@@ -62,6 +62,17 @@ class Container(AbstractContextManager["Container"]):
             counts.setdefault(file, {})[number] = own.count
         for file, by_number in counts.items():
             yield self.files[file], list(by_number), sum(by_number.values())
+
+    def joined(self, topics: Sequence[Topic]) -> Topic:
+        """Return one topic with the messages of several, whose types are the same."""
+        channels = [self._channels[topic] for topic in topics]
+        mine, bare = (
+            list(dict.fromkeys(own for pair in channels for own in pair[side])) for side in (0, 1)
+        )
+        count = sum(channel.topic.count for channel in (*mine, *bare))
+        topic = replace(topics[0], count=count)
+        self._channels[topic] = mine, bare
+        return topic
 
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
         """Yield the messages of a topic, many at a time, in the order of the recording."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 import sqlite3
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator
+from collections.abc import Collection, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,11 +30,6 @@ WRITES_A_LOG = 2
 PATIENCE = 5.0
 #: Messages are yielded together until they have so many bytes.
 GROUP = 1 << 25
-#: A copy is made of so many pages at a time, between which others may write.
-PAGES = 4096
-#: Results of a step of a copy: SQLITE_BUSY and SQLITE_LOCKED, SQLITE_IOERR and SQLITE_FULL.
-BUSY = (5, 6)
-UNWRITTEN = {10: "disk I/O error", 13: "No space left on device"}
 #: SQLite has no other integers.
 SMALLEST, LARGEST = -(1 << 63), (1 << 63) - 1
 
@@ -81,31 +76,6 @@ class Db3File:
     def close(self) -> None:
         """Close the file."""
         self._db.close()
-
-    def copy_to(
-        self, target: sqlite3.Connection, name: str, progress: Callable[[int, int], object]
-    ) -> None:
-        """Copy all pages as of one moment to a database, whose name is for errors."""
-        left = LARGEST
-
-        def step(status: int, remaining: int, total: int) -> None:
-            nonlocal left
-            status &= 0xFF  # the rest says more
-            if status in BUSY:
-                raise sqlite3.OperationalError("database is locked")
-            if status in UNWRITTEN:
-                raise RecordingError(f"`{name}` cannot be written: {UNWRITTEN[status]}")
-            if remaining >= left:  # SQLite begins anew
-                raise RecordingError(
-                    f"`{self.name}` was changed while it was read", "read it again"
-                )
-            left = remaining
-            progress(total - remaining, total)
-
-        with self._errors():
-            self._db.backup(target, pages=PAGES, progress=step)
-        if self._lone:
-            self._check_unchanged()
 
     def _is_in_use(self) -> bool:
         """Return whether a journal or log has something that the file has not, or may have."""
@@ -217,6 +187,50 @@ class Db3File:
         """The time of the first message."""
         ((time,),) = self._rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
         return time if isinstance(time, int) else None
+
+    def profiles(self) -> dict[int, str]:
+        """Return the quality of service that was offered, as rosbag2 writes it, by topic."""
+        if "offered_qos_profiles" not in self.columns["topics"]:
+            return {}
+        rows = self._rows("SELECT id, offered_qos_profiles FROM topics")
+        return {number: text for number, text in rows if isinstance(text, str)}
+
+    def metadata(self) -> str:
+        """Return the bag's metadata that rosbag2 keeps in the file, empty if there is none."""
+        if "metadata" not in self.columns.get("metadata", set()):
+            return ""
+        texts = [text for (text,) in self._rows("SELECT metadata FROM metadata ORDER BY rowid")]
+        return texts[-1] if texts and isinstance(texts[-1], str) else ""
+
+    def rows(self) -> Iterator[list[tuple[int, int, bytes]]]:
+        """Yield topic, time and content of all messages, many at a time, in their order."""
+        from idlc.recordings.containers.messages import ALWAYS
+
+        ((version,),) = self._rows("PRAGMA data_version")
+        numbers = {number for _, number in self.topics}
+        query = (
+            "SELECT rowid, topic_id, timestamp, data FROM messages NOT INDEXED "
+            "WHERE rowid BETWEEN ? AND ? ORDER BY rowid"
+        )
+        for first, last in self.pieces(numbers, ALWAYS):
+            row = first
+            while row <= last:
+                group: list[tuple[int, int, bytes]] = []
+                size, start, row = 0, row, last + 1
+                with closing(self._rows(query, (start, last))) as messages:
+                    for number, topic, time, data in messages:
+                        if topic not in numbers:
+                            continue
+                        if not isinstance(time, int) or not isinstance(data, bytes):
+                            raise RecordingError("a message has values of other types")
+                        group.append((topic, time, data))
+                        size += len(data)
+                        if size >= GROUP:
+                            row = number + 1
+                            break
+                yield group
+        if ((version,),) != tuple(self._rows("PRAGMA data_version")):
+            raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
         """Yield topics with the start of their first messages; few pages of large ones are read."""

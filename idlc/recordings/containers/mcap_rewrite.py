@@ -6,7 +6,7 @@ Definitions may be anywhere in a chunk, so all are decompressed, and their messa
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, TypeAlias
@@ -17,10 +17,12 @@ from idlc.recordings.containers import records
 from idlc.recordings.containers.compression import MOST_IN_A_CHUNK, Room, compress, decompress
 from idlc.recordings.containers.conversion import (
     Conversion,
+    Conversions,
     Recorded,
     RewrittenTopic,
     check,
     converted,
+    selected,
 )
 from idlc.recordings.containers.file import Schema, check_count, full_name
 from idlc.recordings.containers.mcap import Facts, read_facts
@@ -67,13 +69,14 @@ class Plan:
     """The definitions that take the place of others."""
 
     def __init__(
-        self, facts: Facts, conversions: Mapping[str, Conversion], recorded: dict[str, Recorded]
+        self, facts: Facts, conversions: Conversions, recorded: dict[str, Recorded]
     ) -> None:
-        self.changed = {
-            number: conversions[own.topic]
-            for number, own in facts.channels.items()
-            if own.topic in conversions
-        }
+        self.changed: dict[int, Conversion] = {}
+        for number, channel_ in facts.channels.items():
+            definition = facts.schemas.get(channel_.schema)
+            conversion = selected(conversions, channel_.topic, definition)
+            if conversion is not None:
+                self.changed[number] = conversion
         self._check(facts, recorded)
         #: By kind and number: contents of records.
         self.contents = dict(facts.raws)
@@ -192,7 +195,7 @@ class Rewriting:
             count, size = (by.get(number, 0) for by in (self.writer.counts, self.writer.sizes))
             before = topics.get(own.topic, RewrittenTopic(0, 0, False))
             change = self.plan.changed.get(number)
-            done = bool(change and change.convert)
+            done = bool(change and change.convert) or before.converted
             topics[own.topic] = RewrittenTopic(before.messages + count, before.size + size, done)
         return topics
 
@@ -291,11 +294,13 @@ class Rewriting:
 
     def _messages(self, content: Content) -> Iterator[Edit]:
         """Yield the messages with new payloads."""
-        by_topic: dict[str, list[Any]] = {}
+        by_topic: dict[tuple[str, str | None], list[Any]] = {}
         for number, mine in content.by_channel.items():
-            if number in self.plan.changed and self.plan.changed[number].convert:
-                by_topic.setdefault(self.facts.channels[number].topic, []).append(mine)
-        for topic, parts in by_topic.items():
+            change = self.plan.changed.get(number)
+            if change is not None and change.convert:
+                key = self.facts.channels[number].topic, change.old
+                by_topic.setdefault(key, []).append(mine)
+        for (topic, _), parts in by_topic.items():
             mine = np.sort(np.concatenate(parts))
             starts, times = content.places[mine], content.heads["log"][mine].tolist()
             stops = (starts + HEAD.size + content.heads["size"][mine].astype(np.int64)).tolist()
@@ -335,7 +340,7 @@ def _has_checksum(source: Source) -> bool:
 def rewrite_mcap(
     place: Path,
     file: BinaryIO,
-    conversions: Mapping[str, Conversion],
+    conversions: Conversions,
     recorded: dict[str, Recorded],
     index: bool,
     progress: Callable[[int, int], object],

@@ -75,6 +75,10 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
         raws = [raw for raw, chosen in zip(self.views(), mask, strict=True) if chosen]
         return Separate(self.log_times[mask], publish, raws)
 
+    def first_views(self, count: int) -> list[Raw]:
+        """Return the bytes of the first messages."""
+        return self.views()[:count]
+
 
 class Ranges(Messages, frozen=True, eq=False):
     """Messages that are each a part of one buffer."""
@@ -98,8 +102,12 @@ class Ranges(Messages, frozen=True, eq=False):
 
     def views(self) -> list[Raw]:
         """Return each message as a part of the buffer."""
+        return self.first_views(len(self))
+
+    def first_views(self, count: int) -> list[Raw]:
+        """Return each of the first messages as a part of the buffer."""
         view = memoryview(self.buffer)
-        pairs = zip(self.starts.tolist(), self.stops.tolist(), strict=True)
+        pairs = zip(self.starts[:count].tolist(), self.stops[:count].tolist(), strict=True)
         return [view[start:stop] for start, stop in pairs]
 
 
@@ -121,6 +129,15 @@ def times_of(values: Any, what: str) -> Any:
     if len(values) and int(values.max()) >= END_OF_TIME:
         raise RecordingError(f"a message has a {what} after the year 2262")
     return values.astype(np.int64)
+
+
+def in_order(parts: Sequence[Messages]) -> Messages:
+    """Return the messages of all parts in the order of their log times."""
+    joined = join_messages(parts)
+    order = np.argsort(joined.log_times, kind="stable")
+    publish = None if joined.publish_times is None else joined.publish_times[order]
+    raws = joined.views()
+    return Separate(joined.log_times[order], publish, [raws[at] for at in order.tolist()])
 
 
 def join_messages(parts: Sequence[Messages]) -> Messages:

@@ -21,11 +21,11 @@ from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.file import CDR, MSG, Schema, Topic
-from idlc.recordings.definition_text import mcap
 from idlc.recordings.definitions import (
     RecordedDefinition,
     TextCache,
     interface_of,
+    mcap_text,
     read_definition,
     type_name,
 )
@@ -154,7 +154,7 @@ def _local_text(compiler: Compiler, name: ir.TypeName, hash_: str) -> str | None
     reached = compiler.reached([interface])
     model = compiler.model(interface.package, list(reached.values()), report)
     is_same = not report.had_errors and model.hash(name) == hash_
-    return mcap(model.interfaces[interface], model) if is_same else None
+    return mcap_text(model.interfaces[interface], model) if is_same else None
 
 
 def _questions(name: ir.TypeName, ends: Iterable[Entity]) -> Iterator[Question]:
@@ -193,6 +193,6 @@ def _definition(key: Key, answers: Mapping[Question, Answer]) -> tuple[str, str]
     for candidate in candidates:
         if interface in candidate:
             if linked := model_of_sources(candidate, name, key[1]):
-                return mcap(linked.interfaces[interface], linked), ""
+                return mcap_text(linked.interfaces[interface], linked), ""
             problems.append("a node sends a definition with another type hash")
     return "", first_few(list(dict.fromkeys(problems)) or ["no node has its definition"], ASKED)
