@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
+import numpy as np
+
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
+from idlc.recordings.containers.damage import Damage, DamageWarning
 from idlc.recordings.containers.file import CDR, START, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
+    NO_TIME,
     Messages,
     Raw,
     Window,
     join_messages,
 )
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.times import moment
+from idlc.recordings.times import date_text, moment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,14 +158,17 @@ class Selection:
     def messages(self, kind: type[Kind]) -> Iterator[Stamped[Kind]]: ...
 
     def messages(self, kind: Any = None) -> Iterator[Stamped[Any]]:
-        """Yield each message with its time, in the order in which they were recorded."""
+        """Yield each message with its time, in the order in which they were recorded.
+
+        A time after the year 2262 is None.
+        """
         self._source(kind)
         kind, done = kind or self.kind, 0
         for batch in self.batches():
             for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
                 with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
                     message = kind.deserialize(view)
-                yield Stamped(time, message)
+                yield Stamped(None if time == NO_TIME else time, message)
                 done += 1
 
     def to_columns(
@@ -240,9 +248,15 @@ def _table(source: Any, options: Any, batch: Messages | None = None) -> pa.Table
         if times is None:
             column = pa.nulls(len(batch), kind)
         else:
-            column = pa.Array.from_buffers(kind, len(batch), [None, pa.py_buffer(times)])
+            column = pa.Array.from_buffers(kind, len(batch), [_known(times), pa.py_buffer(times)])
         table = table.add_column(0, pa.field(name, kind), column)
     return table
+
+
+def _known(times: Any) -> Any:
+    """Return Arrow's bits of the times that are known; None if all are."""
+    known = times != NO_TIME
+    return None if known.all() else arrow().py_buffer(np.packbits(known, bitorder="little"))
 
 
 def arrow() -> Any:
@@ -273,10 +287,18 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
         raise RecordingError(f"{what}: {problem} at byte {error.offset}") from error
 
 
+def _warn(damage: tuple[Damage, ...], warned: int) -> int:
+    """Warn of the damage after the first `warned` ones; return how much there is."""
+    for each in damage[warned:]:
+        warnings.warn(DamageWarning(str(each)), stacklevel=3)
+    return len(damage)
+
+
 class Part(Selection):
     """Some of the messages of a topic, to be read wherever the file can be opened.
 
-    A part can be pickled. `pieces` are chunks of an MCAP file, or rows of a .db3 file.
+    A part can be pickled. `pieces` are chunks of an MCAP file, or rows of a .db3 file, and `checks`
+    are the recording's `check` and `strict`.
     """
 
     def __init__(
@@ -288,24 +310,30 @@ class Part(Selection):
         window: Window,
         include: tuple[str, ...] = (),
         reading: Reading | None = None,
+        checks: tuple[bool | None, bool] = (None, False),
     ) -> None:
         super().__init__(topic, include, reading)
         self.place = place
         self.ids = ids
         self.pieces = pieces
         self.window = window
+        self.checks = checks
 
     def __reduce__(self) -> tuple[Any, ...]:
         where = self.place, self.ids, self.pieces, self.window
-        return Part, (self.topic, *where, self.include, self.reading)
+        return Part, (self.topic, *where, self.include, self.reading, self.checks)
 
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
 
     def recorded(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
-        with closing(open_pieces(self.place)) as file:
-            yield from file.messages(self.ids, self.pieces, self.window)
+        with closing(open_pieces(self.place, *self.checks)) as file:
+            warned = 0
+            for batch in file.messages(self.ids, self.pieces, self.window):
+                warned = _warn(tuple(file.damage), warned)
+                yield batch
+            _warn(tuple(file.damage), warned)
 
 
 #: A part reads about so many bytes of a recording.
@@ -318,7 +346,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
     `path` is an .mcap or .db3 file, the folder of a bag, a list of these which are then one
     recording, a URL of an .mcap file that fsspec can open, or a file object. `notes` says what is
     unusual about it. Without `index`, summary and indexes of MCAP files are not used. `check`
-    compares checksums. `include` are folders in which types are looked for that the recording does
+    compares checksums; by default, only those of files that are known to be damaged. What is
+    damaged is left out with a warning, and is in `damage`; `strict` raises RecordingError instead.
+    `include` are folders in which types are looked for that the recording does
     not define, as those of ROS 2 Humble do not. `as_` is a class, or several, that earlier versions
     of its type are read as; `rules` are files and folders of rules that this runs.
     """
@@ -328,14 +358,17 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         path: Any,
         *,
         index: bool = True,
-        check: bool = False,
+        check: bool | None = None,
+        strict: bool = False,
         include: Iterable[str] = (),
         as_: Any = (),
         rules: Any = None,
     ) -> None:
         self._readings = readings(as_, rules)
         self._include = tuple(map(str, include))
-        self._container: Container = open_recording(path, index=index, check=check)
+        self._checks = check, strict
+        self._container: Container = open_recording(path, index=index, check=check, strict=strict)
+        _warn(self._container.damage, 0)
         self._topics: dict[str, list[Topic]] = {}
         for topic in self.topics:
             self._topics.setdefault(topic.name, []).append(topic)
@@ -350,6 +383,11 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         """Notes about anomalies of the recording, such as that it was not closed."""
         return self._container.notes
 
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """The parts that cannot be read, as far as the recording was read."""
+        return self._container.damage
+
     def __getitem__(self, name: str) -> RecordedTopic:
         topics = self._topics.get(name)
         if not topics:
@@ -360,8 +398,8 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         if len(topics) > 1:
             kinds = ", ".join(sorted({topic.type for topic in topics}))
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
-        reading = self._readings.get(topics[0].type)
-        return RecordedTopic(self._container, topics[0], ALWAYS, self._include, reading)
+        how = self._include, self._readings.get(topics[0].type), self._checks
+        return RecordedTopic(self._container, topics[0], ALWAYS, *how)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -398,11 +436,13 @@ class RecordedTopic(Selection):
         topic: Topic,
         window: Window,
         include: tuple[str, ...],
-        reading: Reading | None = None,
+        reading: Reading | None,
+        checks: tuple[bool | None, bool],
     ) -> None:
         super().__init__(topic, include, reading)
         self._container = container
         self._window = window
+        self._checks = checks
 
     def __repr__(self) -> str:
         return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
@@ -418,18 +458,42 @@ class RecordedTopic(Selection):
             None if time is None else moment(time, self._container.start) for time in (start, end)
         )
         window = self._window.narrowed(first, last)
-        return RecordedTopic(self._container, self.topic, window, self.include, self.reading)
+        if (start, end) != (None, None):
+            self._check_range(window)
+        how = self.include, self.reading, self._checks
+        return RecordedTopic(self._container, self.topic, window, *how)
+
+    def _check_range(self, window: Window) -> None:
+        """Raise RecordingError if a range of times does not touch the recording."""
+        span = self._container.span()
+        if None not in window and window.start > window.end:  # type: ignore[operator]
+            raise RecordingError("the range of times ends before it starts")
+        if span is None:
+            return
+        is_late = window.start is not None and window.start > span[1]
+        is_early = window.end is not None and window.end < span[0]
+        if not (is_late or is_early):
+            return
+        limits = " to ".join("" if time is None else date_text(time) for time in window).strip()
+        recorded = " to ".join(map(date_text, span))
+        hint = "write a text, such as `'10'`, for seconds from the start; an int is nanoseconds"
+        what = f"no message is in the range of times ({limits})"
+        raise RecordingError(f"{what}: the recording is from {recorded}", hint)
 
     def recorded(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
-        return self._container.messages(self.topic, self._window)
+        warned = len(self._container.damage)
+        for batch in self._container.messages(self.topic, self._window):
+            warned = _warn(self._container.damage, warned)
+            yield batch
+        _warn(self._container.damage, warned)
 
     def parts(self, size: int = PART) -> list[Part]:
         """Return pieces for others to read, each of about `size` bytes of the recording.
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
-        how = self._window, self.include, self.reading
+        how = self._window, self.include, self.reading, self._checks
         return [
             Part(self.topic, file.place, tuple(numbers), pieces, *how)
             for file, numbers, _ in self._container.places(self.topic)

@@ -58,7 +58,13 @@ from idlc.cli import completion, options
     show_default=True,
     help="Convert each Time and Duration to one column.",
 )
-@click.option("--check", is_flag=True, help="Verify the checksums of the recording.")
+@click.option(
+    "--check/--no-check",
+    default=None,
+    help="Verify the checksums of the recording. By default, idlc verifies those of a damaged "
+    "recording.",
+)
+@click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @click.option(
     "--index/--no-index",
     "use_index",

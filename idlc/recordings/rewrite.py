@@ -12,14 +12,24 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from idlc.project.atomic import ended_by_errors, make_folder, move_new, uninterrupted
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.container import is_db3
 from idlc.recordings.containers.conversion import Conversion, Recorded, RewrittenTopic
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.damage import Damage, DamageList
+from idlc.recordings.containers.source import DamageError, RecordingError
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
+
+
+class Rewritten(NamedTuple):
+    """The fate of each topic of a recording, and the parts that are damaged."""
+
+    topics: dict[str, RewrittenTopic]
+    damage: tuple[Damage, ...]
+
 
 #: Called with a file's name, how much of it is done, and its size.
 Progress = Callable[[str, int, int], object]
@@ -34,12 +44,13 @@ def rewrite(
     progress: Progress = lambda *_: None,
     *,
     index: bool = True,
-) -> dict[str, RewrittenTopic]:
+    strict: bool = False,
+) -> Rewritten:
     """Write a recording with conversions of topics, by their names, to a path that is free.
 
     Both are files of one format, or folders of bags. Without `index`, the counts in MCAP files are
-    not used. Returns the fate of each topic. Raises RecordingError, and what `convert` raises:
-    then nothing is left of the target.
+    not used. What is damaged is left out, or an error if `strict`. Raises RecordingError, and what
+    `convert` raises: then nothing is left of the target.
     """
     start, end = Path(source), Path(target)
     if os.path.lexists(end):
@@ -48,7 +59,7 @@ def rewrite(
     if start.resolve() in end.resolve().parents:
         raise RecordingError(f"`{target}` is inside of `{source}`")
     with _draft(end) as draft:
-        rewriting = _Rewriting(conversions, index, progress)
+        rewriting = _Rewriting(conversions, index, progress, strict)
         if start.is_dir():
             rewriting.folder(start, draft)
         else:
@@ -59,7 +70,7 @@ def rewrite(
                     os.fsync(file.fileno())
         with uninterrupted():
             move_new(draft, end)
-    return rewriting.topics
+    return Rewritten(rewriting.topics, tuple(rewriting.damage))
 
 
 @contextmanager
@@ -87,13 +98,19 @@ class _Rewriting:
     """The files of one recording; `topics` sums up what was written."""
 
     def __init__(
-        self, conversions: Mapping[str, Conversion], index: bool, progress: Progress
+        self,
+        conversions: Mapping[str, Conversion],
+        index: bool,
+        progress: Progress,
+        strict: bool,
     ) -> None:
         self.conversions = conversions
         self.index = index
         self.progress = progress
         self.recorded: dict[str, Recorded] = {}
+        self.strict = strict
         self.topics: dict[str, RewrittenTopic] = {}
+        self.damage: list[Damage] = []
 
     def file(self, path: Path, target: Path) -> None:
         """Write a file."""
@@ -105,24 +122,38 @@ class _Rewriting:
         else:
             from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
 
+            damage = DamageList(str(path), self.strict)
             with target.open("xb") as file:
                 topics = rewrite_mcap(
-                    path, file, self.conversions, self.recorded, self.index, progress
+                    path, file, self.conversions, self.recorded, self.index, progress, damage
                 )
+            self.damage += damage
         for name, own in topics.items():
             before = self.topics.get(name, RewrittenTopic(0, 0, own.converted))
             count, size = before.messages + own.messages, before.size + own.size
             self.topics[name] = RewrittenTopic(count, size, own.converted)
 
+    def split(self, path: Path, target: Path, is_only: bool) -> None:
+        """Write one of the files of a bag; others do not need it."""
+        try:
+            self.file(path, target)
+        except DamageError as error:
+            if self.strict or is_only:
+                raise
+            target.unlink(missing_ok=True)
+            self.damage.append(Damage(str(path), error.message))
+
     def folder(self, folder: Path, target: Path) -> None:
         """Write a bag, with all that is in its folder."""
-        paths, _ = bag.files_of(folder)
+        bag_files = bag.files_of(folder)
+        paths = bag_files.paths
+        self.damage += bag_files.missing
         beside = {f"{path.name}{suffix}" for path in paths for suffix in BESIDE}
         types = {name: (own.type, own.type_hash) for name, own in self.conversions.items()}
         target.mkdir()
         for path in sorted(folder.iterdir()):
             if path in paths:
-                self.file(path, target / path.name)
+                self.split(path, target / path.name, len(paths) == 1)
             elif path.name == bag.METADATA and (new := bag.retyped(path, types)) is not None:
                 (target / path.name).write_bytes(new)
             elif path.name not in beside:

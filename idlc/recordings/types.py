@@ -25,6 +25,7 @@ from idlc.project.library import Library, Texts
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
+from idlc.recordings.containers.damage import Damage
 from idlc.recordings.containers.file import UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
@@ -40,6 +41,20 @@ class RecordingTopics(NamedTuple):
 
     topics: tuple[RecordedDefinition, ...]
     unread: tuple[UnreadTopic, ...] = ()
+    damage: tuple[Damage, ...] = ()
+
+
+#: Reports list so much damage of a recording.
+LISTED = 20
+
+
+def damage_problems(path: str, damage: Sequence[Damage]) -> Iterator[Diagnostic]:
+    """Yield IDL656 for the damage of a recording."""
+    for each in damage[:LISTED]:
+        yield codes.DAMAGED_RECORDING.of(path, str(each))
+    if len(damage) > LISTED:
+        message = f"{len(damage) - LISTED:,} more parts of the recording are damaged"
+        yield codes.DAMAGED_RECORDING.of(path, message)
 
 
 #: Returns the topics of a recording by its path, and maybe those of a robot by its address.
@@ -54,23 +69,26 @@ class Version(msgspec.Struct):
 
 
 def read_topics(
-    path: str, root: Root, report: Report, *, check: bool = False
+    path: str, root: Root, report: Report, *, check: bool = False, verify: bool = False
 ) -> RecordingTopics | None:
     """Return the topics of a recording; report IDL651 and return `None` for other files.
 
     Reports name it by `path`, as the user wrote it. With `check`, topics that cannot be read are in
-    `unread`.
+    `unread`. With `verify`, all messages are read, so that all damage is known.
     """
     place = root.path(path) if is_local(path) else path
     if not is_there(place):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
         return None
     try:
-        with open_recording(place) as container:
+        with open_recording(place, check=True if verify else None) as container:
+            if verify:
+                container.verify()
             report.notes += container.notes
             cache: TextCache = {}
             topics = tuple(read_definition(topic, path, cache) for topic in container.topics)
-            return RecordingTopics(topics, tuple(container.unread()) if check else ())
+            unread = tuple(container.unread()) if check else ()
+            return RecordingTopics(topics, unread, container.damage)
     except RecordingError as error:
         message = error.message.replace(place, path)
         hint = error.hint.replace(place, path) if error.hint else None

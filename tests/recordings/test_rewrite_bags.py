@@ -46,7 +46,7 @@ def test_bags_as_rosbags_reads_them(storage, compression, tmp_path):
     (source / "folder").mkdir()
     (source / "folder" / "link").symlink_to("../notes.txt")
     before = {path: path.read_bytes() for path in source.rglob("*.*")}
-    fate = rewrite(str(source), str(tmp_path / "target"), {"/imu": JOINTS})
+    fate = rewrite(str(source), str(tmp_path / "target"), {"/imu": JOINTS}).topics
     assert {path: path.read_bytes() for path in source.rglob("*.*")} == before
     assert fate["/imu"].converted
     assert [one.messages for one in fate.values()] == [20, 20, 20]

@@ -48,7 +48,7 @@ def rewrite_db3(
 
     `recorded` has what other files of the recording have of a topic, and is added to.
     """
-    with closing(Db3File(path)) as file, of_file(file.name):
+    with closing(Db3File(path, strict=True)) as file, of_file(file.name):
         for own, _ in file.topics:
             if own.name in conversions:
                 definition = own.type, own.schema

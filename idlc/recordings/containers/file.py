@@ -53,12 +53,16 @@ def recorded_schema(schema: Schema) -> Schema | None:
     return None if schema.is_blank and schema.encoding != MSG else schema
 
 
+def wrong_count(topic: str, counted: int, actual: int) -> str:
+    """Return the sentence about a number of messages that is not the counted one."""
+    return f"the index lists {counted:,} messages of `{topic}`, but the file has {actual:,}"
+
+
 def check_count(topic: str, counted: int, actual: int) -> None:
     """Raise RecordingError if the number of messages is not the counted one."""
     if counted != actual:
         hint = "--no-index, or Recording(path, index=False), ignores the counts in the file"
-        what = f"the index lists {counted:,} messages of `{topic}`, but the file has {actual:,}"
-        raise RecordingError(what, hint)
+        raise RecordingError(wrong_count(topic, counted, actual), hint)
 
 
 #: So many bytes suffice.

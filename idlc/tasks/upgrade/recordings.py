@@ -32,6 +32,7 @@ from idlc.recordings.types import (
     DefinedTopic,
     LocalTypes,
     RecordedTypes,
+    damage_problems,
     recorded_types,
     topics_of,
     versions,
@@ -59,6 +60,7 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
     write_rules: str | None = None
     dry_run: bool = False
     allow_loss: bool = False
+    strict: bool = False
     again: str = "idlc upgrade"
 
 
@@ -308,14 +310,14 @@ def _write(
     for recording, shown in targets.items():
         plans = [each for each in result.plans if each.recording == recording]
         try:
-            summary = rewrite(
-                root.path(recording), root.path(shown), _conversions(plans, run), progress
-            )
+            source, to, ways = root.path(recording), root.path(shown), _conversions(plans, run)
+            summary = rewrite(source, to, ways, progress, strict=options.strict)
         except (RecordingError, UpgradeError) as error:
             advice = getattr(error, "hint", None)
             report.add(codes.CONVERSION_FAILED.of(recording, str(error), hint=advice))
         else:
-            result.written.append((recording, shown, summary))
+            result.written.append((recording, shown, summary.topics))
+            report.extend(damage_problems(recording, summary.damage))
 
 
 def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Conversion]:
