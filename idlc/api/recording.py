@@ -14,7 +14,7 @@ import numpy as np
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.damage import Damage, DamageWarning
-from idlc.recordings.containers.file import CDR, START, unread_reason
+from idlc.recordings.containers.file import CDR, START, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
     NO_TIME,
@@ -135,8 +135,7 @@ class Selection:
     def _source(self, kind: Any) -> Any:
         """Return what columns are read by: `kind` if it is of the recorded type, or that type."""
         if self.topic.encoding != CDR:
-            what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
-            raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+            raise RecordingError(*other_encoding(self.topic.name, self.topic.encoding))
         if self.reading is not None:
             if kind not in (None, self.reading.kind):
                 what = f"`{self.topic.name}` is read as {self.reading.kind.__name__}"
@@ -168,7 +167,8 @@ class Selection:
             for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
                 with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
                     message = kind.deserialize(view)
-                yield Stamped(None if time == NO_TIME else time, message)
+                known: Any = None if time == NO_TIME else time
+                yield Stamped(known, message)
                 done += 1
 
     def to_columns(

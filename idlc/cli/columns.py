@@ -84,13 +84,13 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
-    from idlc.recordings.find import expand, split_recordings
+    from idlc.recordings.find import expand, in_order, split_recordings
     from idlc.tasks.columns import ColumnsOptions, columns
 
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
-    paths = (*expand(subject), *recordings)
+    paths = tuple(in_order([*expand(subject), *recordings]))
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
     with output.progress_bar(sys.stderr) as update:
         written = columns(request, report, update)

@@ -35,8 +35,8 @@ class BagFiles(NamedTuple):
 def files_of(folder: Path) -> BagFiles:
     """Return the files of a bag."""
     try:
-        inside = (file for file in folder.iterdir() if file.is_file())
-        files = sorted(inside, key=lambda file: natural(file.name))
+        every = (file for file in folder.iterdir() if file.is_file())
+        files = sorted(every, key=lambda file: natural(file.name))
     except OSError as error:
         raise RecordingError(f"`{folder}` cannot be read: {error.strerror}") from None
     present = {file.name: file for file in files if file.name.endswith(SUFFIXES + COMPRESSED)}

@@ -80,7 +80,7 @@ class Container(AbstractContextManager["Container"]):
             if file.damage and file.damage.is_unproven
         ]
         late = [
-            f"`{topic}`: {count:,} times are after the year 2262, and are null"
+            f"`{topic}`: {count:,} {'time' if count == 1 else 'times'} after the year 2262: null"
             for topic, count in self._late.items()
         ]
         return (*self.notes_of_bag, *of_files, *unproven, *late)
@@ -113,6 +113,21 @@ class Container(AbstractContextManager["Container"]):
             self._late[topic.name] = late
         if topic.count and not read and window == (None, None) and self.damage:
             raise DamageError(f"`{topic.name}` has no readable messages: {self.damage[0]}")
+
+    def sizes(self) -> dict[str, int]:
+        """Return the bytes of the messages of each topic, as far as they are known."""
+        sizes: dict[str, int] = {}
+        unknown: set[str] = set()
+        for file in self.files:
+            by_number = None
+            with suppress(DamageError):
+                by_number = file.sizes()
+            for topic, number in file.topics:
+                if by_number is None:
+                    unknown.add(topic.name)
+                else:
+                    sizes[topic.name] = sizes.get(topic.name, 0) + by_number.get(number, 0)
+        return {name: size for name, size in sizes.items() if name not in unknown}
 
     def verify(self) -> None:
         """Read all messages once, so that all damage is known."""
@@ -232,7 +247,7 @@ def _readable(
             raise errors[0][1]
         stack.pop_all()
     damage = [
-        Damage(name, error.message.removeprefix(f"`{name}`").removeprefix(":").strip())
+        Damage(name, error.message.removeprefix(f"`{name}`: ").replace(f"`{name}`", "it"))
         for name, error in errors
     ]
     return files, damage

@@ -88,6 +88,7 @@ class Db3File:
         self.is_lone = log and not self._is_in_use()
         self.log = self._log.name
         self._state = self._path.stat()
+        self.size = self._state.st_size
         self.notes: list[str] = []
         self._survey: Survey | None = None
         self._db, self.columns = self._opened()
@@ -227,9 +228,7 @@ class Db3File:
         required = {"topics": {"id", "name", "type"}, "messages": messages}
         for table, needed in required.items():
             if not needed <= tables.get(table, set()):
-                raise DamageError(
-                    f"`{self.name}` is not a recording: it has no table of {table}"
-                )
+                raise DamageError(f"`{self.name}` is not a recording: it has no table of {table}")
         return tables
 
     def _topics(self, columns: dict[str, set[str]]) -> Iterator[tuple[Topic, int]]:
@@ -237,18 +236,20 @@ class Db3File:
         own = columns["topics"]
         encoding = "serialization_format" if "serialization_format" in own else "'cdr'"
         digest = "type_description_hash" if "type_description_hash" in own else "''"
-        query = f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id"  # noqa: S608 # ours
+        qos = "offered_qos_profiles" if "offered_qos_profiles" in own else "''"
+        query = f"SELECT id, name, type, {encoding}, {digest}, {qos} FROM topics ORDER BY id"  # noqa: S608 # ours
         definitions = self._definitions(columns.get("message_definitions", set()))
         for number, *texts in self._rows(query):
             if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
                 raise RecordingError(f"`{self.name}`: a topic has values of other types")
-            name, kind, encoding, digest = texts
+            name, kind, encoding, digest, profiles = texts
             # the definition of a service is that of its events, too
             recorded = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
             schema_encoding, text, other = recorded or ("", "", "")
             kind, count = full_name(kind), self._counted.get(number, Counted()).count
             schema = recorded_schema(Schema(kind, schema_encoding, text))
-            yield Topic(name, kind, count, digest or other or None, encoding, schema), number
+            hash_ = digest or other or None
+            yield Topic(name, kind, count, hash_, encoding, schema, profiles), number
 
     def _definitions(self, columns: set[str]) -> dict[str, tuple[str, str, str]]:
         """Return encoding, text and hash of each type."""
@@ -305,6 +306,13 @@ class Db3File:
                 self._salvage(error)
         assert self._survey is not None
         return self._survey.topics
+
+    def sizes(self) -> dict[int, int] | None:
+        """Return the bytes of the messages of each topic; None if the file is damaged."""
+        if self._survey is not None:
+            return None
+        query = "SELECT topic_id, SUM(LENGTH(data)) FROM messages NOT INDEXED GROUP BY topic_id"
+        return {topic: size for topic, size in self._rows(query) if isinstance(size, int)}
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
         """Yield topics with the start of their first messages; few pages of large ones are read."""
@@ -392,7 +400,9 @@ class Db3File:
     def survey_rows(self, first: int, last: int) -> Iterator[tuple[Any, ...]]:
         """Yield number, topic, time and data of rows."""
         numbers, condition = _condition(Rows(first, last))
-        query = f"SELECT rowid, topic_id, timestamp, data FROM messages NOT INDEXED WHERE {condition}"  # noqa: S608
+        query = (
+            f"SELECT rowid, topic_id, timestamp, data FROM messages NOT INDEXED WHERE {condition}"  # noqa: S608
+        )
         yield from self._rows(f"{query} ORDER BY rowid", numbers)
 
     def _around(self, part: Rows, error: DamageError) -> list[Rows]:
@@ -530,11 +540,12 @@ class _Surveyor:
         """Add a row that was read; return its number."""
         is_new = bool(self.gap)
         self.end_of_gap(row, time)
-        self.extend(row, topic, time, data, is_new)
+        self.extend((row, topic, time, data), is_new)
         return row
 
-    def extend(self, row: int, topic: Any, time: Any, data: Any, is_new: bool) -> None:
+    def extend(self, values: tuple[Any, ...], is_new: bool) -> None:
         """Count a row, and make it a part of the run before unless a new one begins."""
+        row, topic, time, data = values
         if self.runs and not is_new and row > self.runs[-1].last:
             self.runs[-1] = self.runs[-1]._replace(last=row)
         else:
@@ -559,7 +570,7 @@ class _Surveyor:
                 break
             self.trials -= 1
             for each in self.row(number):
-                self.extend(*each, is_new=number != previous + 1)
+                self.extend(each, number != previous + 1)
                 found, previous = found + 1, number
         what = f"rows from {first:,} on" if row is None else f"rows {first:,} to {row - 1:,}"
         rest = f", except {found:,} of them" if found else ""

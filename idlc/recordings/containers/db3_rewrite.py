@@ -16,7 +16,8 @@ from idlc.recordings.containers.conversion import (
     check,
     converted,
 )
-from idlc.recordings.containers.db3 import GROUP, LARGEST, SMALLEST, Db3File
+from idlc.recordings.containers.db3 import GROUP, Db3File
+from idlc.recordings.containers.db3_pages import LARGEST, SMALLEST
 from idlc.recordings.containers.file import Schema, full_name
 from idlc.recordings.containers.source import RecordingError, of_file
 

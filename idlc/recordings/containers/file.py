@@ -31,7 +31,7 @@ class Topic(msgspec.Struct, frozen=True):
     """The messages recorded under one name, of one type.
 
     `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
-    the recording has no definition.
+    the recording has no definition. `qos` is the YAML of the publishers' profiles.
     """
 
     name: str
@@ -40,6 +40,7 @@ class Topic(msgspec.Struct, frozen=True):
     hash: str | None
     encoding: str
     schema: Schema | None
+    qos: str = ""
 
 
 def full_name(name: str) -> str:
@@ -88,6 +89,17 @@ class UnreadTopic(NamedTuple):
 
     message: str
     hint: str
+
+
+#: The packages that decode messages of other encodings.
+_DECODERS = {"ros1": "mcap-ros1-support", "protobuf": "mcap-protobuf-support", "json": "mcap"}
+
+
+def other_encoding(topic: str, encoding: str) -> UnreadTopic:
+    """Return why messages that are not CDR cannot be read."""
+    what = f"messages of `{topic}` are written as `{encoding}`, not as ROS 2 writes them, `{CDR}`"
+    package = _DECODERS.get(encoding, "mcap")
+    return UnreadTopic(what, f"the Python package `{package}` reads these messages")
 
 
 def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:

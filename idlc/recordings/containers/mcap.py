@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 END_OF_TIME = (1 << 64) - 1
 #: The start of a message: its channel and time, with its sequence number between them.
 CHANNEL_AND_TIME = Struct("<HIQ")
+#: An entry of an index of messages: their times, and where in the chunk they begin.
+TIME_AND_PLACE = Struct("<QQ")
 
 
 class Channel(NamedTuple):
@@ -140,6 +142,20 @@ def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
     for op, _, data in records.read_records(_content(source, head, room)):
         if op == MESSAGE_OP:
             yield data[:most]
+
+
+def _sizes(source: Source, chunk: Chunk, room: Room) -> Iterator[tuple[int, int]]:
+    """Yield channel and size of each message of a chunk, or of a stretch outside of any."""
+    if chunk.compression is None:
+        for op, at, size in heads(source, chunk.at, chunk.at + chunk.size):
+            if op == MESSAGE_OP:
+                channel = int.from_bytes(source.view(at + HEAD.size, 2), "little")
+                yield channel, size - HEAD.size - MESSAGE_HEAD.size
+        return
+    head = records.read_chunk_head(source, chunk.at, chunk.size)
+    for op, _, data in records.read_records(_content(source, head, room)):
+        if op == MESSAGE_OP:
+            yield int.from_bytes(data[:2], "little"), len(data) - MESSAGE_HEAD.size
 
 
 def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
@@ -390,6 +406,7 @@ class McapFile:
         self.check = check
         self.source = Source(place)
         self.name = self.source.name
+        self.size = self.source.size
         self.damage = DamageList(self.name, strict)
         with of_file(self.name):
             facts = read_facts(self.source, self.damage, index, check) if read else Facts()
@@ -401,7 +418,8 @@ class McapFile:
             schema, count = facts.schemas.get(channel.schema), facts.counts.get(number, 0)
             kind, recorded = (schema.name, recorded_schema(schema)) if schema else ("", None)
             digest = channel.metadata.get("topic_type_hash") or None
-            topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded)
+            qos = channel.metadata.get("offered_qos_profiles", "")
+            topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded, qos)
             self.topics.append((topic, number))
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
@@ -423,6 +441,37 @@ class McapFile:
                         waiting.discard(number)
                         if not mine:
                             break
+
+    def sizes(self) -> dict[int, int] | None:
+        """Return the bytes of the messages of each channel; None if not all chunks are indexed.
+
+        The indexes of a chunk say where its messages begin. What is between them is more than a
+        message only where a channel is defined, so the chunks with first messages are opened.
+        """
+        sizes: dict[int, int] = {}
+        seen: set[int] = set()
+        room = Room(self.source.size)
+        for chunk in self.facts.chunks:
+            starts: list[tuple[int, int]] = []
+            for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
+                entries = records.index_entries(self.source, channel, at)
+                data = self.source.view(at + HEAD.size + 6, entries)
+                starts += [(place, channel) for _, place in TIME_AND_PLACE.iter_unpack(data)]
+            new = {channel for _, channel in starts} - seen
+            if chunk.compression is not None and chunk.indexes is None:
+                return None
+            if new or chunk.compression is None:
+                seen |= new
+                for channel, size in _sizes(self.source, chunk, room):
+                    sizes[channel] = sizes.get(channel, 0) + size
+                continue
+            head = records.read_chunk_head(self.source, chunk.at, chunk.size)
+            starts.sort()
+            ends = [*(place for place, _ in starts[1:]), head.size]
+            for (place, channel), end in zip(starts, ends, strict=True):
+                size = end - place - HEAD.size - MESSAGE_HEAD.size
+                sizes[channel] = sizes.get(channel, 0) + size
+        return sizes
 
     def pieces(self, topics: Collection[int], window: Window) -> list[Chunk]:
         """Return the chunks that may hold messages of some channels, with the indexes of these."""

@@ -162,7 +162,9 @@ class _Reader:
                 time = int(ranges.log_times[index])
                 self.damage.add(error.message, messages=1, times=(time, time))
                 whole[index] = False
-        return Separate(ranges.log_times[whole], ranges.publish_times[whole], raws)
+        publish = ranges.publish_times
+        publish = None if publish is None else publish[whole]
+        return Separate(ranges.log_times[whole], publish, raws)
 
 
 def _read(
@@ -237,7 +239,8 @@ def _walked(
 ) -> list[int]:
     """Return where in a chunk messages begin, by a walk from record to record."""
     unpack, ahead, stop = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size, len(view)
-    places, at = [], 0
+    places: list[int] = []
+    at = 0
     for _ in room.records():
         if at + ahead > stop:
             break
@@ -247,9 +250,9 @@ def _walked(
         if op == records.MESSAGE_OP and channel in channels:
             places.append(at)
         at += HEAD.size + size
-    if at != stop and not (at < stop and at + HEAD.size + view[at + 1] == stop):
-        if not partial:
-            raise DamageError(f"records of the chunk at byte {chunk.at} are cut off")
+    is_whole = at == stop or (at < stop and at + HEAD.size + view[at + 1] == stop)
+    if not (is_whole or partial):
+        raise DamageError(f"records of the chunk at byte {chunk.at} are cut off")
     return places
 
 

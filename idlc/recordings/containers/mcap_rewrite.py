@@ -163,7 +163,8 @@ class Rewriting:
         for op, at, size in sound_heads(self.source, end, self.source.size, self._skip):
             progress(at)
             is_loose = op == MESSAGE_OP or (op in (SCHEMA_OP, CHANNEL_OP) and not ended)
-            if start < end and (not is_loose or at + size - start > records.GROUP):
+            is_next = is_loose and at == end
+            if start < end and (not is_next or at + size - start > records.GROUP):
                 self._loose(start, end)
                 start = end = at
             if is_loose:
@@ -174,13 +175,7 @@ class Rewriting:
                     break
                 continue
             ended |= op == records.DATA_END_OP
-            try:
-                if op == records.CHUNK_OP:
-                    self._chunk(at, size)
-                elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
-                    self._other(op, at, size)
-            except DamageError as error:
-                self.damage.add(error.message, at, at + size)
+            self._record(op, at, size)
         if start < end:
             self._loose(start, end)
         for number in self.facts.channels:
@@ -208,6 +203,16 @@ class Rewriting:
             done = bool(change and change.convert)
             topics[own.topic] = RewrittenTopic(before.messages + count, before.size + size, done)
         return topics
+
+    def _record(self, op: int, at: int, size: int) -> None:
+        """Write a record that is by itself, unless it is damaged."""
+        try:
+            if op == records.CHUNK_OP:
+                self._chunk(at, size)
+            elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
+                self._other(op, at, size)
+        except DamageError as error:
+            self.damage.add(error.message, at, at + size)
 
     def _skip(self, start: int, stop: int) -> None:
         """Add a part without records to the damage, unless it is the end of a summary."""
