@@ -13,7 +13,6 @@ import numpy as np
 
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
-from idlc.recordings.containers.damage import Damage, DamageWarning
 from idlc.recordings.containers.file import CDR, START, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
@@ -24,6 +23,7 @@ from idlc.recordings.containers.messages import (
     join_messages,
 )
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.damage import Damage, DamageWarning
 from idlc.recordings.times import date_text, moment
 
 if TYPE_CHECKING:

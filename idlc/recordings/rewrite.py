@@ -18,8 +18,8 @@ from idlc.project.atomic import ended_by_errors, make_folder, move_new, uninterr
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.container import is_db3
 from idlc.recordings.containers.conversion import Conversion, Recorded, RewrittenTopic
-from idlc.recordings.containers.damage import Damage, DamageList
 from idlc.recordings.containers.source import DamageError, RecordingError
+from idlc.recordings.damage import Damage, DamageList
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
 

@@ -25,9 +25,9 @@ from idlc.project.library import Library, Texts
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.damage import Damage
 from idlc.recordings.containers.file import CDR, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
+from idlc.recordings.damage import Damage
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import oversized

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+import zstandard
 
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.source import RecordingError
@@ -108,7 +109,7 @@ def test_a_truncated_file_is_read_to_its_last_whole_chunk_and_says_so(compressio
         (b"", "is empty"),
         (b"\x89MC", "is not an MCAP or .db3 recording"),
         (b"#ROSBAG V2.0\n", "is a recording of ROS 1"),
-        (b"\x28\xb5\x2f\xfd....", "is not an MCAP or .db3 recording"),
+        (zstandard.compress(b"...."), "is not an MCAP or .db3 recording"),
         (b"SQLite format 3\0", "cannot be read"),
         (b"hello", "is not an MCAP or .db3 recording"),
     ],

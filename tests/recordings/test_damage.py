@@ -14,9 +14,9 @@ from mcap.stream_reader import StreamReader
 import idlc
 from idlc.cli.main import main
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.damage import DamageWarning
 from idlc.recordings.containers.messages import ALWAYS, NO_TIME
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.damage import DamageWarning
 from idlc.recordings.rewrite import rewrite
 from tests.support import mcap_mutations
 from tests.support import recordings as made

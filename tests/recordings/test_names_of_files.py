@@ -1,10 +1,14 @@
 """The order of the files of a recording, and files that are no recordings."""
 
+import random
+
 import pytest
+import zstandard
 
 import idlc
 from idlc.cli.main import main
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.damage import DamageWarning
 from idlc.recordings.find import expand, in_order
 from tests.support import recordings as made
 
@@ -67,3 +71,38 @@ def test_messages_of_other_encodings(encoding, tmp_path, capsys):
     with idlc.Recording(path) as recording, pytest.raises(RecordingError) as caught:
         recording["/j"].to_columns()
     assert "mcap" in caught.value.hint
+
+
+@pytest.mark.parametrize("storage", ["db3", "mcap"])
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_bag_that_is_compressed_by_files(storage, beside, tmp_path):
+    messages = made.messages(30)
+    bag = made.by_rosbags(tmp_path / "bag", messages, storage)
+    (path,) = bag.glob(f"*.{storage}")
+    packed = path.with_name(path.name + ".zstd")
+    packed.write_bytes(zstandard.compress(path.read_bytes()))
+    metadata = bag / "metadata.yaml"
+    text = metadata.read_text(encoding="utf-8").replace(path.name, packed.name)
+    metadata.write_text(text, encoding="utf-8")
+    if not beside:
+        path.unlink()
+    for place in (bag, packed):
+        with idlc.Recording(place) as recording:
+            topic = recording["/imu"]
+            (part,) = topic.parts()
+            assert len(topic.to_columns()) == len(part.to_columns()) == 10
+            assert recording.notes == recording.damage == ()
+
+
+def test_a_compressed_file_that_is_cut_off(tmp_path):
+    rng = random.Random(1)
+    messages = [one._replace(data=one.data + rng.randbytes(9000)) for one in made.messages(90)]
+    path = made.by_mcap(tmp_path / "a.mcap", messages, "", chunk_size=20_000)
+    packed = zstandard.compress(path.read_bytes())
+    place = tmp_path / "a.mcap.zstd"
+    place.write_bytes(packed[: len(packed) // 2])
+    path.unlink()
+    with pytest.warns(DamageWarning), idlc.Recording(place) as recording:
+        assert 0 < sum(topic.count for topic in recording.topics) < 90
+    with pytest.raises(RecordingError):
+        idlc.Recording(place, strict=True)

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from idlc.recordings.containers.damage import Damage
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.damage import Damage
 
 SUFFIXES = (".mcap", ".db3")
 #: Files that rosbag2 compressed as a whole.
-COMPRESSED = (".mcap.zstd", ".db3.zstd")
+ZSTD = ".zstd"
+COMPRESSED = tuple(suffix + ZSTD for suffix in SUFFIXES)
 METADATA = "metadata.yaml"
 TYPE_KEYS = ("type", "type_description_hash")
 #: No recorder writes more, or deeper.
@@ -56,17 +57,17 @@ def files_of(folder: Path) -> BagFiles:
         what = f"is missing, although {METADATA} lists it"
         damage = [Damage(str(folder / name), f"`{name}` {what}") for name in missing]
         if any(name in present for name in named):
+            others = [name for name in others if name + ZSTD not in named]
             notes += [f"idlc skips `{name}`: {METADATA} does not list it" for name in others]
             present = {name: present[name] for name in named if name in present}
     if not present:
         inside = min((path.parent for path in folder.glob(f"*/{METADATA}")), default=None)
         hint = f"pass a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
         raise RecordingError(f"`{folder}` contains no recording", hint)
-    for name in present:
-        if name.endswith(COMPRESSED):
-            hint = f"zstd -d {folder / name}"
-            raise RecordingError(f"the whole file `{name}` is compressed", hint)
-    return BagFiles(list(present.values()), notes, damage, counted)
+    # a file may be there twice after it was decompressed
+    plain = {file.name: file for file in files if file.name.endswith(SUFFIXES)}
+    chosen = [plain.get(name.removesuffix(ZSTD), file) for name, file in present.items()]
+    return BagFiles(list(dict.fromkeys(chosen)), notes, damage, counted)
 
 
 def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from idlc.recordings.containers.source import DamageError, RecordingError
@@ -96,6 +97,23 @@ def _zstd(data: memoryview, target: memoryview) -> int:
         return done + len(reader.read(1))
     except zstandard.ZstdError as error:
         raise DamageError(f"a chunk cannot be decompressed: {error}") from None
+
+
+def unpack(path: Path, target: Path) -> str | None:
+    """Decompress a whole file; return why only its start can be, if that is so."""
+    zstandard, decompressor = _zstandard()
+    room = Room(path.stat().st_size)
+    try:
+        with path.open("rb") as source, target.open("xb") as file:
+            reader = decompressor.stream_reader(source, read_across_frames=True)
+            while piece := reader.read(PIECE):
+                room.reserve(len(piece))
+                file.write(piece)
+    except zstandard.ZstdError as error:
+        return f"it cannot be decompressed as a whole: {error}"
+    except OSError as error:
+        raise RecordingError(f"`{path}` cannot be decompressed: {error.strerror}") from None
+    return None
 
 
 def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from pathlib import Path
@@ -11,8 +14,7 @@ from msgspec.structs import replace
 
 from idlc.project.find import is_address
 from idlc.recordings.containers import bag, db3, records
-from idlc.recordings.containers.compression import ZSTD_MAGIC
-from idlc.recordings.containers.damage import Damage
+from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.db3 import Db3File
 from idlc.recordings.containers.file import (
     CDR,
@@ -24,6 +26,7 @@ from idlc.recordings.containers.file import (
 )
 from idlc.recordings.containers.mcap import McapFile
 from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes, is_local
+from idlc.recordings.damage import Damage
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
@@ -185,9 +188,7 @@ def open_recording(
     """
 
     def opened(place: Path) -> File:
-        if is_db3(place):
-            return Db3File(place, strict=strict)
-        return McapFile(place, index, check, strict=strict)
+        return _opened(place, index, check, strict)
 
     if isinstance(path, (list, tuple)):
         containers, damage = _readable(
@@ -223,9 +224,30 @@ def open_recording(
 
 def open_pieces(place: Any, check: bool | None = None, strict: bool = False) -> File:
     """Open a file to read pieces of it that are known: nothing else is read."""
-    if is_local(place) and Path(place).suffix == ".db3":
-        return Db3File(Path(place), read=False, strict=strict)
+    if is_local(place):
+        return _opened(Path(place), True, check, strict, read=False)
     return McapFile(place, check=check, read=False, strict=strict)
+
+
+def _opened(place: Path, index: bool, check: bool | None, strict: bool, read: bool = True) -> File:
+    """Open a file; one that is compressed as a whole is decompressed to a temporary file."""
+    if not first_bytes(place).startswith(ZSTD_MAGIC):
+        if is_db3(place):
+            return Db3File(place, read, strict)
+        return McapFile(place, index, check, read, strict)
+    folder = tempfile.mkdtemp(prefix="idlc-")
+    try:
+        plain = Path(folder, place.name.removesuffix(bag.ZSTD))
+        problem = unpack(place, plain)
+        file = _opened(plain, index, check, strict, read)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    weakref.finalize(file, shutil.rmtree, folder, ignore_errors=True)
+    file.name = file.place = file.damage.file = str(place)
+    if problem:
+        file.damage.add(problem)
+    return file
 
 
 def _readable(
@@ -274,7 +296,7 @@ def is_db3(path: Path) -> bool:
         hint = f"convert it: `rosbags-convert --src {path} --dst {path.with_suffix('')}`"
         raise RecordingError(f"`{path}` is a recording of ROS 1, which idlc does not read", hint)
     if start.startswith(ZSTD_MAGIC):
-        hint = f"the whole file is compressed: zstd -d {path}"
+        raise RecordingError(f"`{path}` is compressed as a whole", f"zstd -d {path}")
     kind = DamageError if path.suffix in bag.SUFFIXES else RecordingError
     raise kind(f"`{path}` is not an MCAP or .db3 recording", hint)
 

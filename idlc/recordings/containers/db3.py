@@ -18,8 +18,6 @@ from urllib.parse import quote
 import msgspec
 
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
-from idlc.recordings.containers.damage import DamageList
-from idlc.recordings.containers.db3_pages import LARGEST, SMALLEST, Cell, Leaf, Pages
 from idlc.recordings.containers.file import START, Schema, Topic, full_name, recorded_schema
 from idlc.recordings.containers.source import (
     DamageError,
@@ -28,6 +26,8 @@ from idlc.recordings.containers.source import (
     first_bytes,
     of_file,
 )
+from idlc.recordings.damage import DamageList
+from idlc.recordings.sqlite_pages import LARGEST, SMALLEST, Cell, Leaf, Pages
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window

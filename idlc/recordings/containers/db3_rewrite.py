@@ -17,9 +17,9 @@ from idlc.recordings.containers.conversion import (
     converted,
 )
 from idlc.recordings.containers.db3 import GROUP, Db3File
-from idlc.recordings.containers.db3_pages import LARGEST, SMALLEST
 from idlc.recordings.containers.file import Schema, full_name
 from idlc.recordings.containers.source import RecordingError, of_file
+from idlc.recordings.sqlite_pages import LARGEST, SMALLEST
 
 #: The draft is not kept if anything fails, so nothing of it is logged or synchronized meanwhile,
 #: and nothing is computed by what a file defines.

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import msgspec
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import Room, decompress, decompressed
-from idlc.recordings.containers.damage import DamageList
+from idlc.recordings.containers.compression import Room, decompress
 from idlc.recordings.containers.file import (
     START,
     Schema,
@@ -42,6 +41,7 @@ from idlc.recordings.containers.records import (
     sound_heads,
 )
 from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.damage import DamageList
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
@@ -164,15 +164,6 @@ def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
     target = memoryview(bytearray(head.size))
     decompress(source.view(head.start, head.stored), head.compression, target)
     return target
-
-
-def proven_head(source: Source, head: ChunkHead) -> ChunkHead | None:
-    """Return the head of a chunk with the size of its content, if the checksum proves that."""
-    with suppress(DamageError):
-        content = decompressed(source.view(head.start, head.stored), head.compression)
-        if head.crc and zlib.crc32(content) == head.crc:
-            return head._replace(size=len(content))
-    return None
 
 
 def _summary(source: Source) -> Facts:
@@ -304,7 +295,7 @@ class _Walk:
             try:
                 content = _content(self.source, head, self.room)
             except DamageError:
-                proven = proven_head(self.source, head)
+                proven = records.proven_head(self.source, head)
                 if proven is None:
                     raise
                 content = _content(self.source, proven, self.room)

@@ -12,11 +12,10 @@ import numpy as np
 
 from idlc.recordings.containers import records
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, decompress, zstd_frame
-from idlc.recordings.containers.damage import DamageList
-from idlc.recordings.containers.mcap import proven_head
 from idlc.recordings.containers.messages import Messages, Ranges, Raw, Separate, Window, times_of
 from idlc.recordings.containers.records import HEAD, INDEX_OFFSET, Chunk, ChunkHead
 from idlc.recordings.containers.source import DamageError, Source, of_file
+from idlc.recordings.damage import DamageList
 
 #: The head of a message's record.
 MESSAGE = np.dtype(
@@ -98,7 +97,7 @@ class _Reader:
             elif head.size != head.stored:
                 raise DamageError("a chunk that is not compressed declares another size")
         except DamageError:
-            proven = proven_head(self.source, head)
+            proven = records.proven_head(self.source, head)
             if proven is None or self.damage.is_strict:
                 raise
             head = proven
@@ -129,7 +128,7 @@ class _Reader:
         check = self.check is not False
         problem: DamageError | None = None
         bare = chunk._replace(indexes=None)
-        proven = proven_head(self.source, head) if head.compression else None
+        proven = records.proven_head(self.source, head) if head.compression else None
         for own, own_head in dict.fromkeys([(chunk, head), (bare, head), (bare, proven or head)]):
             try:
                 ranges = self._read([(own, own_head)], check)

@@ -22,7 +22,6 @@ from idlc.recordings.containers.conversion import (
     check,
     converted,
 )
-from idlc.recordings.containers.damage import DamageList
 from idlc.recordings.containers.file import Schema, check_count, full_name
 from idlc.recordings.containers.mcap import Facts, read_facts
 from idlc.recordings.containers.mcap_messages import MESSAGE
@@ -46,6 +45,7 @@ from idlc.recordings.containers.records import (
     sound_heads,
 )
 from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.damage import DamageList
 
 #: Numbers of schemas end before.
 MOST_SCHEMAS = 1 << 16

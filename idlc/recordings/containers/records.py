@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from struct import Struct
 from typing import NamedTuple, TypeVar
 
+from idlc.recordings.containers.compression import decompressed
 from idlc.recordings.containers.source import DamageError, Source
 
 Item = TypeVar("Item")
@@ -281,6 +283,15 @@ def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
     if stored > left:
         raise DamageError(f"a chunk is broken: {stored} bytes expected, {left} left")
     return ChunkHead(first, last, large, crc, compression, at + HEAD.size + fields.at, stored)
+
+
+def proven_head(source: Source, head: ChunkHead) -> ChunkHead | None:
+    """Return the head of a chunk with the size of its content, if the checksum proves that."""
+    with suppress(DamageError):
+        content = decompressed(source.view(head.start, head.stored), head.compression)
+        if head.crc and zlib.crc32(content) == head.crc:
+            return head._replace(size=len(content))
+    return None
 
 
 def index_entries(source: Source, channel: int, at: int) -> int:
