@@ -135,13 +135,16 @@ class _Rewriting:
 
     def split(self, path: Path, target: Path, is_only: bool) -> None:
         """Write one of the files of a bag; others do not need it."""
+        if path.name.endswith(bag.COMPRESSED):
+            hint = f"zstd -d --rm {path}"
+            raise RecordingError(f"the whole file `{path.name}` is compressed", hint)
         try:
             self.file(path, target)
         except DamageError as error:
             if self.strict or is_only:
                 raise
             target.unlink(missing_ok=True)
-            self.damage.append(Damage(str(path), error.message))
+            self.damage.append(Damage(str(path), error.message.replace(f"`{path}`", "it")))
 
     def folder(self, folder: Path, target: Path) -> None:
         """Write a bag, with all that is in its folder."""
