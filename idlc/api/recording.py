@@ -16,9 +16,10 @@ from msgspec.structs import replace
 from idlc.model.distros import BY_NAME, unknown_distro
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
-from idlc.recordings.containers.file import CDR, START, full_name, unread_reason
+from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
+    NO_TIME,
     Messages,
     Raw,
     Window,
@@ -26,8 +27,9 @@ from idlc.recordings.containers.messages import (
     join_messages,
 )
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.damage import Damage, DamageWarning
 from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
-from idlc.recordings.times import moment
+from idlc.recordings.times import date_text, moment
 from idlc.runtime.codec import PAUSE
 
 if TYPE_CHECKING:
@@ -99,7 +101,8 @@ class ReadOptions(NamedTuple):
 
     `include` are folders in which types are looked for that the recording does not define, `distro`
     is the distribution of such types, and `others` are topics with other versions of the type. With
-    `reading`, messages are converted to another version. They match all `conditions`.
+    `reading`, messages are converted to another version. They match all `conditions`. `checks` are
+    the recording's `check` and `strict`.
     """
 
     include: tuple[str, ...] = ()
@@ -107,6 +110,7 @@ class ReadOptions(NamedTuple):
     others: tuple[Topic, ...] = ()
     reading: Reading | None = None
     conditions: tuple[Condition, ...] = ()
+    checks: tuple[bool | None, bool] = (None, False)
 
 
 class Selection:
@@ -251,8 +255,7 @@ class Selection:
     def _source(self, kind: Any) -> Any:
         """Return what columns are read by: `kind` if it is of the recorded type, or that type."""
         if self.topic.encoding != CDR:
-            what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
-            raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+            raise RecordingError(*other_encoding(self.topic.name, self.topic.encoding))
         reading = self.options.reading
         if reading is not None:
             if kind not in (None, reading.kind):
@@ -285,7 +288,8 @@ class Selection:
         """Yield each message with its time, in the order in which they were recorded.
 
         With `fields`, the values at these paths take the place of the message, and nothing else is
-        decoded: one value for one path, a tuple for several, as `idlc.reader` reads them.
+        decoded: one value for one path, a tuple for several, as `idlc.reader` reads them. A time
+        after the year 2262 is None.
         """
         self._source(kind)
         recorded_kind, kind, done = kind, kind or self.kind, 0
@@ -303,7 +307,7 @@ class Selection:
             for first in range(0, len(views), step):
                 part = views[first : first + step]
                 values, error = _each(read, part)
-                times = batch.log_times[first : first + len(values)].tolist()
+                times = _known_times(batch.log_times[first : first + len(values)])
                 yield from map(Stamped, times, values)
                 if error:
                     _raise(error, self.topic, part[len(values)], done + len(values))
@@ -391,9 +395,23 @@ def _table(source: Any, options: Any, batch: Messages | None = None) -> pa.Table
         if times is None:
             column = pa.nulls(len(batch), kind)
         else:
-            column = pa.Array.from_buffers(kind, len(batch), [None, pa.py_buffer(times)])
+            column = pa.Array.from_buffers(kind, len(batch), [_known(times), pa.py_buffer(times)])
         table = table.add_column(0, pa.field(name, kind), column)
     return table
+
+
+def _known_times(times: Any) -> list[Any]:
+    """Return times as a list; None for those that are not known."""
+    known: list[Any] = times.tolist()
+    if (times == NO_TIME).any():
+        return [None if time == NO_TIME else time for time in known]
+    return known
+
+
+def _known(times: Any) -> Any:
+    """Return Arrow's bits of the times that are known; None if all are."""
+    known = times != NO_TIME
+    return None if known.all() else arrow().py_buffer(np.packbits(known, bitorder="little"))
 
 
 def arrow() -> Any:
@@ -441,6 +459,13 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
         raise RecordingError(f"{what}: {problem} at byte {error.offset}") from error
 
 
+def _warn(damage: tuple[Damage, ...], warned: int) -> int:
+    """Warn of the damage after the first `warned` ones; return how much there is."""
+    for each in damage[warned:]:
+        warnings.warn(DamageWarning(str(each)), stacklevel=3)
+    return len(damage)
+
+
 class Part(Selection):
     """Some of the messages of a topic, to be read wherever the file can be opened.
 
@@ -471,8 +496,12 @@ class Part(Selection):
 
     def read_all(self) -> Iterator[Messages]:
         """Yield all messages as they are recorded, many at a time."""
-        with closing(open_pieces(self.place)) as file:
-            yield from file.messages(self.ids, self.pieces, self.window)
+        with closing(open_pieces(self.place, *self.options.checks)) as file:
+            warned = 0
+            for batch in file.messages(self.ids, self.pieces, self.window):
+                warned = _warn(tuple(file.damage), warned)
+                yield batch
+            _warn(tuple(file.damage), warned)
 
 
 #: A part reads about so many bytes of a recording.
@@ -485,7 +514,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
     `path` is an .mcap or .db3 file, the folder of a bag, a list of these which are then one
     recording, a URL of an .mcap file that fsspec can open, or a file object. `notes` says what is
     unusual about it. Without `index`, summary and indexes of MCAP files are not used. `check`
-    compares checksums. `include` are folders in which types are looked for that the recording does
+    compares checksums; by default, only those of files that are known to be damaged. What is
+    damaged is left out with a warning, and is in `damage`; `strict` raises RecordingError instead.
+    `include` are folders in which types are looked for that the recording does
     not define, as those of ROS 2 Humble do not. `as_` is a class, or several, that earlier versions
     of its type are read as; `rules` are files and folders of rules that this runs.
     """
@@ -495,15 +526,18 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         path: Any,
         *,
         index: bool = True,
-        check: bool = False,
+        check: bool | None = None,
+        strict: bool = False,
         include: Iterable[str] = (),
         distro: str | None = None,
         as_: Any = (),
         rules: Any = None,
     ) -> None:
         self._readings = readings(as_, rules)
-        self._options = ReadOptions(tuple(map(str, include)), checked_distro(distro))
-        self._container: Container = open_recording(path, index=index, check=check)
+        names = tuple(map(str, include))
+        self._options = ReadOptions(names, checked_distro(distro), checks=(check, strict))
+        self._container: Container = open_recording(path, index=index, check=check, strict=strict)
+        _warn(self._container.damage, 0)
         self._topics: dict[str, list[Topic]] = {}
         for topic in self.topics:
             self._topics.setdefault(topic.name, []).append(topic)
@@ -517,6 +551,11 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
     def notes(self) -> tuple[str, ...]:
         """Notes about anomalies of the recording, such as that it was not closed."""
         return self._container.notes
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """The parts that cannot be read, as far as the recording was read."""
+        return self._container.damage
 
     def __getitem__(self, name: str) -> RecordedTopic:
         topics = self._topics.get(name)
@@ -662,7 +701,27 @@ class RecordedTopic(Selection):
         first, last = (
             None if time is None else moment(time, self._container.start) for time in (start, end)
         )
-        return self._narrowed(self.window.narrowed(first, last), self.options)
+        window = self.window.narrowed(first, last)
+        if (start, end) != (None, None):
+            self._check_range(window)
+        return self._narrowed(window, self.options)
+
+    def _check_range(self, window: Window) -> None:
+        """Raise RecordingError if a range of times does not touch the recording."""
+        span = self._container.span()
+        if None not in window and window.start > window.end:  # type: ignore[operator]
+            raise RecordingError("the range of times ends before it starts")
+        if span is None:
+            return
+        is_late = window.start is not None and window.start > span[1]
+        is_early = window.end is not None and window.end < span[0]
+        if not (is_late or is_early):
+            return
+        limits = " to ".join("" if time is None else date_text(time) for time in window).strip()
+        recorded = " to ".join(map(date_text, span))
+        hint = "write a text, such as `'10'`, for seconds from the start; an int is nanoseconds"
+        what = f"no message is in the range of times ({limits})"
+        raise RecordingError(f"{what}: the recording is from {recorded}", hint)
 
     def where(self, path: str, operator: str, value: Any) -> RecordedTopic:
         """Return the messages in which a field compares with a value: ==, !=, <, <=, > or >=.
@@ -685,7 +744,11 @@ class RecordedTopic(Selection):
 
     def read_all(self) -> Iterator[Messages]:
         """Yield all messages as they are recorded, many at a time."""
-        return self._container.messages(self.topic, self.window)
+        warned = len(self._container.damage)
+        for batch in self._container.messages(self.topic, self.window):
+            warned = _warn(self._container.damage, warned)
+            yield batch
+        _warn(self._container.damage, warned)
 
     def parts(self, size: int = PART) -> list[Part]:
         """Return pieces for others to read, each of about `size` bytes of the recording.
@@ -744,6 +807,7 @@ class RecordedVersions(RecordedTopic):
             version.absent = 0
             for file, mine, _ in self._container.places(version.topic):
                 numbers.setdefault(id(file), []).append((version, mine))
+        warned = len(self._container.damage)
         for file in self._container.files:
             owners = numbers.get(id(file), [])
             every = [number for _, mine in owners for number in mine]
@@ -755,5 +819,6 @@ class RecordedVersions(RecordedTopic):
                         version.compare_lengths(batch)
                         batches.append(version.read_as(batch))
                 self.absent = sum(version.absent for version in self.versions)
+                warned = _warn(self._container.damage, warned)
                 if batches:
                     yield in_order(batches) if len(owners) > 1 else join_messages(batches)

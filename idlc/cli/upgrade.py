@@ -127,6 +127,7 @@ EPILOG += "\n" + options.example(
     is_flag=True,
     help="If the new version does not contain the type of a message, keep the message unchanged.",
 )
+@click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @options.packages
 @options.distro
 @options.style

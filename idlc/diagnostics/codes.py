@@ -231,6 +231,7 @@ MISSING_DEFINITION = Code("IDL652", "missing-definition", WARNING)
 SEVERAL_DEFINITIONS = Code("IDL653", "several-definitions", ERROR)
 RECORDED_HASH_DIFFERS = Code("IDL654", "recorded-hash-differs", WARNING)
 NO_SUCH_TOPIC = Code("IDL655", "no-such-topic", ERROR, usage=True)
+DAMAGED_RECORDING = Code("IDL656", "damaged-recording", ERROR)
 
 # upgrades of recordings
 RULE_NEEDED = Code("IDL661", "rule-needed", ERROR)

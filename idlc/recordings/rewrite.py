@@ -9,10 +9,14 @@ import os
 import re
 import secrets
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from idlc.project.atomic import (
     ended_by_errors,
@@ -22,6 +26,7 @@ from idlc.project.atomic import (
     uninterrupted,
 )
 from idlc.recordings.containers import bag
+from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.container import is_db3
 from idlc.recordings.containers.conversion import (
     Conversion,
@@ -30,12 +35,22 @@ from idlc.recordings.containers.conversion import (
     RewrittenTopic,
 )
 from idlc.recordings.containers.db3_to_mcap import as_mcap
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes
+from idlc.recordings.damage import Damage, DamageList
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
 
 #: New drafts that are made if other runs remove them as abandoned before they are locked.
 ATTEMPTS = 3
+
+
+class Rewritten(NamedTuple):
+    """The fate of each topic of a recording, and the parts that are damaged."""
+
+    topics: dict[str, RewrittenTopic]
+    damage: tuple[Damage, ...]
+
+
 #: Called with a file's name, how much of it is done, and its size.
 Progress = Callable[[str, int, int], object]
 #: The files that SQLite has beside a database, whose content is in the copy of that.
@@ -44,7 +59,8 @@ BESIDE = ("-journal", "-shm", "-wal")
 
 def mcap_name(path: Path) -> str:
     """Return the name of the MCAP file that a recording becomes."""
-    return path.with_suffix(".mcap").name if path.suffix == ".db3" else path.name
+    plain = path.with_name(path.name.removesuffix(bag.ZSTD))
+    return plain.with_suffix(".mcap").name if plain.suffix == ".db3" else plain.name
 
 
 def rewrite(
@@ -54,12 +70,13 @@ def rewrite(
     progress: Progress = lambda *_: None,
     *,
     index: bool = True,
-) -> dict[str, RewrittenTopic]:
+    strict: bool = False,
+) -> Rewritten:
     """Write a recording with conversions of topics, by their names, to a path that is free.
 
     Files that are written are MCAP, and folders are those of bags. Without `index`, the counts in
-    MCAP files are not used. Returns the fate of each topic. Raises RecordingError, and what
-    `convert` raises: then nothing is left of the target.
+    MCAP files are not used. What is damaged is left out, or an error if `strict`. Raises
+    RecordingError, and what `convert` raises: then nothing is left of the target.
     """
     start, end = Path(source), Path(target)
     if os.path.lexists(end):
@@ -68,7 +85,7 @@ def rewrite(
     if start.resolve() in end.resolve().parents:
         raise RecordingError(f"`{target}` is inside of `{source}`")
     with _draft(end) as draft:
-        rewriting = _Rewriting(conversions, index, progress)
+        rewriting = _Rewriting(conversions, index, progress, strict)
         if start.is_dir():
             rewriting.folder(start, draft)
         else:
@@ -79,7 +96,7 @@ def rewrite(
                     os.fsync(file.fileno())
         with uninterrupted():
             move_new(draft, end)
-    return rewriting.topics
+    return Rewritten(rewriting.topics, tuple(rewriting.damage))
 
 
 @contextmanager
@@ -123,37 +140,74 @@ def _remove_abandoned(target: Path) -> None:
 class _Rewriting:
     """The files of one recording; `topics` sums up what was written."""
 
-    def __init__(self, conversions: Conversions, index: bool, progress: Progress) -> None:
+    def __init__(
+        self, conversions: Conversions, index: bool, progress: Progress, strict: bool
+    ) -> None:
         self.conversions = conversions
         self.index = index
         self.progress = progress
         self.recorded: dict[str, Recorded] = {}
+        self.strict = strict
         self.topics: dict[str, RewrittenTopic] = {}
+        self.damage: list[Damage] = []
 
     def file(self, path: Path, target: Path) -> None:
         """Write a file."""
+        if first_bytes(path).startswith(ZSTD_MAGIC):
+            self.packed(path, target)
+            return
         progress = partial(self.progress, path.name)
-        if is_db3(path):
-            from idlc.recordings.containers.db3_to_mcap import convert_db3
+        with target.open("xb") as file:
+            if is_db3(path):
+                from idlc.recordings.containers.db3_to_mcap import convert_db3
 
-            with target.open("xb") as file:
-                topics = convert_db3(path, file, self.conversions, self.recorded, progress)
-        else:
-            from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
+                how = self.conversions, self.recorded, progress, self.strict
+                topics, damage = convert_db3(path, file, *how)
+            else:
+                from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
 
-            with target.open("xb") as file:
+                damage = DamageList(str(path), self.strict)
                 topics = rewrite_mcap(
-                    path, file, self.conversions, self.recorded, self.index, progress
+                    path, file, self.conversions, self.recorded, self.index, progress, damage
                 )
+        self.damage += damage
         for name, own in topics.items():
             before = self.topics.get(name, RewrittenTopic(0, 0, own.converted))
             count, size = before.messages + own.messages, before.size + own.size
             is_converted = own.converted or before.converted
             self.topics[name] = RewrittenTopic(count, size, is_converted)
 
+    def packed(self, path: Path, target: Path) -> None:
+        """Write a file that is compressed as a whole; the new one is not."""
+        known = len(self.damage)
+        with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
+            plain = Path(folder, path.name.removesuffix(bag.ZSTD))
+            problem = unpack(path, plain)
+            if problem and self.strict:
+                raise DamageError(f"`{path}`: {problem}")
+            try:
+                self.file(plain, target)
+            except RecordingError as error:
+                message = error.message.replace(str(plain), str(path))
+                raise type(error)(message, error.hint) from None
+        found = [replace(damage, file=str(path)) for damage in self.damage[known:]]
+        self.damage[known:] = [*([Damage(str(path), problem)] if problem else []), *found]
+
+    def split(self, path: Path, target: Path, is_only: bool) -> None:
+        """Write one of the files of a bag; others do not need it."""
+        try:
+            self.file(path, target)
+        except DamageError as error:
+            if self.strict or is_only:
+                raise
+            target.unlink(missing_ok=True)
+            self.damage.append(Damage(str(path), error.message.replace(f"`{path}`", "it")))
+
     def folder(self, folder: Path, target: Path) -> None:
         """Write a bag, with all that is in its folder."""
-        paths, _ = bag.files_of(folder)
+        bag_files = bag.files_of(folder)
+        paths = bag_files.paths
+        self.damage += bag_files.missing
         beside = {f"{path.name}{suffix}" for path in paths for suffix in BESIDE}
         types: dict[str, tuple[str, str]] = {}
         for name, new in self.conversions.items():
@@ -162,10 +216,10 @@ class _Rewriting:
         target.mkdir()
         for path in sorted(folder.iterdir()):
             if path in paths:
-                self.file(path, target / mcap_name(path))
+                self.split(path, target / mcap_name(path), len(paths) == 1)
             elif path.name == bag.METADATA and (data := bag.retyped(path, types)) is not None:
-                is_sqlite = any(path.suffix == ".db3" for path in paths)
-                data = as_mcap(data.decode()).encode() if is_sqlite else data
+                is_mcap = all(path.suffix == ".mcap" for path in paths)
+                data = data if is_mcap else as_mcap(data.decode()).encode()
                 (target / path.name).write_bytes(data)
             elif path.name not in beside:
                 _copy(path, target / path.name)

@@ -43,7 +43,7 @@ def test_bags_as_rosbags_reads_them(storage, compression, tmp_path):
     (source / "folder").mkdir()
     (source / "folder" / "link").symlink_to("../notes.txt")
     before = {path: path.read_bytes() for path in source.rglob("*.*")}
-    fate = rewrite(str(source), str(tmp_path / "target"), {"/imu": JOINTS})
+    fate = rewrite(str(source), str(tmp_path / "target"), {"/imu": JOINTS}).topics
     assert {path: path.read_bytes() for path in source.rglob("*.*")} == before
     assert fate["/imu"].converted
     assert [one.messages for one in fate.values()] == [20, 20, 20]
@@ -127,12 +127,26 @@ def test_a_database_becomes_a_file_with_all_that_rosbag2_reads(tmp_path):
     assert (record.name, record.metadata) == ("rosbag2", {"serialized_metadata": expected})
 
 
-@pytest.mark.parametrize("value", [-1, "x"])
-def test_times_that_no_mcap_file_has_are_an_error(value, tmp_path):
+def test_a_time_that_no_mcap_file_has_is_an_error(tmp_path):
     with closing(create(tmp_path / "a.db3")) as database, database:
-        database.execute("UPDATE messages SET timestamp = ? WHERE rowid = 3", (value,))
-    with pytest.raises(RecordingError, match=r"before 1970|of other types"):
+        database.execute("UPDATE messages SET timestamp = -1 WHERE rowid = 3")
+    with pytest.raises(RecordingError, match="before 1970"):
         rewrite(str(tmp_path / "a.db3"), str(tmp_path / "b.mcap"), {})
+
+
+@pytest.mark.parametrize(
+    ("column", "value"), [("timestamp", "x"), ("data", "x"), ("data", b"\x28\xb5\x2f\xfd")]
+)
+def test_damaged_rows_are_left_out(column, value, tmp_path):
+    with closing(create(tmp_path / "a.db3")) as database, database:
+        database.execute(f"UPDATE messages SET {column} = ? WHERE rowid = 3", (value,))
+        query = "SELECT timestamp, data FROM messages WHERE rowid != 3 ORDER BY timestamp"
+        rows = database.execute(query).fetchall()
+    with pytest.raises(RecordingError, match="row 3"):
+        rewrite(str(tmp_path / "a.db3"), str(tmp_path / "b.mcap"), {}, strict=True)
+    (damage,) = rewrite(str(tmp_path / "a.db3"), str(tmp_path / "b.mcap"), {}).damage
+    assert damage.messages == 1 and damage.problem.startswith("row 3")
+    assert [(each[-2], each[-1]) for each in content(tmp_path / "b.mcap")] == rows
     assert not (tmp_path / "b.mcap").exists()
 
 
@@ -244,18 +258,37 @@ def test_metadata_keeps_its_text_but_for_the_types(tmp_path):
         assert (tmp_path / "new/metadata.yaml").read_bytes() == broken
 
 
-@pytest.mark.parametrize("name", ["a.mcap.zstd", "pipe"])
-def test_folders_with_what_cannot_be_rewritten_are_an_error(name, tmp_path):
+def test_a_folder_with_what_cannot_be_rewritten_is_an_error(tmp_path):
     source = tmp_path / "source"
     source.mkdir()
     made.by_mcap(source / "a.mcap", MESSAGES, "")
-    if name == "pipe":
-        os.mkfifo(source / name)
-    else:
-        (source / name).write_bytes(b"\x28\xb5\x2f\xfd")
-    with pytest.raises(RecordingError, match=name):
+    os.mkfifo(source / "pipe")
+    with pytest.raises(RecordingError, match="pipe"):
         rewrite(str(source), str(tmp_path / "target"), {})
     assert list(tmp_path.iterdir()) == [source]
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "db3"])
+def test_files_that_are_compressed_as_a_whole_become_plain_ones(suffix, tmp_path):
+    source = made.by_rosbags(tmp_path / "bag", MESSAGES, suffix)
+    (plain,) = source.glob(f"*.{suffix}")
+    rewrite(str(plain), str(tmp_path / "expected.mcap"), {})
+    packed = source / f"{plain.name}.zstd"
+    packed.write_bytes(zstandard.ZstdCompressor().compress(plain.read_bytes()))
+    plain.unlink()
+    metadata = source / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace(plain.name, packed.name))
+    assert rewrite(str(source), str(tmp_path / "new"), {}).damage == ()
+    (written,) = (tmp_path / "new").glob("*.mcap*")
+    assert content(written) == content(tmp_path / "expected.mcap")
+    text = (tmp_path / "new/metadata.yaml").read_text()
+    assert f"- {written.name}" in text.replace("'", "") and "zstd" not in text
+    (source / packed.name).write_bytes(packed.read_bytes()[:-9])
+    with pytest.raises(RecordingError, match=packed.name):
+        rewrite(str(source), str(tmp_path / "strict"), {}, strict=True)
+    (tmp_path / "damaged").parent.mkdir(exist_ok=True)
+    with suppress(RecordingError):
+        assert packed.name in str(rewrite(str(source), str(tmp_path / "damaged"), {}).damage)
 
 
 def test_a_hot_journal_is_an_error(tmp_path):

@@ -237,12 +237,12 @@ def test_mutated_containers_are_rewritten_or_an_error(tmp_path):
         before, use_index = path.read_bytes(), rng.random() < 0.7
         conversions = rng.choice([{}, {"/imu": NEW}, {"/imu": CONVERTED}, {"/joints": CONVERTED}])
         try:
-            fate = rewrite(str(path), str(target), conversions, index=use_index)
+            fate = rewrite(str(path), str(target), conversions, index=use_index).topics
         except RecordingError:
             errors += 1
         else:
             with suppress(RecordingError):  # the rest of the file may be what is broken
-                expected = read(path, index=use_index)
+                expected = read(path, index=use_index, check=True)
                 wanted = [
                     (topic, time, data * 2)
                     if topic in conversions and conversions[topic].convert
@@ -268,7 +268,7 @@ LIMITED = (
     "most = before + int(sys.argv[1])\n"
     "resource.setrlimit(resource.RLIMIT_AS, (most, most))\n"
     "for path in sys.argv[2:]:\n"
-    "    try:\n        print(rewrite(path, path + '.new', {'/imu': new}))\n"
+    "    try:\n        print(rewrite(path, path + '.new', {'/imu': new}, strict=True))\n"
     "    except RecordingError as error:\n        print(error)\n"
 )
 

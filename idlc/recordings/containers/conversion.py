@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, compress, zstd_frame
-from idlc.recordings.containers.file import CDR, START, Schema, unread_reason
+from idlc.recordings.containers.file import CDR, START, Schema, other_encoding, unread_reason
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
 
@@ -68,8 +68,7 @@ def check(
     `recorded` has the definitions of topics that were checked before, and is added to.
     """
     if conversion.convert and encoding != CDR:
-        what = f"messages of `{topic}` are written as `{encoding}`"
-        raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+        raise RecordingError(*other_encoding(topic, encoding))
     kind, schema = definition
     if schema is not None and schema.is_blank:
         schema = None

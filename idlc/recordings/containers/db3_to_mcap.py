@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
+from idlc.recordings.containers.compression import Room
 from idlc.recordings.containers.conversion import (
-    BATCH,
     Conversion,
     Conversions,
     Recorded,
@@ -25,6 +24,7 @@ from idlc.recordings.containers.file import MSG, Topic, check_count, full_name
 from idlc.recordings.containers.mcap_writer import ChunkWriter, channel, record, schema, text_field
 from idlc.recordings.containers.records import MESSAGE_HEAD
 from idlc.recordings.containers.source import RecordingError, of_file
+from idlc.recordings.damage import DamageList
 
 #: The keys of a channel's metadata that rosbag2 reads, and the name and key of a bag's metadata.
 PROFILES, HASH = b"offered_qos_profiles", b"topic_type_hash"
@@ -36,7 +36,7 @@ def as_mcap(metadata: str) -> str:
     """Return a bag's metadata for MCAP files, which are not compressed in rosbag2's ways."""
     metadata = re.sub(r"(?m)^(\s*storage_identifier:).*$", r"\1 mcap", metadata)
     metadata = re.sub(r"(?m)^(\s*compression_(?:format|mode):).*$", r'\1 ""', metadata)
-    return re.sub(r"\.db3\b", ".mcap", metadata)
+    return re.sub(r"\.(db3|mcap)(\.zstd)?\b", ".mcap", metadata)
 
 
 class _Channels:
@@ -48,16 +48,15 @@ class _Channels:
         self.topics: dict[int, tuple[Topic, Conversion | None]] = {}
         #: The numbers of channels, by those of topics.
         self.numbers: dict[int, int] = {}
-        profiles = file.profiles()
         if len(file.topics) > MOST_CHANNELS:
             raise RecordingError(f"it has more than {MOST_CHANNELS:,} topics")
         for topic, number in file.topics:
             conversion = selected(conversions, topic.name, topic.schema)
             self.topics[number] = topic, conversion
             self.numbers[number] = len(self.numbers)
-            self._add(self.numbers[number], topic, conversion, profiles.get(number, ""))
+            self._add(self.numbers[number], topic, conversion)
 
-    def _add(self, number: int, topic: Topic, new: Conversion | None, profiles: str) -> None:
+    def _add(self, number: int, topic: Topic, new: Conversion | None) -> None:
         kind, encoding, text, digest = topic.type, MSG, "", topic.hash or ""
         if topic.schema is not None:
             encoding, text = topic.schema.encoding, topic.schema.text
@@ -67,7 +66,7 @@ class _Channels:
         if key not in self._schemas:
             self._schemas[key] = len(self._schemas) + 1
             self._writer.append(records.SCHEMA_OP, schema(self._schemas[key], *key))
-        metadata = {PROFILES: profiles.encode()}
+        metadata = {PROFILES: topic.qos.encode()}
         if digest:
             metadata[HASH] = digest.encode()
         names = topic.name.encode(), topic.encoding.encode()
@@ -77,21 +76,6 @@ class _Channels:
 
 #: Messages: their topics, times and contents.
 Rows: TypeAlias = list[tuple[int, int, bytes]]
-
-
-def _decompressed(groups: Iterable[Rows], room: Room) -> Iterator[Rows]:
-    """Yield messages without a compression of their own, so many that they are not large."""
-    for rows in groups:
-        part: Rows = []
-        size = 0
-        for number, time, raw in rows:
-            data = bytes(zstd_frame(raw, room)) if raw[:4] == ZSTD_MAGIC else raw
-            part.append((number, time, data))
-            size += len(data)
-            if size >= BATCH:
-                yield part
-                part, size = [], 0
-        yield part
 
 
 class _Conversion:
@@ -155,24 +139,26 @@ def convert_db3(
     conversions: Conversions,
     recorded: dict[str, Recorded],
     progress: Callable[[int, int], object],
-) -> dict[str, RewrittenTopic]:
+    strict: bool = False,
+) -> tuple[dict[str, RewrittenTopic], DamageList]:
     """Write a .db3 file as MCAP, with conversions of topics.
 
     `recorded` has what other files of the recording have of a topic, and is added to. Messages that
-    are compressed by themselves are not any more: in MCAP files, no player reads them.
+    are compressed by themselves are not any more: in MCAP files, no player reads them. What is
+    damaged is left out, or an error if `strict`.
     """
-    with closing(Db3File(path)) as file, of_file(file.name):
+    with closing(Db3File(path, strict=strict)) as file, of_file(file.name):
         for topic, _ in file.topics:
             if conversion := selected(conversions, topic.name, topic.schema):
                 check(topic.name, topic.encoding, (topic.type, topic.schema), conversion, recorded)
         room = Room(path.stat().st_size)
         conversion_of_file = _Conversion(file, target, conversions, room)
         total, done = sum(topic.count for topic, _ in file.topics), 0
-        for rows in _decompressed(file.rows(), room):
+        for rows in file.rows():
             conversion_of_file.add(rows)
             done += len(rows)
             progress(done, total)
-        for topic, number in file.topics:
+        for topic, number in file.topics if not file.damage else ():
             check_count(topic.name, topic.count, conversion_of_file.counts[number])
         conversion_of_file.close(file.metadata())
-    return conversion_of_file.topics()
+    return conversion_of_file.topics(), file.damage

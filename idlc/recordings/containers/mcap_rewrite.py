@@ -44,8 +44,10 @@ from idlc.recordings.containers.records import (
     SCHEMA_OP,
     Fields,
     heads,
+    sound_heads,
 )
-from idlc.recordings.containers.source import RecordingError, Source, of_file
+from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.damage import DamageList
 
 #: Numbers of schemas end before.
 MOST_SCHEMAS = 1 << 16
@@ -138,10 +140,16 @@ class Rewriting:
     """One pass over a file; `room` bounds what is decompressed."""
 
     def __init__(
-        self, source: Source, facts: Facts, plan: Plan, write: Callable[[Raw], object]
+        self,
+        source: Source,
+        facts: Facts,
+        plan: Plan,
+        write: Callable[[Raw], object],
+        damage: DamageList,
     ) -> None:
         self.source = source
         self.facts = facts
+        self.damage = damage
         self.plan = plan
         self.room = Room(source.size)
         #: The schemas that are defined outside of chunks.
@@ -155,10 +163,11 @@ class Rewriting:
         first = next(heads(self.source, start, self.source.size), None)
         if first is None or first[0] != records.HEADER_OP:
             self.writer.write(record(records.HEADER_OP, bytes(8)))
-        for op, at, size in heads(self.source, end, self.source.size):
+        for op, at, size in sound_heads(self.source, end, self.source.size, self._skip):
             progress(at)
             is_loose = op == MESSAGE_OP or (op in (SCHEMA_OP, CHANNEL_OP) and not ended)
-            if start < end and (not is_loose or at + size - start > records.GROUP):
+            is_next = is_loose and at == end
+            if start < end and (not is_next or at + size - start > records.GROUP):
                 self._loose(start, end)
                 start = end = at
             if is_loose:
@@ -169,10 +178,7 @@ class Rewriting:
                     break
                 continue
             ended |= op == records.DATA_END_OP
-            if op == records.CHUNK_OP:
-                self._chunk(at, size)
-            elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
-                self._other(op, at, size)
+            self._record(op, at, size)
         if start < end:
             self._loose(start, end)
         for number in self.facts.channels:
@@ -184,6 +190,8 @@ class Rewriting:
 
     def check(self, facts: Facts) -> None:
         """Raise RecordingError if other numbers of messages were written than are counted."""
+        if self.damage:
+            return
         for number, own in facts.channels.items():
             count = self.writer.counts.get(number, 0)
             check_count(own.topic, facts.counts.get(number, 0), count)
@@ -198,6 +206,21 @@ class Rewriting:
             done = bool(change and change.convert) or before.converted
             topics[own.topic] = RewrittenTopic(before.messages + count, before.size + size, done)
         return topics
+
+    def _record(self, op: int, at: int, size: int) -> None:
+        """Write a record that is by itself, unless it is damaged."""
+        try:
+            if op == records.CHUNK_OP:
+                self._chunk(at, size)
+            elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
+                self._other(op, at, size)
+        except DamageError as error:
+            self.damage.add(error.message, at, at + size)
+
+    def _skip(self, start: int, stop: int) -> None:
+        """Add a part without records to the damage, unless it is the end of a summary."""
+        if stop < self.source.size or not self.facts.is_ended:
+            self.damage.add("there are no records", start, stop)
 
     def _loose(self, start: int, end: int) -> None:
         """Write records outside of chunks."""
@@ -215,13 +238,23 @@ class Rewriting:
         if head.compression or head.size != head.stored:
             data = memoryview(bytearray(head.size))
             decompress(stored, head.compression, data)
-        content, crc = Content(data, self.room), head.crc
+        crc = head.crc
+        if crc and zlib.crc32(data) != crc:
+            raise DamageError(f"the checksum of the chunk at byte {at} is wrong")
+        is_cut = False
+        try:
+            content = Content(data, self.room)
+        except DamageError as error:
+            if crc:
+                raise
+            # without a checksum, the messages before the damage are as good as any
+            is_cut = True
+            self.damage.add(error.message, at, at + size)
+            content = Content(data[: records.sound_size(data)], self.room)
         self._define_channels(content)
         edits = self._edits(content, set())
-        if edits:
-            if crc and zlib.crc32(data) != crc:
-                raise RecordingError(f"the checksum of the chunk at byte {at} is wrong")
-            new = _edited(data, edits)
+        if edits or is_cut:
+            new = _edited(content.data, edits)
             self._check_size(len(new))
             content, crc = Content(new), zlib.crc32(new)
             stored = memoryview(compress(new, head.compression))
@@ -344,20 +377,23 @@ def rewrite_mcap(
     recorded: dict[str, Recorded],
     index: bool,
     progress: Callable[[int, int], object],
+    damage: DamageList,
 ) -> dict[str, RewrittenTopic]:
     """Write an MCAP file with conversions of topics; `index` is that of `read_facts`.
 
-    `recorded` has what other files of the recording have of a topic, and is added to.
+    `recorded` has what other files of the recording have of a topic, and is added to. What is
+    damaged is left out.
     """
     source = Source(place)
     every: list[Facts] = []
     with of_file(source.name), source.opened():
         for use_index in dict.fromkeys((index, False)):
-            facts = read_facts(source, use_index)
+            facts = read_facts(source, damage, use_index)
             every.append(facts)
             file.seek(0)
             file.truncate()
-            rewriting = Rewriting(source, facts, Plan(facts, conversions, recorded), file.write)
+            plan = Plan(facts, conversions, recorded)
+            rewriting = Rewriting(source, facts, plan, file.write, damage)
             try:
                 rewriting.run(lambda done: progress(done, source.size))
             except _UnlistedError:

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeAlias
 import msgspec
 import numpy as np
 
-from idlc.recordings.containers.source import RecordingError
-
 #: Times of numpy and Arrow end here, in the year 2262.
 END_OF_TIME = 1 << 63
+#: Stands for a later time; it is NaT, numpy's null.
+NO_TIME = -END_OF_TIME
 
 #: From this mean size on, messages are not copied to be one buffer.
 LARGE = 1 << 15
@@ -41,7 +41,9 @@ class Window(NamedTuple):
         if self.start is None and self.end is None:
             return None
         # numpy compares numbers of 64 bits, and limits may have more
-        inside = np.full(len(times), self.start is None or self.start < END_OF_TIME)
+        inside = times != NO_TIME
+        if self.start is not None and self.start >= END_OF_TIME:
+            inside[:] = False
         if self.start is not None and 0 < self.start < END_OF_TIME:
             inside &= times >= self.start
         if self.end is not None and self.end < END_OF_TIME:
@@ -56,7 +58,7 @@ ALWAYS = Window()
 class Messages(msgspec.Struct, frozen=True, eq=False):
     """Messages of one topic, in the order in which they were recorded, for `to_columns` to read.
 
-    Times are int64, in nanoseconds; `publish_times` is None where a recording has none.
+    Times are int64, in nanoseconds, or NO_TIME; `publish_times` is None where a recording has none.
     """
 
     log_times: Any
@@ -64,6 +66,11 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
 
     def __len__(self) -> int:
         return len(self.log_times)
+
+    def late(self) -> int:
+        """Return how many times are not known because they are after the year 2262."""
+        times = (self.log_times, self.publish_times)
+        return sum(int(np.count_nonzero(each == NO_TIME)) for each in times if each is not None)
 
     def views(self) -> list[Raw]:
         """Return the bytes of each message."""
@@ -124,11 +131,12 @@ class Separate(Messages, frozen=True, eq=False):
         return self.raws
 
 
-def times_of(values: Any, what: str) -> Any:
-    """Return unsigned times as int64."""
-    if len(values) and int(values.max()) >= END_OF_TIME:
-        raise RecordingError(f"a message has a {what} after the year 2262")
-    return values.astype(np.int64)
+def times_of(values: Any) -> Any:
+    """Return unsigned times as int64, NO_TIME for those after the year 2262."""
+    times = values.astype(np.int64)
+    if len(times) and times.min() < 0:
+        times[times < 0] = NO_TIME
+    return times
 
 
 def in_order(parts: Sequence[Messages]) -> Messages:

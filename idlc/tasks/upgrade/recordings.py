@@ -38,6 +38,7 @@ from idlc.recordings.types import (
     DefinedTopic,
     LocalTypes,
     RecordedTypes,
+    damage_problems,
     recorded_types,
     topics_of,
     versions,
@@ -68,6 +69,7 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
     write_rules: str | None = None
     dry_run: bool = False
     allow_loss: bool = False
+    strict: bool = False
     again: str = "idlc upgrade"
 
 
@@ -385,12 +387,14 @@ def _write(
         plans = [each for each in result.plans if each.recording == recording]
         try:
             conversions = _definitions(result.undefined[recording]) | _conversions(plans, run)
-            summary = rewrite(root.path(recording), root.path(shown), conversions, progress)
+            source, to = root.path(recording), root.path(shown)
+            summary = rewrite(source, to, conversions, progress, strict=options.strict)
         except (RecordingError, UpgradeError) as error:
             advice = getattr(error, "hint", None)
             report.add(codes.CONVERSION_FAILED.of(recording, str(error), hint=advice))
         else:
-            result.written.append((recording, shown, summary))
+            result.written.append((recording, shown, summary.topics))
+            report.extend(damage_problems(recording, summary.damage))
             if _has_db3(Path(root.path(recording))):
                 report.notes.append(PLUGIN)
     report.notes[:] = dict.fromkeys(report.notes)
