@@ -7,7 +7,7 @@ of the build; nothing is written into the project.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,7 +53,7 @@ sys.meta_path.append(Finder)
 _ARRAYS = b" import arrays as _arrays"
 
 
-class Library(NamedTuple):
+class CompiledLibrary(NamedTuple):
     """The classes of a library.
 
     `out` is their folder in the project, `module` the name by which that is imported, and `files`
@@ -76,7 +76,7 @@ def compile_library(
     installed_path: Callable[[str], str],
     requirements: Iterable[str],
     report: Report,
-) -> Library | None:
+) -> CompiledLibrary | None:
     """Compile the interfaces of a library into a folder; return `None` after a problem.
 
     `installed_path` returns the path below site-packages of a path in the project. `requirements`
@@ -85,7 +85,9 @@ def compile_library(
     root = Root.at(project)
     config = load_settings(root, report)
     missing = [key for key in ("paths", "out") if not getattr(config, key)]
-    for key in () if report.had_errors else missing:
+    if report.had_errors and missing:
+        return None
+    for key in missing:
         hint = "set `paths` to the interfaces, and `out` to the folder for the library's classes"
         message = f"[tool.idlc] has no `{key}`, so the build cannot compile interfaces"
         report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
@@ -107,19 +109,25 @@ def compile_library(
     request = GenOptions(config.paths, where, str(target), runtime=runtime, vendoring=vendoring)
     if report.had_errors or not generate(request, report):
         return None
-    files = {path.relative_to(target).as_posix(): path for path in target.rglob("*.*")}
-    for key, path in tuple(files.items()):
-        own = project / out / key
-        # people describe a package in its __init__.py
-        is_top = path.name == "__init__.py" and path.with_name(FILE).is_file()
-        if is_top and own.is_file() and own.read_bytes() != path.read_bytes():
-            files[key] = own
+    files = dict(_compiled_files(target, project / out))
     uses_numpy = any(_ARRAYS in path.read_bytes() for path in files.values())
     if uses_numpy and not any(map(NUMPY.match, requirements)):
         message = "the classes have arrays, which need numpy, but [project] does not require it"
         hint = 'add "numpy" to `dependencies`'
         report.add(codes.UNDECLARED_IMPORT.of(SETTINGS_FILE, message, hint=hint))
-    return Library(Path(out).as_posix(), ".".join(parts), files)
+    return CompiledLibrary(Path(out).as_posix(), ".".join(parts), files)
+
+
+def _compiled_files(target: Path, committed: Path) -> Iterator[tuple[str, Path]]:
+    """Yield compiled files by their paths, with each `__init__.py` that describes a package."""
+    for path in target.rglob("*.*"):
+        name = path.relative_to(target)
+        is_top = path.name == "__init__.py" and path.with_name(FILE).is_file()
+        described = committed / name
+        if is_top and described.is_file() and described.read_bytes() != path.read_bytes():
+            yield name.as_posix(), described
+        else:
+            yield name.as_posix(), path
 
 
 def sources(project: Path) -> list[str]:

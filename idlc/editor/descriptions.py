@@ -58,8 +58,10 @@ def _definition(meaning: ir.Field | ir.Constant, context: InterfaceContext) -> I
     yield code([f"{spell(meaning.type)} {meaning.name}{value}"])
     yield "**Deprecated**" if deprecation(meaning.comment) is not None else ""
     yield prose(meaning.comment)
+    facts = []
     says_range = meaning.unit is not None and is_range(meaning.unit)
-    facts = [f"{'range' if says_range else 'unit'}: `{meaning.unit}`"] if meaning.unit else []
+    if meaning.unit:
+        facts.append(f"{'range' if says_range else 'unit'}: `{meaning.unit}`")
     element = ir.element_of(meaning.type)
     if isinstance(element, ir.Primitive) and element.info.low is not None and not says_range:
         facts.append(f"range: `{element.info.low}` to `{element.info.high}`")
@@ -67,7 +69,8 @@ def _definition(meaning: ir.Field | ir.Constant, context: InterfaceContext) -> I
         facts.append(f"length: at most {element.bound} characters")
     if isinstance(meaning.type, ir.Sequence) and meaning.type.bound is not None:
         facts.append(f"elements: at most {meaning.type.bound}")
-    facts += [f"default: `{default}`"] if default else []
+    if default:
+        facts.append(f"default: `{default}`")
     if each := _placed(context).get(id(meaning)):
         facts.append(f"on the wire: {each.size.in_bytes} at offset {each.offset}")
     yield "  \n".join(facts)

@@ -16,6 +16,9 @@ from idlc.model import ir, python_names
 #: Enums for the fields that are marked, for all fields whose names constants begin with, or none.
 Choice: TypeAlias = Literal["marked", "all", "none"]
 
+#: What a field lists: names of constants, and prefixes such as `MODE_*`.
+_Words: TypeAlias = tuple[str, ...]
+
 #: Python 3.10 takes time by the square of the members to make an enum.
 MOST = 1000
 
@@ -63,35 +66,59 @@ def enums(message: ir.Message, choice: Choice = "marked") -> Iterator[Enum]:
     """
     if choice == "none" or not message.constants:
         return
-    groups: dict[tuple[str, ...], list[ir.Field]] = {}
-    for field in message.fields:
-        group = groups.setdefault(listed(field) or (_prefix(field),), [])
-        group += [field] if holds_integers(field.type) else []
-    owners = {word: words for words in reversed(groups) for word in words}
-    lengths = sorted({len(word) - 1 for word in owners if word.endswith("_*")}, reverse=True)
-    members: dict[tuple[str, ...], dict[str, ir.Constant]] = {words: {} for words in groups}
-    for constant in message.constants:
-        name = constant.name
-        prefixes = (f"{name[:length]}*" for length in lengths if length < len(name))
-        word = next((word for word in (name, *prefixes) if word in owners), None)
-        if word is None or not _can_hold(groups[owners[word]][:1], constant):
-            continue
-        own = members[owners[word]]
-        short = name if word == name else name[len(word) - 1 :]
-        if not short.isidentifier() or short in own:
-            short = name if name not in own else f"{name}_"
-        own[short] = constant
+    groups = _groups(message)
+    members = _members(message, groups)
     taken = {constant.name for constant in message.constants}
     taken |= {python_names.class_(name) for name in (message.name, *message.references)}
     for words, fields in groups.items():
         is_marked = any(listed(field) is not None for field in fields)
         least = 1 if is_marked else 2
         if (is_marked or choice == "all") and least <= len(members[words]) <= MOST:
-            is_prefix = len(words) == 1 and words[0].endswith("_*")
-            stem = words[0].removesuffix("_*") if is_prefix else fields[0].name
-            name = python_names.enum(stem, taken)
+            name = python_names.enum(_stem(words, fields), taken)
             taken.add(name)
             yield Enum(name, tuple(fields), members[words])
+
+
+def _groups(message: ir.Message) -> dict[_Words, list[ir.Field]]:
+    """Return the integer fields by what they list; other fields leave their group empty."""
+    groups: dict[_Words, list[ir.Field]] = {}
+    for field in message.fields:
+        group = groups.setdefault(listed(field) or (_prefix(field),), [])
+        if holds_integers(field.type):
+            group.append(field)
+    return groups
+
+
+def _members(
+    message: ir.Message, groups: dict[_Words, list[ir.Field]]
+) -> dict[_Words, dict[str, ir.Constant]]:
+    """Return the constants of each group, by their names in its enum."""
+    owners = {word: words for words in reversed(groups) for word in words}
+    lengths = sorted({len(word) - 1 for word in owners if word.endswith("_*")}, reverse=True)
+    members: dict[_Words, dict[str, ir.Constant]] = {words: {} for words in groups}
+    for constant in message.constants:
+        name = constant.name
+        prefixes = (f"{name[:length]}*" for length in lengths if length < len(name))
+        word = next((word for word in (name, *prefixes) if word in owners), None)
+        if word is not None and _can_hold(groups[owners[word]][:1], constant):
+            group = members[owners[word]]
+            group[_member_name(name, word, group)] = constant
+    return members
+
+
+def _member_name(name: str, word: str, group: dict[str, ir.Constant]) -> str:
+    """Return the name of a constant without the prefix in `word`, if that is a free name."""
+    short = name if word == name else name[len(word) - 1 :]
+    if short.isidentifier() and short not in group:
+        return short
+    return f"{name}_" if name in group else name
+
+
+def _stem(words: _Words, fields: list[ir.Field]) -> str:
+    """Return what an enum is named after: its only prefix, or its first field."""
+    if len(words) == 1 and words[0].endswith("_*"):
+        return words[0].removesuffix("_*")
+    return fields[0].name
 
 
 def _can_hold(fields: list[ir.Field], constant: ir.Constant) -> bool:

@@ -60,27 +60,9 @@ def _from_files(
         folders = (package.home for package in packages)
         origins = ["package.xml" if root.manifest(folder) else "its folder" for folder in folders]
     else:
-        home, name, origins = min(homes), scope.package, ["--package"]
-        declared = next((path for home in homes if (path := root.manifest(home))), None)
-        if name is None and declared:
-            name, origins = declared_name(declared, root, report), ["package.xml"]
-        if name is None:
-            name, origins = root.absolute(out).name, ["the folder given with -o"]
-            if catalog.is_standard(name) and home.name != name:
-                report.add(
-                    codes.UNIMPORTABLE_PACKAGE.of(
-                        "",
-                        f"`{name}` (from {origins[0]}) would hide the ROS 2 package",
-                        hint=f"choose another folder, or confirm the name with `--package {name}`",
-                    )
-                )
-            # other commands cannot know that name
-            if name != home.name and root.absolute(out).parent not in output_folders(home, root):
-                report.notes.append(
-                    f"the package is named `{name}`, after the output folder; other commands "
-                    f"need `--package {name}`, or a package.xml next to the interfaces"
-                )
-        packages = (inputs.load(name, files, home, root, report),)
+        name, origin = _name_of_all(homes, out, scope, report)
+        origins = [origin]
+        packages = (inputs.load(name, files, min(homes), root, report),)
     if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
         report.add(
             codes.FOREIGN_FILE.of(
@@ -92,6 +74,35 @@ def _from_files(
     for package, origin in zip(packages, origins, strict=True):
         accept_name(package.package, origin, report)
     return packages
+
+
+def _name_of_all(
+    homes: Collection[Path], out: str, scope: Scope, report: Report
+) -> tuple[str, str]:
+    """Return the name of the package that all files make up, and where it comes from."""
+    root = scope.root
+    if scope.package is not None:
+        return scope.package, "--package"
+    declared = next((path for home in homes if (path := root.manifest(home))), None)
+    name = declared_name(declared, root, report) if declared else None
+    if name is not None:
+        return name, "package.xml"
+    home, name, origin = min(homes), root.absolute(out).name, "the folder given with -o"
+    if catalog.is_standard(name) and home.name != name:
+        report.add(
+            codes.UNIMPORTABLE_PACKAGE.of(
+                "",
+                f"`{name}` (from {origin}) would hide the ROS 2 package",
+                hint=f"choose another folder, or confirm the name with `--package {name}`",
+            )
+        )
+    # other commands cannot know that name
+    if name != home.name and root.absolute(out).parent not in output_folders(home, root):
+        report.notes.append(
+            f"the package is named `{name}`, after the output folder; other commands "
+            f"need `--package {name}`, or a package.xml next to the interfaces"
+        )
+    return name, origin
 
 
 def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:

@@ -15,7 +15,7 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.model import ir
 from idlc.project import inputs, prefixes, write
-from idlc.project.library import Texts
+from idlc.project.library import InterfaceTexts
 from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
@@ -71,7 +71,7 @@ def recorded_packages(
     report: Report,
     *,
     whole: bool,
-) -> tuple[list[inputs.Inputs], Texts]:
+) -> tuple[list[inputs.Inputs], InterfaceTexts]:
     """Return the packages of recorded types with all that these need, and their definitions.
 
     `whole` packages are for a prefix, where they hide those of the same name in others.
@@ -137,7 +137,7 @@ def write_definitions(
             path = write.shown(shown, change.path)
             hint = "choose another folder with -o"
             report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint=hint))
-    plan = write.Plan(folder, tuple(changes), {})
+    plan = write.WritePlan(folder, tuple(changes), {})
     if report.had_errors or not write.apply(plan, shown, report):
         return []
     return [write.shown(shown, path) for path in files]

@@ -301,16 +301,11 @@ def _refusal(value: Any, field: FieldInfo) -> str:
     """Return what the field allows if it refuses a value, else nothing."""
     if not field.is_list:
         return _refusal_of_element(value, field)
-    if field.is_numeric and field.primitive is not None:
+    if field.is_numeric:
         if field.is_sequence and isinstance(value, array):
-            if value.typecode != field.primitive.code:
-                return f"an array.array of {field.primitive.code!r}"
-            far = field.bound is not None and len(value) > field.bound
-            return f"an array.array of length <= {field.bound}" if far else ""
+            return _refusal_of_array(value, field)
         if field.size is not None and type(value).__module__ == "numpy":
-            right = value.dtype.name == field.primitive.name
-            right = right and value.size == field.size
-            return "" if right else f"{field.size} numbers ({field.primitive.name})"
+            return _refusal_of_numpy(value, field)
     if not isinstance(value, (Sequence, AbstractSet, UserList)) or isinstance(
         value, (str, UserString)
     ):
@@ -323,6 +318,22 @@ def _refusal(value: Any, field: FieldInfo) -> str:
     return next(
         (f"a set or sequence, each value {text}" for text in refusals if text), ""
     )
+
+
+def _refusal_of_array(value: array[Any], field: FieldInfo) -> str:
+    assert field.primitive is not None
+    if value.typecode != field.primitive.code:
+        return f"an array.array of {field.primitive.code!r}"
+    if field.bound is not None and len(value) > field.bound:
+        return f"an array.array of length <= {field.bound}"
+    return ""
+
+
+def _refusal_of_numpy(value: Any, field: FieldInfo) -> str:
+    assert field.primitive is not None
+    if value.dtype.name == field.primitive.name and value.size == field.size:
+        return ""
+    return f"{field.size} numbers ({field.primitive.name})"
 
 
 def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
 
-from idlc.check import cmake_lists, outputs
+from idlc.check import builds, cmake_lists, outputs
 from idlc.check.registry import advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
 from idlc.compiler.compiler import Compiler, library_for, stage
@@ -18,6 +18,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.packaging.facts import Facts, facts
+from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
 from idlc.project.find import KINDS, RULES, list_files, no_interfaces
@@ -68,6 +69,10 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         recordings, others = split_recordings(options.paths, options.scope.root)
         if recordings:
             return _with_recordings(recordings, others, options, report)
+    return _check_files(options, report)
+
+
+def _check_files(options: CheckOptions, report: Report) -> CheckResult:
     fixed = 0
     texts: dict[str, tuple[str, str]] = {}
     scope, selection = options.scope, options.selection
@@ -76,11 +81,7 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
         looked = Report()
         listing = list_files(paths, scope.root, looked, scope.exclude)
         packages = inputs.packages(listing.files, scope, looked, listing.packages)
-        for path in listing.empty:
-            folder = scope.root.absolute(path)
-            if not any(package.home.is_relative_to(folder) for package in packages):
-                also = "package.xml and no "
-                looked.add(no_interfaces(path, scope.root, scope.exclude, also=also))
+        looked.extend(_without_packages(listing.empty, packages, scope))
         checking = checkers(packages, scope)
         problems, models = check_all(checking, packages, selection)
         edits = [change for problem in problems for change in problem.edits]
@@ -104,9 +105,20 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
     report.extend((*looked, *problems))
     report.notes += looked.notes
     first = next(iter(checking.values()))
-    looked_at = filter(None, map(first.package_facts, packages))
-    notes = tuple(filter(None, map(cmake_lists.unknown, looked_at)))
+    looked_at = [*filter(None, map(first.package_facts, packages))]
+    unjudged = (note(each) for each in looked_at for note in (cmake_lists.unknown, builds.unjudged))
+    notes = tuple(filter(None, unjudged))
     return CheckResult(files, len(packages), fixed, distros, notes, texts)
+
+
+def _without_packages(
+    paths: Iterable[str], packages: Collection[inputs.Inputs], scope: Scope
+) -> Iterator[Diagnostic]:
+    """Yield a problem for each path without interfaces in which there is no package either."""
+    for path in paths:
+        folder = scope.root.absolute(path)
+        if not any(package.home.is_relative_to(folder) for package in packages):
+            yield no_interfaces(path, scope.root, scope.exclude, also="package.xml and no ")
 
 
 def _with_packages(paths: Sequence[str], root: Root) -> tuple[str, ...]:
@@ -172,6 +184,8 @@ class Checker:
     ) -> None:
         self._scope = scope
         self.library = library_for(packages, scope, Report())
+        folders = {package.package: package.folders for package in packages}
+        self._neighbours = Neighbours(folders, scope.root)
         self._lowered: link.Memory = {}
         # dependencies between interfaces are only worth remembering for a next run
         self._checked = IncrementalFindings() if again else None
@@ -209,7 +223,9 @@ class Checker:
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""
         if package.package not in self._facts:
-            self._facts[package.package] = facts(package, self.library.packages, self._scope)
+            self._facts[package.package] = facts(
+                package, self.library.packages, self._neighbours, self._scope
+            )
         current = self._facts[package.package]
         if current is None or not current.inputs:
             return current

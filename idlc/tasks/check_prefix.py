@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.generate.native import library as native
 from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS
-from idlc.model import derive
+from idlc.model import derive, ir
 from idlc.project import inputs, prefixes
 from idlc.project.files import is_file, read_bytes
 from idlc.project.find import list_files
@@ -87,22 +87,28 @@ def _problems(
     if model is None:
         return
     messages = [message for own in model.own for message in derive.messages(own)]
-    missing = [
-        f"`{message.name}`"
-        for message in messages
+    expected = [message.name for message in messages]
+    if library.stamp is None:
         # older distributions have no events
-        if native.symbol(identifier, message.name) not in library.symbols
-        and (library.stamp is not None or not message.name.name.endswith("_Event"))
+        expected = [name for name in expected if not name.name.endswith("_Event")]
+    missing = [
+        f"`{name}`" for name in expected if native.symbol(identifier, name) not in library.symbols
     ]
     if missing:
         yield f"lacks {first_few(missing, 3)}"
-    if library.stamp is None:
-        return
+    if library.stamp is not None:
+        yield from _stale(data, library.stamp, prefix, messages, model)
+
+
+def _stale(
+    data: bytes, stamp: bytes, prefix: Path, messages: Iterable[ir.Message], model: Model
+) -> Iterator[str]:
+    """Yield how a complete library differs from the interfaces and from the distribution."""
     hashes = {str(message.name): model.describer.hash(str(message.name)) for message in messages}
     stale = [f"`{name}`" for name, hash_ in hashes.items() if native.hash_bytes(hash_) not in data]
     if stale:
         yield f"is out of date: {first_few(stale, 3)} changed since"
     local = prefixes.distribution((prefix, *prefixes.ament_prefixes()))
     layout = LAYOUTS.get(local.name)
-    if layout is not None and library.stamp != native.identity_stamp(layout):
+    if layout is not None and stamp != native.identity_stamp(layout):
         yield f"is for a different ROS 2 distribution than {local.name} ({local.why})"

@@ -10,7 +10,7 @@ import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.package import Generated, generated, up_to_date, with_needs
+from idlc.generate.package import Generated, PlannedPackage, generated, up_to_date, with_needs
 from idlc.generate.target import (
     Output,
     Target,
@@ -24,7 +24,7 @@ from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
-from idlc.project.library import Library, Texts, resolve
+from idlc.project.library import InterfaceTexts, Library, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.requests import (
@@ -111,7 +111,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     paths = [word for word in others if not is_name(word, root)]
     words = [word for word in others if is_name(word, root)]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
-    texts: Texts = {}
+    texts: InterfaceTexts = {}
     if recordings and not report.had_errors:
         from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_packages
@@ -202,14 +202,13 @@ def named_packages(
 
 
 def _compile_and_write(
-    requested: Mapping[Target, inputs.Inputs], texts: Texts, options: GenOptions, report: Report
+    requested: Mapping[Target, inputs.Inputs],
+    texts: InterfaceTexts,
+    options: GenOptions,
+    report: Report,
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(requested.values()), options.scope, report, texts)
-    # files that another distribution accepts may have errors for this one
-    refusable = not library.distro.reads_optional and any(
-        OPTIONAL.encode() in file.data for package in requested.values() for file in package.files
-    )
-    if not (options.check or report.had_errors or refusable):
+    if not options.check and not report.had_errors and not _may_be_refused(requested, library):
         current = [
             up_to_date(target, package.digests, library, options.vendoring)
             for target, package in requested.items()
@@ -228,17 +227,29 @@ def _compile_and_write(
     if options.check:
         for package in packages:
             package.target.drift(package.plan, package.lock, options.again)
-    else:
-        stale = tuple(leftovers(packages))
-        removals = [(target, plan) for target, plan in stale if plan]
-        if len(removals) < len(stale):
-            return ()
-        if not all(package.target.apply(package.plan, package.lock) for package in packages):
-            return ()
-        if not all(target.remove(plan) for target, plan in removals):
-            return ()
+    elif not _write(packages):
+        return ()
     targets = requested if packages else ()
     return with_needs(map(generated, packages), targets, library.distro, report, options.again)
+
+
+def _may_be_refused(requested: Mapping[Target, inputs.Inputs], library: Library) -> bool:
+    """Return whether files that another distribution accepts may have errors for this one."""
+    if library.distro.reads_optional:
+        return False
+    files = (file for package in requested.values() for file in package.files)
+    return any(OPTIONAL.encode() in file.data for file in files)
+
+
+def _write(packages: Sequence[PlannedPackage]) -> bool:
+    """Write packages and remove what earlier runs left; return whether all of it was possible."""
+    stale = tuple(leftovers(packages))
+    removals = [(target, plan) for target, plan in stale if plan]
+    return (
+        len(removals) == len(stale)
+        and all(package.target.apply(package.plan, package.lock) for package in packages)
+        and all(target.remove(plan) for target, plan in removals)
+    )
 
 
 class Run(NamedTuple):

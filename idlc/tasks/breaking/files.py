@@ -5,7 +5,8 @@ from __future__ import annotations
 import datetime
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -237,6 +238,13 @@ class Side(NamedTuple):
         """The names of all interfaces, broken ones included."""
         return self.broken.union(own.name for own in self.interfaces)
 
+    def without(self, names: AbstractSet[str]) -> dict[str, Model]:
+        """Return the models with their interfaces, except those with these names."""
+        return {
+            package: model.only({own.name for own in model.own if str(own.name) not in names})
+            for package, model in self.models.items()
+        }
+
 
 def _compare(
     options: BreakingOptions, packages: Packages, revision: Revision | None, report: Report
@@ -254,13 +262,7 @@ def _compare(
     if revision:
         skipped += _outside(options, packages, before, after, revision)
     out = {name for each in skipped for name in each.names} | {*map(str, after.broken)}
-    old, new = (
-        {
-            package: model.only({own.name for own in model.own if str(own.name) not in out})
-            for package, model in side.models.items()
-        }
-        for side in (before, after)
-    )
+    old, new = before.without(out), after.without(out)
     with stage("compare", options.against):
         whole = combine(
             compare(*(side.get(package) or Model(package, (), {}) for side in (old, new)))
@@ -360,39 +362,56 @@ def _moved(
     if not missing:
         return (), []
     top = revision.top.as_posix()
-    whole = revision.files([top], scope.exclude, Report())
-    candidates: dict[str, list[tuple[Inputs, Sequence[InterfaceFile]]]] = {}
-    unnamed = msgspec.structs.replace(scope, package=None)
-    for files in by_home(whole, scope.root).values():
-        for package in inputs.packages(files, unnamed, Report()):
-            candidates.setdefault(package.package, []).append((package, files))
+    candidates = _candidates(revision, scope)
     present = {package.package for package in old}
     submodules = {*revision.unknown([top])}.difference(revision.unknown(options.paths))
     moved: list[InterfaceFile] = []
     skipped: list[Skipped] = []
-    for package in (each for each in packages if each.package in missing):
-        name, names = package.package, missing[package.package]
-        places = candidates.get(name, [])
+    for package in packages:
+        names = missing.get(package.package)
+        if names is None:
+            continue
+        places = candidates.get(package.package, [])
         if len(places) > 1:
             gone = [each for each in places if not revision.is_present(each[0].home)]
             places = gone if len(gone) == 1 else places
         listed = tuple(map(str, sorted(names)))
         if len(places) > 1:
             folders = " and ".join(f"`{revision.shown(each.home)}`" for each, _ in places)
-            skipped.append(Skipped(listed, f"package `{name}` is in {folders}"))
+            skipped.append(Skipped(listed, f"package `{package.package}` is in {folders}"))
         elif places:
-            home, own = places[0][0].home, places[0][1]
-            wanted = (
-                [] if name in present else [home / part for part in _parts(package, scope.root)]
-            )
-            for file in own:
-                is_missing = ir.TypeName(name, file.kind, file.name) in names
-                if is_missing or any(file.path.is_relative_to(part) for part in wanted):
-                    moved.append(file)
+            (earlier, files), parts = places[0], set[Path]()
+            if package.package not in present:
+                parts = _parts(package, scope.root)
+            moved += _moved_files(files, names, [earlier.home / part for part in parts])
         elif submodules:
             gone_from = first_few((f"`{each}`" for each in sorted(submodules)), NAMED)
             skipped.append(Skipped(listed, f"they may come from the submodule {gone_from}"))
     return tuple(moved), skipped
+
+
+def _candidates(
+    revision: Revision, scope: Scope
+) -> Mapping[str, list[tuple[Inputs, Sequence[InterfaceFile]]]]:
+    """Return the packages of a whole revision by name, with their files."""
+    files = revision.files([revision.top.as_posix()], scope.exclude, Report())
+    unnamed = msgspec.structs.replace(scope, package=None)
+    candidates: dict[str, list[tuple[Inputs, Sequence[InterfaceFile]]]] = {}
+    for group in by_home(files, scope.root).values():
+        for package in inputs.packages(group, unnamed, Report()):
+            candidates.setdefault(package.package, []).append((package, group))
+    return candidates
+
+
+def _moved_files(
+    files: Iterable[InterfaceFile], names: AbstractSet[ir.TypeName], parts: Collection[Path]
+) -> Iterator[InterfaceFile]:
+    """Yield the files with these interfaces, and all files in these parts of the package."""
+    for file in files:
+        package = next(iter(names)).package
+        is_missing = ir.TypeName(package, file.kind, file.name) in names
+        if is_missing or any(file.path.is_relative_to(part) for part in parts):
+            yield file
 
 
 def _parts(package: Inputs, root: Root) -> set[Path]:

@@ -25,7 +25,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.templates import RenderedFile, html, verbatim
 from idlc.project.write import apply, owned_files, plan
-from idlc.tasks.docs.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
+from idlc.tasks.docs.view import KINDS, Home, Pages, Paragraph, blocks, page, prefix, words
 from idlc.tasks.gen import is_name, named_packages
 
 
@@ -38,7 +38,7 @@ class About(NamedTuple):
     licenses: tuple[str, ...] = ()
 
 
-class Entry(NamedTuple):
+class ListingEntry(NamedTuple):
     """An interface in the list of its package, or a package among several."""
 
     page: str
@@ -48,23 +48,23 @@ class Entry(NamedTuple):
     about: str
 
 
-class Listing(NamedTuple):
+class ListingPage(NamedTuple):
     """The page of a package, or of several; `described`: some entry has a description."""
 
     title: str
     root: str
     words: Sequence[str]
-    description: Sequence[Block]
+    description: Sequence[Paragraph]
     facts: str
     described: bool
-    entries: Sequence[Entry]
+    entries: Sequence[ListingEntry]
 
 
 def _package_page(
     name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
-) -> Listing:
+) -> ListingPage:
     entries = [
-        Entry(
+        ListingEntry(
             pages[interface.name],
             words(interface.name.name),
             interface.name.kind,
@@ -79,7 +79,7 @@ def _package_page(
         "licence": ", ".join(about.licenses),
     }
     shown = [f"{label} {fact}" for label, fact in facts.items() if fact]
-    return Listing(
+    return ListingPage(
         title=name,
         root="../" * home.count("/"),
         words=words(name),
@@ -103,19 +103,19 @@ def first_line(interface: ir.Interface) -> str:
 
 
 #: The interfaces by package.
-Packages: TypeAlias = Mapping[str, Sequence[ir.Interface]]
+InterfacesByPackage: TypeAlias = Mapping[str, Sequence[ir.Interface]]
 #: The facts about packages by name.
 Abouts: TypeAlias = Mapping[str, About]
 
 
 def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
     """Yield the pages of all packages and of the interfaces that they use, with a search."""
-    sources: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
-    for model in models:
-        for name, interface in model.interfaces.items():
-            if interface.source is not None and (name not in sources or interface in model.own):
-                sources[name] = (interface, model)
+    sources = _with_sources(models)
     own = sorted({interface.name for model in models for interface in model.own})
+    users: dict[ir.TypeName, set[ir.TypeName]] = {}
+    for interface, _ in sources.values():
+        for target in derive.references(interface):
+            users.setdefault(target, set()).add(interface.name)
     pages = {name: f"{name.package}/{name.kind}-{name.name}.html" for name in sorted(sources)}
     packages = {
         package: tuple(sources[name][0] for name in names)
@@ -130,22 +130,16 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
         yield RenderedFile(home[package], template.render(page=shown))
     if len(packages) > 1:
         template = html().get_template("documents/index.html.jinja")
-        entries = []
-        for name, interfaces in packages.items():
-            own_facts = about.get(name, About())
-            version = [f"version {own_facts.version}"] if own_facts.version else []
-            line = " · ".join([*version, kind_counts(interfaces)])
-            entries.append(Entry(home[name], words(name), "", line, own_facts.description))
-        shown = Listing("Interfaces", "", (), (), "", True, entries)
+        entries = [
+            _package_entry(package, home[package], about.get(package, About()), interfaces)
+            for package, interfaces in packages.items()
+        ]
+        shown = ListingPage("Interfaces", "", (), (), "", True, entries)
         yield RenderedFile("index.html", template.render(page=shown))
     yield RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n")
     for path in ("search.js", "style.css"):
         yield RenderedFile(path, verbatim(f"documents/{path}"))
     template = html().get_template("documents/interface.html.jinja")
-    users: dict[ir.TypeName, set[ir.TypeName]] = {}
-    for interface, _ in sources.values():
-        for target in derive.references(interface):
-            users.setdefault(target, set()).add(interface.name)
     owners = {name: Home(home[name], about.get(name, About()).version) for name in home}
     for name, (interface, model) in sorted(sources.items()):
         owner = owners.get(name.package, Home())
@@ -153,7 +147,27 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
         yield RenderedFile(pages[name], text)
 
 
-def _index(packages: Packages, home: Mapping[str, str], pages: Pages, about: Abouts) -> str:
+def _with_sources(models: Sequence[Model]) -> dict[ir.TypeName, tuple[ir.Interface, Model]]:
+    """Return the interfaces that have a file, each with its model: that of its package, if any."""
+    sources: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
+    for model in models:
+        for name, interface in model.interfaces.items():
+            if interface.source is not None and (name not in sources or interface in model.own):
+                sources[name] = (interface, model)
+    return sources
+
+
+def _package_entry(
+    package: str, home: str, facts: About, interfaces: Sequence[ir.Interface]
+) -> ListingEntry:
+    version = [f"version {facts.version}"] if facts.version else []
+    line = " · ".join([*version, kind_counts(interfaces)])
+    return ListingEntry(home, words(package), "", line, facts.description)
+
+
+def _index(
+    packages: InterfacesByPackage, home: Mapping[str, str], pages: Pages, about: Abouts
+) -> str:
     """Return the search index: names, pages, descriptions and the items of each, as JSON."""
     entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []
     for package, interfaces in packages.items():
