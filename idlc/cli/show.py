@@ -178,15 +178,21 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
         sys.stdout.write(f"similar names: {sent} has no receiver, and {received} no sender\n")
 
 
-@click.command("show", epilog=options.example("idlc show geometry_msgs/msg/PoseStamped"))
+@click.command(
+    "show",
+    epilog=options.example(
+        "idlc show geometry_msgs/msg/PoseStamped", "idlc show std_msgs/msg/Header --format hash"
+    ),
+)
 @click.argument(
     "subject", metavar="TYPE|PATH|REC", type=click.Path(), shell_complete=completion.types_and_paths
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @options.output_style(
-    ("text", "json", "ros2idl", "jsonschema", "mcap", "msg"),
-    "Output format: text, JSON facts, IDL, JSON Schema, an MCAP schema, or the files of the "
-    "recorded definitions (see --out).",
+    ("text", "json", "hash", "type-description", "ros2idl", "jsonschema", "mcap", "msg"),
+    "Output format: text, JSON facts, type hashes (RIHS01), the type description that ROS 2 "
+    "installs as JSON, IDL, JSON Schema, an MCAP schema, or the files of the recorded definitions "
+    "(see --out).",
 )
 @click.option(
     "-o",
@@ -196,7 +202,7 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
     help="With --format msg, the folder to write a recording's .msg, .srv, .action and .idl files "
     "to: a package in each folder.",
 )
-@options.scoped(options.package, options.include, options.distro)
+@options.scoped(options.package, options.include, options.exclude, options.distro)
 def command(
     subject: str,
     topics: tuple[str, ...],
@@ -207,13 +213,15 @@ def command(
 ) -> None:
     """Show an interface with its nested messages and all comments.
 
-    REC is a recording: an .mcap or .db3 file, or a bag folder. For a recording, idlc lists each
-    topic with its type, message count and type hash, and shows whether your local type matches.
-    With TOPIC, it shows the recorded definitions of these topics.
+    For a recording, idlc lists each topic with its type, message count and type hash, and shows
+    whether your local type matches. With TOPIC, it shows the recorded definitions of these topics.
 
     REC can also be the address of a robot, such as `dds` or tcp/robot:7447. idlc lists the robot's
     topics, services and actions, and the nodes that use them. It also reports incompatible
     endpoints.
+
+    With --format hash, idlc prints the hashes of all TYPE, PATH and REC arguments, and for a
+    service or action those of the messages that ROS 2 derives from it.
     """
     from idlc.cli import output
     from idlc.project.find import is_address
@@ -230,7 +238,11 @@ def command(
         for path in write_definitions(read_source, subject, topics, out, scope, report):
             sys.stdout.write(f"{path}\n")
         return
-    if not is_of_recording:
+    if style == "hash" and not (topics and is_of_recording):
+        paint = output.painter(sys.stdout)
+        for value, name in show.hashes((subject, *topics), scope, report):
+            sys.stdout.write(f"{paint('value', value)}  {name}\n")
+    elif not is_of_recording:
         if topics:
             raise click.UsageError(
                 f"`{subject}` is not a recording; TOPIC selects from an .mcap or .db3 file or a bag"
