@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
@@ -22,6 +22,10 @@ from idlc.project.find import find, is_path
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
 from idlc.recordings.find import split_recordings
+
+if TYPE_CHECKING:
+    from idlc.recordings.definitions import RecordedDefinition
+    from idlc.recordings.types import LocalTypes
 
 
 def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
@@ -179,6 +183,30 @@ def qos_text(profiles: str) -> str:
     return ", ".join(texts)
 
 
+def _topic_facts(
+    recorded: RecordedDefinition,
+    compiled: str | None,
+    local: LocalTypes,
+    rate: float | None,
+    size: int | None,
+) -> TopicFacts:
+    """Return what is shown of a topic; `compiled` is the hash of its definition."""
+    topic = recorded.topic
+    hash_, here, local_hash = topic.hash or compiled, "unknown", None
+    if recorded.name and recorded.interface:
+        local_hash = local.hash(recorded.name, recorded.interface)
+    if local_hash and hash_:
+        here = "same" if local_hash == hash_ else "differs"
+    schema = topic.schema
+    if schema and schema.is_blank and not compiled:
+        schema = None
+    definition = None
+    if schema:
+        definition = schema.encoding or "unknown"
+    own = (topic.name, topic.type, topic.count, hash_, here, definition)
+    return TopicFacts(*own, rate, size, qos_text(topic.qos))
+
+
 def recording(
     path: str, scope: Scope, report: Report
 ) -> tuple[RecordingFacts | None, list[TopicFacts]]:
@@ -211,18 +239,9 @@ def recording(
         hashes = {id(typed.recorded): types.hash(typed) for typed in own}
         for recorded in version.topics:
             topic, compiled = recorded.topic, hashes.get(id(recorded))
-            hash_, here, local_hash = topic.hash or compiled, "unknown", None
-            if recorded.name and recorded.interface:
-                local_hash = local.hash(recorded.name, recorded.interface)
-            if local_hash and hash_:
-                here = "same" if local_hash == hash_ else "differs"
-            schema = topic.schema
-            if schema and schema.is_blank and not compiled:
-                schema = None
-            definition = schema.encoding or "unknown" if schema else None
             rate = (topic.count - 1) / seconds if seconds and topic.count > 1 else None
-            own_facts = (topic.name, topic.type, topic.count, hash_, here, definition)
-            facts.append(TopicFacts(*own_facts, rate, sizes.get(topic.name), qos_text(topic.qos)))
+            size_of_topic = sizes.get(topic.name)
+            facts.append(_topic_facts(recorded, compiled, local, rate, size_of_topic))
     facts.sort(key=lambda row: (row.name, row.type_name))
     if recording.summary is None:
         return None, facts

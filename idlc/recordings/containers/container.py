@@ -220,6 +220,11 @@ def open_recording(
     path = Path(path)
     if not path.is_dir():
         return Container(str(path), [opened(path)])
+    return _opened_bag(path, opened, strict)
+
+
+def _opened_bag(path: Path, opened: Callable[[Path], File], strict: bool) -> Container:
+    """Open the folder of a bag."""
     bag_files = bag.files_of(path)
     if strict and bag_files.missing:
         raise RecordingError(bag_files.missing[0].problem)

@@ -536,16 +536,9 @@ class _Surveyor:
         numbers = [done, *(cell.row for cell in cells), leaf.last + 1]
         is_ordered = all(row < following for row, following in pairwise(numbers))
         if is_ordered and not (broken or is_missing):
-            try:
-                for row in self.file.survey_rows(leaf.first, leaf.last):
-                    if not done < row[0] <= leaf.last:
-                        raise DamageError("its rows are not in order")
-                    done = self.add(*row)
-                # only a table without rows has a page without rows
-                if done >= leaf.first or (leaf.first, leaf.last) == (SMALLEST, LARGEST):
-                    return
-            except DamageError:
-                pass
+            done, is_whole = self.all_rows(leaf)
+            if is_whole:
+                return
         # where all rows were read, it is the next page that is damaged
         if not cells:
             self.gap.append(leaf)
@@ -556,6 +549,19 @@ class _Surveyor:
                 self.single(cell, leaf)
         if is_missing:
             self.gap.append(leaf)
+
+    def all_rows(self, leaf: Leaf) -> tuple[int, bool]:
+        """Read the rows of a page; return the last that was read, and whether all were."""
+        done = leaf.first - 1
+        try:
+            for row in self.file.survey_rows(leaf.first, leaf.last):
+                if not done < row[0] <= leaf.last:
+                    raise DamageError("its rows are not in order")
+                done = self.add(*row)
+        except DamageError:
+            return done, False
+        # only a table without rows has a page without rows
+        return done, done >= leaf.first or (leaf.first, leaf.last) == (SMALLEST, LARGEST)
 
     def single(self, cell: Cell, leaf: Leaf) -> None:
         """Read one row."""
