@@ -90,7 +90,7 @@ def test_definitions_are_written_as_files(files, capsys):
     assert (files / "defs/demo_msgs/msg/In.msg").read_text() == "float64 x\n"
     with idlc.Recording("a.mcap") as recording:
         digest = recording["/t"].structure.hash
-    assert main(["hash", "defs/demo_msgs"]) == 0
+    assert main(["show", "defs/demo_msgs", "--format", "hash"]) == 0
     assert digest in capsys.readouterr().out
     assert main(["show", "a.mcap", "/t", "--format", "msg", "-o", "defs"]) == 0
     (files / "defs/demo_msgs/msg/In.msg").write_text("mine\n")
