@@ -26,7 +26,7 @@ from idlc.recordings.containers.records import (
     Fields,
     read_records,
 )
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.source import DamageError
 from idlc.version import __version__
 
 
@@ -50,7 +50,7 @@ class Content:
         for (op, at, content), _ in every:
             if op == MESSAGE_OP:
                 if len(content) < LEAST:
-                    raise RecordingError("a message is cut off")
+                    raise DamageError("a message is cut off")
                 places.append(at)
             elif op in (SCHEMA_OP, CHANNEL_OP):
                 number = Fields(content, "a definition").number(2)
@@ -160,7 +160,7 @@ class McapWriter:
             names = [bytes(fields.part().data) for _ in range(2)]
             length = bytes(fields.read(8))
             if int.from_bytes(length, "little") + fields.at + 4 > size:
-                raise RecordingError("an attachment is cut off")
+                raise DamageError("an attachment is cut off")
             what = place + times + length + b"".join(map(text_field, names))
             self._index(records.ATTACHMENT_INDEX_OP, what)
         elif op == records.METADATA_OP:

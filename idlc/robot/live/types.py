@@ -28,11 +28,11 @@ from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.file import CDR, MSG, Schema, Topic
-from idlc.recordings.definition_text import mcap
 from idlc.recordings.definitions import (
     RecordedDefinition,
     TextCache,
     interface_of,
+    mcap_text,
     read_definition,
     type_name,
 )
@@ -215,7 +215,7 @@ def _local_text(compiler: Compiler, name: ir.TypeName, hash_: str, *, unsure: bo
     model = compiler.model(interface.package, list(reached.values()), report)
     is_same = model.hash(name) == hash_ or (unsure and not hash_ and interface in reached)
     is_sound = is_same and not report.had_errors
-    return mcap(model.interfaces[interface], model) if is_sound else None
+    return mcap_text(model.interfaces[interface], model) if is_sound else None
 
 
 def _questions(name: ir.TypeName, ends: Iterable[Entity]) -> Iterator[Question]:
@@ -251,6 +251,6 @@ def _definition(key: Key, answers: Mapping[Question, Answer]) -> tuple[str, str]
     for texts in sorted(candidates, key=lambda each: str(each.values()).count(INCOMPLETE)):
         if interface in texts:
             if linked := model_of_sources(texts, name, key[1]):
-                return mcap(linked.interfaces[interface], linked), ""
+                return mcap_text(linked.interfaces[interface], linked), ""
             problems.append("a node sends a definition with another type hash")
     return "", first_few(list(dict.fromkeys(problems)) or ["no node has its definition"], ASKED)
