@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 import numpy as np
 
-from idlc.recordings.containers.compression import missing
+from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, unread_reason
 from idlc.recordings.containers.messages import (
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
     from idlc.api.conditions import Condition
     from idlc.api.upgrade import Upgrade
+    from idlc.recordings.aligned.table import Aligned
     from idlc.recordings.load import TopicType
+    from idlc.runtime.typeinfo import Structure
 
 
 class Reading(NamedTuple):
@@ -218,6 +220,21 @@ class Selection:
                     _raise(error, self.topic, part[len(values)], done + len(values))
                 done += len(values)
 
+    @property
+    def read_type(self) -> Structure:
+        """The type that messages are read as."""
+        from idlc.recordings.columns.read import type_of
+
+        return type_of(self._source(None))
+
+    def table(self, batch: Messages, fields: Iterable[str] | None, numbers: Any = 0) -> pa.Table:
+        """Return the columns of some messages, whose `numbers` in the recording errors name."""
+        from idlc.recordings.columns import to_arrow
+
+        with _at(self.topic, batch.views, numbers):
+            messages = self._read_as(batch)
+            return to_arrow(self._source(None), messages, fields, flat=True, datetimes=True)
+
     def to_columns(
         self, kind: Any = None, *, fields: Iterable[str] | None = None, datetimes: bool = False
     ) -> Any:
@@ -300,15 +317,6 @@ def _table(source: Any, options: Any, batch: Messages | None = None) -> pa.Table
     return table
 
 
-def arrow() -> Any:
-    """Return pyarrow, or say how to install it."""
-    try:
-        import pyarrow
-    except ImportError:
-        raise missing("pyarrow", "tables are made by Arrow") from None
-    return pyarrow
-
-
 def _each(read: Callable[[Raw], Any], views: list[Raw]) -> tuple[list[Any], Exception | None]:
     """Return what is read of each message, up to the first that raises an error."""
     values: list[Any] = []
@@ -327,8 +335,11 @@ def _raise(error: Exception, topic: Topic, view: Raw, number: int) -> None:
 
 
 @contextmanager
-def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator[None]:
-    """Turn errors in messages into errors that name the message of the recording."""
+def _at(topic: Topic, views: Callable[[], list[Raw]], done: Any = 0) -> Iterator[None]:
+    """Turn errors in messages into errors that name the message of the recording.
+
+    `done` is the number of messages before them, or an array with the number of each.
+    """
     try:
         yield
     except ValueError as caught:
@@ -341,7 +352,8 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
         if why:
             raise RecordingError(*why) from error
         problem = f"{path}: {error.problem}" if path else error.problem
-        what = f"message {done + number} of `{topic.name}` is broken"
+        place = done + number if isinstance(done, int) else done[number]
+        what = f"message {place} of `{topic.name}` is broken"
         raise RecordingError(f"{what}: {problem} at byte {error.offset}") from error
 
 
@@ -435,6 +447,37 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
         reading = self._readings.get(topics[0].type)
         return RecordedTopic(self._container, topics[0], ALWAYS, self._include, reading)
+
+    def aligned(
+        self,
+        topics: Mapping[str, Any] | Iterable[str],
+        *,
+        on: str | None = None,
+        every: Any = None,
+        how: Any = "last",
+        tolerance: Any = None,
+        clock: Any = "log",
+        start: Any = None,
+        end: Any = None,
+    ) -> Aligned:
+        """Return a table with a row for each message of topic `on`, or `every` so often.
+
+        >>> topics = {"/camera/image": None, "/joint_states": ["position", "velocity"]}
+        >>> recording.aligned(topics, on="/camera/image", tolerance="50ms").to_arrow()
+
+        `topics` has the fields of each topic, None for all. The value of a tick is that of the
+        `last` message until then, or of the `nearest`, or `linear` between two. It is null without
+        a message within `tolerance`. The `clock` of messages is `log`, or `header` for the stamp of
+        their header. These three are for all topics, or a mapping has them by topic. Lengths of
+        time are `50ms`, `30Hz`, a timedelta, or an int in nanoseconds; `start` and `end` limit the
+        ticks, as for `between`.
+        """
+        from idlc.recordings.aligned.table import aligned
+
+        limits = [
+            None if time is None else moment(time, self._container.start) for time in (start, end)
+        ]
+        return aligned(self, topics, on, every, how, tolerance, clock, (limits[0], limits[1]))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
