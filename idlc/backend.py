@@ -15,10 +15,10 @@ from typing import Any
 
 #: Licences as expressions are known to hatchling since 1.27.
 BUILDER = "hatchling>=1.27,<2"
-Settings = Mapping[str, Any] | None
+ConfigSettings = Mapping[str, Any] | None
 
 
-def get_requires_for_build_wheel(config_settings: Settings = None) -> list[str]:  # noqa: ARG001
+def get_requires_for_build_wheel(config_settings: ConfigSettings = None) -> list[str]:  # noqa: ARG001
     """Return what must be installed besides idlc."""
     return [BUILDER]
 
@@ -27,7 +27,7 @@ get_requires_for_build_sdist = get_requires_for_build_wheel
 get_requires_for_build_editable = get_requires_for_build_wheel
 
 
-def build_sdist(sdist_directory: str, config_settings: Settings = None) -> str:
+def build_sdist(sdist_directory: str, config_settings: ConfigSettings = None) -> str:
     """Write the archive of the source folder, and return its name."""
     from idlc.build.hooks import archive, sdist
 
@@ -37,7 +37,7 @@ def build_sdist(sdist_directory: str, config_settings: Settings = None) -> str:
 
 def build_wheel(
     wheel_directory: str,
-    config_settings: Settings = None,
+    config_settings: ConfigSettings = None,
     metadata_directory: str | None = None,  # noqa: ARG001
 ) -> str:
     """Compile the package in the working folder into a wheel, and return its name.

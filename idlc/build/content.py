@@ -30,14 +30,16 @@ class Options(NamedTuple):
     libraries: bool = True
 
 
-class Content(NamedTuple):
+class PrefixContent(NamedTuple):
     """The files of the prefix by their paths in it; `libraries` are those among them."""
 
     prefix: Mapping[str, bytes]
     libraries: Libraries
 
 
-def compile_package(name: str, classes: Path, options: Options, report: Report) -> Content | None:
+def compile_package(
+    name: str, classes: Path, options: Options, report: Report
+) -> PrefixContent | None:
     """Compile the package in the working folder, its classes into a folder of their own.
 
     Returns `None` after a problem.
@@ -82,7 +84,7 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
         libraries = libraries_of(model, options.distribution)
     else:
         libraries = Libraries({}, "the build has the setting `libraries=no`", build_tag(model))
-    return Content(shared(model, manifest, libraries, report), libraries)
+    return PrefixContent(shared(model, manifest, libraries, report), libraries)
 
 
 def refuse_beside(config: Config, report: Report) -> None:

@@ -14,7 +14,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.plugin import hookimpl
 
 if TYPE_CHECKING:
-    from idlc.build.library import Library
+    from idlc.build.library import CompiledLibrary
     from idlc.diagnostics.report import Report
 
 #: The settings that hatchling itself reads of each hook.
@@ -44,7 +44,7 @@ class InterfacesHook(BuildHookInterface[BuilderConfig]):
         installed_path = self.build_config.get_distribution_path
         installed_path("")  # hatchling's errors about files to pack end the build as always
 
-        def build(report: Report) -> Library | None:
+        def build(report: Report) -> CompiledLibrary | None:
             for key in self.config.keys() - _SETTINGS:
                 message = f"unknown setting `{key}` of the build hook idlc"
                 hint = "write settings for idlc into [tool.idlc]"

@@ -53,7 +53,7 @@ sys.meta_path.append(Finder)
 _ARRAYS = b" import arrays as _arrays"
 
 
-class Library(NamedTuple):
+class CompiledLibrary(NamedTuple):
     """The classes of a library.
 
     `out` is their folder in the project, `module` the name by which that is imported, and `files`
@@ -76,7 +76,7 @@ def compile_library(
     installed_path: Callable[[str], str],
     requirements: Iterable[str],
     report: Report,
-) -> Library | None:
+) -> CompiledLibrary | None:
     """Compile the interfaces of a library into a folder; return `None` after a problem.
 
     `installed_path` returns the path below site-packages of a path in the project. `requirements`
@@ -115,7 +115,7 @@ def compile_library(
         message = "the classes have arrays, which need numpy, but [project] does not require it"
         hint = 'add "numpy" to `dependencies`'
         report.add(codes.UNDECLARED_IMPORT.of(SETTINGS_FILE, message, hint=hint))
-    return Library(Path(out).as_posix(), ".".join(parts), files)
+    return CompiledLibrary(Path(out).as_posix(), ".".join(parts), files)
 
 
 def _compiled_files(target: Path, committed: Path) -> Iterator[tuple[str, Path]]:

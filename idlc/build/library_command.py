@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from idlc.build.hooks import finished
-from idlc.build.library import Library, compile_library, sources
+from idlc.build.library import CompiledLibrary, compile_library, sources
 from idlc.diagnostics.report import Report
 from idlc.project.lock import FILE, load_lock
 
@@ -34,7 +34,7 @@ def build_command() -> type:
         package_dir = self.distribution.package_dir or {}
         with TemporaryDirectory(prefix="idlc-") as folder:
 
-            def build(report: Report) -> Library | None:
+            def build(report: Report) -> CompiledLibrary | None:
                 installed_path = partial(_installed_path, package_dir)
                 return compile_library(project, Path(folder), installed_path, requirements, report)
 
@@ -55,7 +55,7 @@ def build_command() -> type:
     return type("build_idlc", (base,), {**attributes, **named})
 
 
-def _install(library: Library, site: Path) -> None:
+def _install(library: CompiledLibrary, site: Path) -> None:
     """Copy files to where they are imported from, and remove those of an earlier build."""
     target = site.joinpath(*library.module.split("."))
     for lock_file in target.rglob(FILE):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -136,7 +137,12 @@ def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind:
 
 
 def _data_files_problem(
-    code: codes.Code, message: str, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
+    code: codes.DiagnosticCode,
+    message: str,
+    setup: Setup,
+    lines: Sequence[str],
+    *,
+    uses_glob: bool = False,
 ) -> Diagnostic:
     """Return a problem with the hint and the edits that add entries to `data_files`."""
     glob, imports = setup_edits.imported(setup, "glob", "glob") if uses_glob else ("glob", ())
@@ -178,7 +184,7 @@ def _missing_packages(package: _Package, view: Layout) -> Iterator[Diagnostic]:
     if view.installed.is_nothing:
         reason = "`packages` is not set, and setuptools does not choose among several folders"
     message = f"{reason}, so the build does not install the interface classes"
-    yield _packages_problem(view.installed.place, message, package, view)
+    yield _packages_problem(view.installed.place, message, package, view, missing)
 
 
 def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
@@ -195,49 +201,64 @@ def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
             continue
         is_support = support not in existing and f"{name}.".startswith(f"{support}.")
         if not (package.kinds and (is_support or name in generated)):  # or the build creates it
-            message = f"`packages` names `{name}`, but `{view.folder(name)}` does not exist"
-            yield _packages_problem(span_of(setup.source, item.node), message, package, view)
+            # no edit: in another copy the folder may exist, as a submodule's does
+            yield codes.CLASSES_NOT_INSTALLED.at(
+                span_of(setup.source, item.node),
+                f"`packages` names `{name}`, but `{view.folder(name)}` has no files",
+                hint="remove the name, or create the folder; for a git submodule, run "
+                "`git submodule update --init`",
+            )
 
 
-def _packages_problem(place: Span, message: str, package: _Package, view: Layout) -> Diagnostic:
-    """Return a problem with the edits that let setuptools find the `packages`."""
+def _packages_problem(
+    place: Span, message: str, package: _Package, view: Layout, missing: Sequence[str]
+) -> Diagnostic:
+    """Return a problem with the edits that add `missing` to what setuptools installs.
+
+    The edits keep every name and search that setup.py has.
+    """
     setup, code, name = package.setup, codes.CLASSES_NOT_INSTALLED, package.name
     root = view.roots.get("", "").removesuffix(".")
     where = f"'{root}', " if root else ""
     if place.source is not setup.source:
-        if view.installed and view.installed.finders:
-            hint = "change its `where`, `include` and `exclude` to match these packages"
-        elif place.source.path.endswith(".toml"):
-            # setuptools takes every folder below `where` for a package, tests and sources, too
-            where = f'where = ["{root}"]' if root else f'include = ["{name.partition(".")[0]}*"]'
-            hint = f"write `packages.find = {{ {where} }}` in [tool.setuptools]"
-        else:
-            also = f", and `where = {root}` in [options.packages.find]" if root else ""
-            hint = f"write `packages = find:`{also}"
+        hint = _config_hint(place, name, view, missing)
         return code.at(place, message, hint=hint)
     find, imports = setup_edits.imported(setup, "setuptools", "find_packages")
-    call = f"{find}({where}exclude=['test'])"
-    hint = f"write `packages={call}`"
-    listed = setup.list_of("packages")
+    patterns = [f"'{name}'"] * (name in missing) + [f"'{name}.*'"]
+    call = f"{find}({where}include=[{', '.join(patterns)}])"
+    hint = f"add `*{call}` to `packages`"
     target = setup.value(setup.arguments.get("packages"))
-    names = setup.texts(setup.arguments.get("packages"))
-    is_own = all(name and name.partition(".")[0] == package.name for name in names)
-    existing = view.packages(package.folders)
-    tops = {name for name, has_init in existing.items() if has_init and "." not in name}
+    listed = setup.list_of("packages")
     edits: tuple[Edit, ...] = ()
     if "packages" not in setup.arguments:
+        hint = f"write `packages={call}`"
         edits = setup_edits.argument(setup, f"packages={call}")
-    elif view.roots.keys() <= {""} and target is not None:
-        if (is_own or listed is None) and tops <= {package.name, "test"}:
-            text = call.replace("'", setup_edits.quote_of(setup.source, target))
-            edits = (Edit(Span(setup.source, *range_of(setup.source, target)), text),)
-        elif listed is not None:
-            own = f"*{find}({where}include=['{package.name}', '{package.name}.*'])"
-            edits = setup_edits.append_elements(setup.source, listed, [own])
-            hint = f"add `{own}` to `packages`"
+    elif not view.roots.keys() <= {""}:
+        pass  # the search would have to begin in several folders
+    elif listed is not None:
+        edits = setup_edits.append_elements(setup.source, listed, [f"*{call}"])
+    elif isinstance(target, ast.Call):
+        hint = f"add `+ {call}` to `packages`"
+        text = f" + {call}".replace("'", setup_edits.quote_of(setup.source, target))
+        edits = (setup_edits.insertion(setup.source, range_of(setup.source, target)[1], text),)
     hint += ", with `from setuptools import find_packages`" if imports else ""
     hint += ", or run `idlc check --fix`" if edits else ""
     return code.at(place, message, hint=hint, edits=(*imports, *edits) if edits else ())
+
+
+def _config_hint(place: Span, name: str, view: Layout, missing: Sequence[str]) -> str:
+    """Return what to write into a setup.cfg or pyproject.toml that omits packages."""
+    root = view.roots.get("", "").removesuffix(".")
+    if view.installed and view.installed.finders:
+        return "change its `where`, `include` and `exclude` to match these packages"
+    if view.installed and view.installed.names:
+        return f"add {enumerated([f'`{each}`' for each in missing])} to this list"
+    if place.source.path.endswith(".toml"):
+        # setuptools takes every folder below `where` for a package, tests and sources, too
+        where = f'where = ["{root}"]' if root else f'include = ["{name.partition(".")[0]}*"]'
+        return f"write `packages.find = {{ {where} }}` in [tool.setuptools]"
+    also = f", and `where = {root}` in [options.packages.find]" if root else ""
+    return f"write `packages = find:`{also}"
 
 
 def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:

@@ -12,9 +12,14 @@ from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
 from idlc.model.link import Model, own_fields
 from idlc.packaging.facts import Facts
+from idlc.packaging.neighbours import LIBRARIES
 from idlc.version import RUNTIME
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
+#: What rosdep adds to the name of a distribution of pip or Debian.
+_PIP = re.compile(r"^python3?-|-pip$")
+#: Folders and files of code that a node does not run.
+_ASIDE = frozenset("conftest example examples launch sample samples setup test tests".split())
 #: Packages that rosidl adds by itself.
 IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
 _GROUP = "rosidl_interface_packages"
@@ -26,7 +31,7 @@ RUNTIME_PACKAGES = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATOR
 def declared_dependencies(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """Packages whose messages are used are declared."""
     seen = may_use(facts)
-    existing = _packages_with_interfaces(model) | facts.available
+    existing = _packages_with_interfaces(model) | facts.available | {*LIBRARIES.values()}
     declared = facts.declared(*_NEEDED)
     unknown = [name for name in declared if name not in existing]
     for package, span in used_packages(model).items():
@@ -150,18 +155,40 @@ def declared_imports(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     from idlc.packaging.setup_py import imported_modules, span_of
 
     declared = {facts.name, *facts.declared(*_NEEDED, "test_depend")}
+    by_pip = {_PIP.sub("", name).replace("-", "_") for name in declared}
     used = used_packages(model)
-    for source in facts.modules.values():
+    for name, source in facts.modules.items():
+        if _is_test(name, facts.name):
+            continue
         for module, node in imported_modules(source):
-            package = module.partition(".")[0]
-            if package in facts.available and package not in declared:
-                declared.add(package)
-                tag = "depend" if package in used else "exec_depend"
-                message = f"`{facts.manifest.path}` does not declare `{package}`"
-                hint = f"add `<{tag}>{package}</{tag}>`"
-                edits = _additions(facts, (tag, package))
-                span = span_of(source, node)
-                yield codes.UNDECLARED_IMPORT.at(span, message, hint=hint, edits=edits)
+            top = module.partition(".")[0]
+            provided_by_pip = {top, f"py{top}"} & by_pip
+            packages = facts.providers.get(top, frozenset())
+            if top in facts.contained or provided_by_pip or packages & declared:
+                continue
+            if len(packages) != 1:  # it is of no ROS package, or of one that idlc would guess
+                continue
+            (package,) = packages
+            declared.add(package)
+            tag = "depend" if package in used else "exec_depend"
+            message = f"`{facts.manifest.path}` does not declare `{package}`"
+            message += f", which provides `{top}`" if package != top else ""
+            hint = f"add `<{tag}>{package}</{tag}>`"
+            edits = _additions(facts, (tag, package))
+            if package in facts.dependents:
+                hint = f"`{package}` depends on `{facts.name}`: move shared code to a third package"
+                edits = ()
+            yield codes.UNDECLARED_IMPORT.at(span_of(source, node), message, hint=hint, edits=edits)
+
+
+def _is_test(module: str, package: str) -> bool:
+    """Return whether a module is a test, an example or a launch file by its dotted name."""
+    first, *others = module.split(".")
+    parts = others if first == package else [first, *others]
+    return any(
+        part in _ASIDE or part.startswith("test_") or part.endswith(("_test", "_tests", "_launch"))
+        for part in parts
+    )
 
 
 def _additions(facts: Facts, *elements: tuple[str, str]) -> tuple[Edit, ...]:

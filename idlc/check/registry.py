@@ -41,7 +41,7 @@ def advise(model: Model, report: Report, incremental: IncrementalFindings | None
 
 def check_package(facts: Facts, model: Model, report: Report) -> None:
     """Report all warnings about the package of a model's interfaces; the caller selects."""
-    from idlc.check import cmake_lists, manifest
+    from idlc.check import builds, cmake_lists, manifest
 
     rules: list[PackageRule] = [
         manifest.declared_dependencies,
@@ -50,6 +50,7 @@ def check_package(facts: Facts, model: Model, report: Report) -> None:
         manifest.generators,
         manifest.declared_imports,
         cmake_lists.lists,
+        builds.obstacles,
     ]
     if facts.modules:
         from idlc.check import arguments

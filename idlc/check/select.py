@@ -16,7 +16,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import closest, did_you_mean
 from idlc.language import tree
 from idlc.language.parse import parse
-from idlc.project.settings import Config, Table, Texts, command_table, read_value
+from idlc.project.settings import Config, TableValue, TextsValue, command_table, read_value
 
 
 def is_selector(word: str) -> bool:
@@ -30,7 +30,7 @@ def similar_selector(word: str) -> str:
     return did_you_mean(word, known) or "`idlc explain` lists the codes"
 
 
-def _means(word: str, code: codes.Code) -> bool:
+def _means(word: str, code: codes.DiagnosticCode) -> bool:
     named = codes.find(word)
     if named is not None:
         return named is code
@@ -56,7 +56,7 @@ class Selection(msgspec.Struct, frozen=True):
         ignored = (*self.ignore, *(ignore.split(",") if ignore else ()))
         return Selection(chosen, ignored, self.per_path)
 
-    def has(self, code: codes.Code) -> bool:
+    def has(self, code: codes.DiagnosticCode) -> bool:
         """Return whether a code is switched on."""
         words = self.select
         chosen = code.default if words is None else any(_means(word, code) for word in words)
@@ -203,8 +203,8 @@ class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):
     """`[tool.idlc.check]`; without `select`, the default codes apply."""
 
     select: Annotated[tuple[str, ...] | None, Meta(title="a list of strings")] = None
-    ignore: Texts = ()
-    per_path: Table = {}
+    ignore: TextsValue = ()
+    per_path: TableValue = {}
 
 
 def selection(config: Config, report: Report) -> Selection:
@@ -214,7 +214,7 @@ def selection(config: Config, report: Report) -> Selection:
         return Selection()
     paths = place._replace(table=f"{place.table}.per-path", shown=f"[{place.table}.per-path]")
     per_path = {
-        path: read_value(words, Texts, path, paths, report) or ()
+        path: read_value(words, TextsValue, path, paths, report) or ()
         for path, words in table.per_path.items()
     }
     lists = [(place, "select", table.select or ()), (place, "ignore", table.ignore)]

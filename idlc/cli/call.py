@@ -41,10 +41,10 @@ def command(
 ) -> None:
     """Call a service of a robot and print the response.
 
-    ADDRESS is the endpoint of the robot's Zenoh router, such as tcp/robot:7447. FIELD=VALUE sets a
-    field of the request: write `goal.x=1.5`, for example. Write lists and messages as JSON, such as
-    `ids=[1,2]`. Other fields have their default values. idlc checks all values before it sends the
-    request.
+    ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447.
+    FIELD=VALUE sets a field of the request: write `goal.x=1.5`, for example. Write lists and
+    messages as JSON, such as `ids=[1,2]`. Other fields have their default values. idlc checks all
+    values before it sends the request.
     """
     from idlc.cli import messages, output
     from idlc.diagnostics import codes

@@ -51,9 +51,9 @@ def command(
 ) -> None:
     """Print the messages of a robot's topic as they arrive.
 
-    ADDRESS is the endpoint of the robot's Zenoh router, such as tcp/robot:7447. To use a Zenoh
-    configuration file instead, write zenoh:FILE. ROS_DOMAIN_ID selects the domain. idlc needs no
-    interface files, because the robot's nodes send the definition of the type.
+    ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447. To use a
+    Zenoh configuration file instead, write zenoh:FILE. ROS_DOMAIN_ID selects the domain. idlc needs
+    no interface files, because the robot's nodes send the definition of the type.
 
     In CSV, lists are JSON. In JSON, numbers that are not finite are null. On a terminal, YAML
     shows the first 16 elements of an array that has more than 32.

@@ -176,7 +176,7 @@ def document(
 
     With `strict`, warnings fail as errors do.
     """
-    from idlc.diagnostics.formats import DOCUMENTS, Run
+    from idlc.diagnostics.formats import DOCUMENTS, RunFacts
 
     with written_as(_FORMS.get(style, Form.EXACT), sys.stdout):
-        sys.stdout.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))
+        sys.stdout.write(DOCUMENTS[style](report, RunFacts(command, __version__, files, strict)))

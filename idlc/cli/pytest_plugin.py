@@ -35,7 +35,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     asked = parent.config.getoption("--idlc") or parent.config.getoption("--idlc-strict")
     if not asked or file_path.suffix not in SUFFIXES:
         return None
-    return InterfaceFile.from_parent(parent, path=file_path)
+    return InterfaceCollector.from_parent(parent, path=file_path)
 
 
 def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
@@ -74,7 +74,7 @@ def _short(value: object) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
-class InterfaceFile(pytest.File):
+class InterfaceCollector(pytest.File):
     """An interface file; it has one test."""
 
     def collect(self) -> Iterator[pytest.Item]:

@@ -37,9 +37,10 @@ def command(
 ) -> None:
     """Record topics of a robot into an MCAP file.
 
-    ADDRESS is the endpoint of the robot's Zenoh router, such as tcp/robot:7447. Without TOPIC, idlc
-    records all topics except the topics of actions, and adds topics that appear later. The file
-    contains the definitions of all types. `idlc columns`, rosbag2 and Foxglove can read it.
+    ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447. Without
+    TOPIC, idlc records all topics except the topics of actions, and adds topics that appear later.
+    The file contains the definitions of all types. `idlc columns`, rosbag2 and Foxglove can read
+    it.
     """
     import time
 

@@ -153,8 +153,9 @@ def command(
     topic with its type, message count and type hash, and shows whether your local type matches.
     With TOPIC, it shows the recorded definitions of these topics.
 
-    REC can also be the address of a robot, such as tcp/robot:7447. idlc lists the robot's topics,
-    services and actions, and the nodes that use them. It also reports incompatible endpoints.
+    REC can also be the address of a robot, such as `dds` or tcp/robot:7447. idlc lists the robot's
+    topics, services and actions, and the nodes that use them. It also reports incompatible
+    endpoints.
     """
     from idlc.cli import output
     from idlc.project.find import is_address

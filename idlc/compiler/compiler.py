@@ -17,7 +17,7 @@ from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.model import derive, ir
 from idlc.project import inputs
-from idlc.project.library import Library, Texts
+from idlc.project.library import InterfaceTexts, Library
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def library_for(
     packages: Sequence[inputs.Inputs],
     scope: Scope,
     report: Report,
-    texts: Texts = MappingProxyType({}),
+    texts: InterfaceTexts = MappingProxyType({}),
     kind: Callable[..., Library] = Library,
 ) -> Library:
     """Return the library, of a `kind`, in which compiled packages look up their references."""

@@ -7,7 +7,7 @@ from enum import Enum
 from typing import NamedTuple
 
 
-class Place(Enum):
+class LinePart(Enum):
     """The part of a line in which a CI system looks for a prefix."""
 
     ANYWHERE = "anywhere"
@@ -15,31 +15,40 @@ class Place(Enum):
     START = "start"
 
 
-class Prefix(NamedTuple):
+class CommandPrefix(NamedTuple):
     """Text that begins a command of a CI system."""
 
     text: str
-    place: Place
+    place: LinePart
 
 
 #: The prefixes of commands by CI system.
 SYSTEMS = {
-    "Azure Pipelines": (Prefix("##vso[", Place.ANYWHERE), Prefix("##[", Place.ANYWHERE)),
-    "GitHub Actions": (Prefix("::", Place.START), Prefix("##[", Place.ANYWHERE)),
-    "GitLab CI": (
-        Prefix("section_start:", Place.ANYWHERE),
-        Prefix("section_end:", Place.ANYWHERE),
+    "Azure Pipelines": (
+        CommandPrefix("##vso[", LinePart.ANYWHERE),
+        CommandPrefix("##[", LinePart.ANYWHERE),
     ),
-    "TeamCity": (Prefix("##teamcity[", Place.ANYWHERE),),
-    "Travis CI": (Prefix("travis_fold:", Place.ANYWHERE), Prefix("travis_time:", Place.ANYWHERE)),
+    "GitHub Actions": (
+        CommandPrefix("::", LinePart.START),
+        CommandPrefix("##[", LinePart.ANYWHERE),
+    ),
+    "GitLab CI": (
+        CommandPrefix("section_start:", LinePart.ANYWHERE),
+        CommandPrefix("section_end:", LinePart.ANYWHERE),
+    ),
+    "TeamCity": (CommandPrefix("##teamcity[", LinePart.ANYWHERE),),
+    "Travis CI": (
+        CommandPrefix("travis_fold:", LinePart.ANYWHERE),
+        CommandPrefix("travis_time:", LinePart.ANYWHERE),
+    ),
 }
 _PREFIXES = sorted({prefix for every in SYSTEMS.values() for prefix in every})
 #: Characters that end a line for some program.
 _ENDS = "\n\r\v\f\x1c-\x1e\x85\u2028\u2029"
 
 
-def _pattern(*places: Place) -> re.Pattern[str]:
-    starts = {Place.ANYWHERE: "", Place.START: rf"(?:(?<![^{_ENDS}])[^\S{_ENDS}]*)"}
+def _pattern(*places: LinePart) -> re.Pattern[str]:
+    starts = {LinePart.ANYWHERE: "", LinePart.START: rf"(?:(?<![^{_ENDS}])[^\S{_ENDS}]*)"}
     # after `::`, a colon is no name of a command
     parts = (
         f"{starts[prefix.place]}{re.escape(prefix.text[0])}(?={re.escape(prefix.text[1:])}(?!:))"
@@ -49,8 +58,8 @@ def _pattern(*places: Place) -> re.Pattern[str]:
     return re.compile("|".join(parts), re.IGNORECASE)
 
 
-_EVERYWHERE = _pattern(*Place)
-_INSIDE = _pattern(Place.ANYWHERE)
+_EVERYWHERE = _pattern(*LinePart)
+_INSIDE = _pattern(LinePart.ANYWHERE)
 
 
 class Form(Enum):

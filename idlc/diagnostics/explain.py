@@ -9,7 +9,7 @@ from importlib.resources import files
 from itertools import groupby
 from operator import attrgetter
 
-from idlc.diagnostics.codes import CATEGORIES, CODES, Code, find
+from idlc.diagnostics.codes import CATEGORIES, CODES, DiagnosticCode, find
 from idlc.diagnostics.text import closest
 
 SECTIONS = ("## Why", "## Bad", "## Good")
@@ -87,13 +87,13 @@ def overview() -> Iterator[str]:
     yield "Run `idlc explain IDL201` or `idlc explain unknown-type` to read about a rule."
 
 
-def _by_heading() -> Iterator[tuple[str, Iterator[Code]]]:
+def _by_heading() -> Iterator[tuple[str, Iterator[DiagnosticCode]]]:
     starts = [*_HEADINGS]
     codes = sorted(CODES.values(), key=attrgetter("id"))
     return groupby(codes, lambda code: _HEADINGS[starts[bisect(starts, int(code.id[3:])) - 1]])
 
 
-def _section(code: Code) -> str:
+def _section(code: DiagnosticCode) -> str:
     """Return a page with its headings two levels down, and how bad it is."""
     title, _, body = (page(code.id) or f"# {code.id} {code.slug}\n").partition("\n")
     body = re.sub(r"(?m)^## (.*)$", r"**\1**", body)

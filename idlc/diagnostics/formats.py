@@ -18,7 +18,7 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import one_line
 
 
-class Run(NamedTuple):
+class RunFacts(NamedTuple):
     """The facts of a document besides problems: the command, idlc's version and the files read.
 
     With `strict`, warnings fail as errors do.
@@ -30,7 +30,7 @@ class Run(NamedTuple):
     strict: bool = False
 
 
-def github(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+def github(diagnostics: Iterable[Diagnostic], _: RunFacts) -> str:
     """Return one command for each problem."""
     return "".join(map(_command, diagnostics))
 
@@ -65,7 +65,7 @@ def _property(text: str) -> str:
     return _escaped(text).replace(":", "%3A").replace(",", "%2C")
 
 
-def gitlab(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+def gitlab(diagnostics: Iterable[Diagnostic], _: RunFacts) -> str:
     """Return the JSON document."""
     seen: dict[str, int] = {}
     issues = []
@@ -96,7 +96,7 @@ def fingerprint(diagnostic: Diagnostic, seen: dict[str, int]) -> str:
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def junit(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+def junit(diagnostics: Iterable[Diagnostic], run: RunFacts) -> str:
     """Return the XML document: a test for each problem, and a passed one for each clean file.
 
     A warning is a passed test with output, unless it fails the run as well: servers would fail a
@@ -146,7 +146,7 @@ def _legal(text: str) -> str:
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+def sarif(diagnostics: Iterable[Diagnostic], run: RunFacts) -> str:
     """Return the JSON document; services keep those of several commands apart."""
     reported = list(diagnostics)
     codes = sorted({diagnostic.code for diagnostic in reported})

@@ -11,6 +11,9 @@ from functools import cached_property
 from itertools import accumulate
 from typing import NamedTuple
 
+#: The last line of a text that a node sent incomplete.
+INCOMPLETE = "# idlc: constants, default values and comments of this type may be missing"
+
 
 class Source:
     """One file's exact text. Compared by identity; messages show `path`.
@@ -30,6 +33,11 @@ class Source:
     def is_idl(self) -> bool:
         """True for IDL, which ROS 2 makes from interface files, instead of an interface file."""
         return self.path.endswith(".idl")
+
+    @cached_property
+    def is_incomplete(self) -> bool:
+        """True if constants and default values may be missing; never for a file of its own."""
+        return self.file != self.path and self.text.rstrip().endswith(INCOMPLETE)
 
     @cached_property
     def lines(self) -> tuple[str, ...]:

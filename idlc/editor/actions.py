@@ -34,7 +34,7 @@ _OTHER_FILE = re.compile(r"call it `((\w+)\.\w+)`")
 MOST = 3
 
 
-class CodeAction(parts.Part, frozen=True):
+class CodeAction(parts.ProtocolStruct, frozen=True):
     """A code action."""
 
     title: str
@@ -182,7 +182,7 @@ NAMED = 5
 _ERROR, _INFO = 1, 3
 
 
-def execute(state: ServerState, params: parts.Command) -> None:
+def execute(state: ServerState, params: parts.CommandParams) -> None:
     """Run a command."""
     match params.command, *params.arguments:
         case protocol.ADD_DEPENDENCY, str(uri), str(package):

@@ -18,7 +18,7 @@ from idlc.diagnostics.terminal import counted
 from idlc.editor.descriptions import code, markdown
 from idlc.editor.documents import Document, characters, in_lines, lines_of, units
 from idlc.editor.elements import has_letters
-from idlc.editor.parts import Part, Position, PositionParams, Range, TextEdit
+from idlc.editor.parts import Position, PositionParams, ProtocolStruct, Range, TextEdit
 from idlc.editor.protocol import ADD_DEPENDENCY
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Workspace
@@ -84,7 +84,7 @@ _AGAIN: dict[str, object] = {"title": "types", "command": "editor.action.trigger
 MOST = 200
 
 
-class Item(Part, frozen=True):
+class CompletionEntry(ProtocolStruct, frozen=True):
     """A completion item."""
 
     label: str
@@ -158,7 +158,7 @@ def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
     return item
 
 
-def _items(typed: TypedLine) -> Iterator[Item]:
+def _items(typed: TypedLine) -> Iterator[CompletionEntry]:
     code, sign, comment = typed.before.partition("#")
     words = code.removeprefix("@optional").lstrip().split(maxsplit=2)
     if sign:
@@ -173,16 +173,16 @@ def _items(typed: TypedLine) -> Iterator[Item]:
         if "/" in words[0] or words[0][:1].isupper():  # the usual name for a field of it
             name = names.snake_case(words[0].rpartition("/")[2].partition("[")[0])
             word = words[1] if len(words) == 2 else ""
-            yield Item(name, _FIELD, typed.replacing(len(word), name))
+            yield CompletionEntry(name, _FIELD, typed.replacing(len(word), name))
     else:
         yield from _values(typed, words[0], words[2] if len(words) == 3 else "", words[1])
 
 
-def _types(typed: TypedLine, word: str) -> Iterator[Item]:
+def _types(typed: TypedLine, word: str) -> Iterator[CompletionEntry]:
     """Yield completions of the first word of a line."""
     if bound := re.fullmatch(r"\S*(?:<=|\[)(\d*)", word):
         for size in BOUNDS:
-            yield Item(size, _VALUE, typed.replacing(len(bound[1]), size))
+            yield CompletionEntry(size, _VALUE, typed.replacing(len(bound[1]), size))
         return
     if word and not (word[0].isalpha() and word.isascii()):
         return
@@ -196,20 +196,22 @@ def _types(typed: TypedLine, word: str) -> Iterator[Item]:
     own = inputs.package
     for type_ in (*ir.PRIMITIVES, *STRINGS):
         size = counted(ir.PRIMITIVES[type_].size, "byte") if type_ in ir.PRIMITIVES else "text"
-        yield Item(type_, _KEYWORD, typed.replacing(len(word), type_), size, f"1{type_}")
+        yield CompletionEntry(type_, _KEYWORD, typed.replacing(len(word), type_), size, f"1{type_}")
     for message in library.names(own):
         if (file.kind, file.name) != ("msg", message):
             yield _type(typed, word, message, own, "0")
     for other in filter(library.names, library.packages()):
         edit = typed.replacing(len(word), f"{other}/")
-        yield Item(f"{other}/", _MODULE, edit, sort_text=f"3{other}", command=_AGAIN)
+        yield CompletionEntry(f"{other}/", _MODULE, edit, sort_text=f"3{other}", command=_AGAIN)
     if word:
         yield from _elsewhere(typed, word, own)
     if not typed.before and file.kind != "msg":
-        yield Item("---", _SNIPPET, typed.replacing(len(word), "---\n"), "the next section", "4")
+        yield CompletionEntry(
+            "---", _SNIPPET, typed.replacing(len(word), "---\n"), "the next section", "4"
+        )
 
 
-def _elsewhere(typed: TypedLine, word: str, own: str) -> Iterator[Item]:
+def _elsewhere(typed: TypedLine, word: str, own: str) -> Iterator[CompletionEntry]:
     """Yield messages of other packages by their names alone."""
     count = 0
     library = typed.workspace.library
@@ -224,14 +226,14 @@ def _elsewhere(typed: TypedLine, word: str, own: str) -> Iterator[Item]:
 
 def _type(
     typed: TypedLine, word: str, text: str, package: str, rank: str, looked_for: str = ""
-) -> Item:
+) -> CompletionEntry:
     """Return a message; if its package is not declared yet, package.xml is edited afterwards."""
     uri = typed.document.uri
     command: dict[str, object] | None = None
     if typed.state.supports("workspace", "applyEdit") and typed.lacks(package):
         title = f"Declare {package} in package.xml"
         command = {"title": title, "command": ADD_DEPENDENCY, "arguments": [uri, package]}
-    return Item(
+    return CompletionEntry(
         text,
         _STRUCT,
         typed.replacing(len(word), text),
@@ -243,27 +245,31 @@ def _type(
     )
 
 
-def _values(typed: TypedLine, type_: str, word: str, name: str) -> Iterator[Item]:
+def _values(typed: TypedLine, type_: str, word: str, name: str) -> Iterator[CompletionEntry]:
     """Yield values that fit a type, the constants of the section for a field first."""
     constants = suggested_constants(typed.lines, typed.line, type_) if name else ()
     for constant, value, is_deprecated in constants:
         edit, tags = typed.replacing(len(word), value), _DEPRECATED if is_deprecated else ()
         sort, filtered = f"0{constant}", f"{value} {constant}"
-        yield Item(constant, _VALUE, edit, value, sort, filtered, tags=tags)
+        yield CompletionEntry(constant, _VALUE, edit, value, sort, filtered, tags=tags)
     for number, value in enumerate(suggested_values(type_)):
-        yield Item(value, _VALUE, typed.replacing(len(word), value), sort_text=f"1{number}")
+        yield CompletionEntry(
+            value, _VALUE, typed.replacing(len(word), value), sort_text=f"1{number}"
+        )
 
 
-def _in_comment(typed: TypedLine, comment: str, words: list[str]) -> Iterator[Item]:
+def _in_comment(typed: TypedLine, comment: str, words: list[str]) -> Iterator[CompletionEntry]:
     if ignored := re.search(r"idlc:\s*ignore[\[(]\s*([\w, ]*)$", comment):
         word = ignored[1].rpartition(",")[2].strip()
         for code in CODES.values():
             if code.severity is Severity.WARNING:
-                yield Item(code.id, _VALUE, typed.replacing(len(word), code.id), code.slug)
+                yield CompletionEntry(
+                    code.id, _VALUE, typed.replacing(len(word), code.id), code.slug
+                )
     elif bracket := re.search(r"\[([^\[\]]*)$", comment):
         name = words[1] if len(words) > 1 else ""
         own = expects_unit(name)  # comes first
         others = sorted(set(QUANTITIES.values()))
         for number, unit in enumerate(dict.fromkeys((*([own] if own else []), *others))):
             edit = typed.replacing(len(bracket[1]), unit)
-            yield Item(unit, _UNIT, edit, sort_text=f"{number:03}")
+            yield CompletionEntry(unit, _UNIT, edit, sort_text=f"{number:03}")

@@ -17,7 +17,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from idlc.diagnostics.source import Source
-from idlc.editor.parts import Change, DocumentItem, Position, Range
+from idlc.editor.parts import ContentChange, DocumentItem, Position, Range
 from idlc.language.tree import BYTE_ORDER_MARK
 from idlc.model import ir
 from idlc.project.atomic import write_whole
@@ -163,7 +163,7 @@ class Document:
             return False
         return self.path is None or digest(data.removeprefix(BOM_UTF8)) == digest(self.data)
 
-    def change(self, changes: Iterable[Change], encoding: str) -> None:
+    def change(self, changes: Iterable[ContentChange], encoding: str) -> None:
         """Apply changes in order."""
         for change in changes:
             start, end = 0, len(self.text)

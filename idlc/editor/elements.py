@@ -69,10 +69,10 @@ def workspace_edit(
     return {"documentChanges": changes, **notes}
 
 
-Part: TypeAlias = Literal["type", "name", "value", "comment"]
+DeclarationPart: TypeAlias = Literal["type", "name", "value", "comment"]
 
 
-class Element(NamedTuple):
+class Declaration(NamedTuple):
     """A definition: its line, the line's syntax tree, and the field or constant, if it is valid.
 
     `message` is the structure of its section.
@@ -129,12 +129,12 @@ class Element(NamedTuple):
 class Spot(NamedTuple):
     """A part of a definition."""
 
-    element: Element
-    part: Part
+    element: Declaration
+    part: DeclarationPart
     span: Span
 
 
-def elements(context: InterfaceContext) -> Iterator[Element]:
+def elements(context: InterfaceContext) -> Iterator[Declaration]:
     """Yield the definitions of a file in order; lines that are none are left out."""
     file = parse(context.source)
     parts = derive.sections(context.interface)
@@ -150,7 +150,7 @@ def elements(context: InterfaceContext) -> Iterator[Element]:
             body = parse_definition(code.definition)
             if not isinstance(body, tree.Fault):
                 meaning = meanings.get(code.start + body.name.start)
-                yield Element(context.source, code, body, message, meaning)
+                yield Declaration(context.source, code, body, message, meaning)
 
 
 def comments(context: InterfaceContext) -> Iterator[tuple[tree.Line, Span]]:
@@ -171,7 +171,7 @@ def spot_at(context: InterfaceContext, position: Position) -> Spot | None:
     for element in elements(context):
         if not element.line.start <= offset <= element.comment.end:
             continue
-        parts: list[tuple[Part, Span | None]] = [
+        parts: list[tuple[DeclarationPart, Span | None]] = [
             ("name", element.name),
             ("type", element.span(element.body.type.whole)),
             ("value", element.value),

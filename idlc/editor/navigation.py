@@ -11,7 +11,7 @@ from idlc.check.manifest import declaration
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.editor.documents import TOP
-from idlc.editor.elements import Element, comments, elements, spot_at, users, uses
+from idlc.editor.elements import Declaration, comments, elements, spot_at, users, uses
 from idlc.editor.parts import Location, PositionParams, ReferenceParams, Uri
 from idlc.editor.protocol import INVALID_PARAMS, RequestError
 from idlc.editor.state import InterfaceContext, ServerState
@@ -48,7 +48,9 @@ def _packages(source: Source) -> Iterator[tuple[str, Span]]:
                 yield statement.text, Span(source, start, start + len(statement.text))
 
 
-def _subject_at(context: InterfaceContext, params: PositionParams) -> Element | ir.TypeName | None:
+def _subject_at(
+    context: InterfaceContext, params: PositionParams
+) -> Declaration | ir.TypeName | None:
     """Return the definition at a position, or the interface that is named there.
 
     Between definitions, that is the file's interface.
@@ -77,7 +79,7 @@ def definition(state: ServerState, params: PositionParams) -> Location | None:
     subject = _subject_at(context, params) if context else None
     if context is None or subject is None:
         return None
-    if isinstance(subject, Element):
+    if isinstance(subject, Declaration):
         return state.location(subject.name, context.snapshot.folder)
     return _top(subject, context.snapshot, state)
 
@@ -85,7 +87,7 @@ def definition(state: ServerState, params: PositionParams) -> Location | None:
 def type_definition(context: InterfaceContext, params: PositionParams) -> Location | None:
     """Return the definition of the type of the field at a position."""
     subject = _subject_at(context, params)
-    target = subject.target if isinstance(subject, Element) else subject
+    target = subject.target if isinstance(subject, Declaration) else subject
     return _top(target, context.snapshot, context.state) if target else None
 
 
@@ -105,7 +107,7 @@ def references(state: ServerState, params: ReferenceParams) -> list[Location]:
     if context is None or subject is None:
         return []
     snapshot = context.snapshot
-    if isinstance(subject, Element):
+    if isinstance(subject, Declaration):
         spans = [*mentions(subject, context)][0 if declared else 1 :]
         return [state.location(span, snapshot.folder) for span in spans]
     first = _top(subject, snapshot, state) if declared else None
@@ -138,7 +140,7 @@ def _uses_of_package(package: str, state: ServerState, *, declared: bool) -> lis
     return locations
 
 
-def mentions(element: Element, context: InterfaceContext) -> Iterator[Span]:
+def mentions(element: Declaration, context: InterfaceContext) -> Iterator[Span]:
     """Yield the definition of a field or constant, and its mentions in comments of the file.
 
     Comments mention constants by name. Field names are often words, so they need backticks.
@@ -162,7 +164,7 @@ def highlights(context: InterfaceContext, params: PositionParams) -> list[dict[s
     subject = _subject_at(context, params)
     if subject is None:
         return []
-    if isinstance(subject, Element):
+    if isinstance(subject, Declaration):
         spans, first = [*mentions(subject, context)], _WRITE
     else:
         spans, first = [e.type for e in elements(context) if e.target == subject], _READ

@@ -10,42 +10,42 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-Number = Annotated[int, Meta(ge=0)]
+UInteger = Annotated[int, Meta(ge=0)]
 
 
-class Part(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
+class ProtocolStruct(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
     """A part of a message, encoded in camel case and without values that are defaults."""
 
 
-class Position(Part, frozen=True, order=True):
+class Position(ProtocolStruct, frozen=True, order=True):
     """A place in a document: line and character from 0, in units of the agreed encoding."""
 
-    line: Number
-    character: Number
+    line: UInteger
+    character: UInteger
 
 
-class Range(Part, frozen=True):
+class Range(ProtocolStruct, frozen=True):
     """From one position up to another."""
 
     start: Position
     end: Position
 
 
-class Location(Part, frozen=True):
+class Location(ProtocolStruct, frozen=True):
     """A range in a document."""
 
     uri: str
     range: Range
 
 
-class TextEdit(Part, frozen=True):
+class TextEdit(ProtocolStruct, frozen=True):
     """A range and the text that replaces it."""
 
     range: Range
     new_text: str
 
 
-class Uri(Part, frozen=True):
+class Uri(ProtocolStruct, frozen=True):
     """A document, file or folder."""
 
     uri: str
@@ -57,7 +57,7 @@ class VersionedUri(Uri, frozen=True):
     version: int | None = None
 
 
-class DocumentItem(Part, frozen=True):
+class DocumentItem(ProtocolStruct, frozen=True):
     """A document with its text."""
 
     uri: str
@@ -66,20 +66,20 @@ class DocumentItem(Part, frozen=True):
     text: str
 
 
-class Change(Part, frozen=True):
+class ContentChange(ProtocolStruct, frozen=True):
     """A new text for a range, or for the whole document."""
 
     text: str
     range: Range | None = None
 
 
-class DidOpen(Part, frozen=True):
+class DidOpen(ProtocolStruct, frozen=True):
     """textDocument/didOpen."""
 
     text_document: DocumentItem
 
 
-class DocumentParams(Part, frozen=True):
+class DocumentParams(ProtocolStruct, frozen=True):
     """The parameters of a request about a whole document."""
 
     text_document: VersionedUri
@@ -88,7 +88,7 @@ class DocumentParams(Part, frozen=True):
 class DidChange(DocumentParams, frozen=True):
     """textDocument/didChange."""
 
-    content_changes: tuple[Change, ...]
+    content_changes: tuple[ContentChange, ...]
 
 
 class PositionParams(DocumentParams, frozen=True):
@@ -109,7 +109,7 @@ class RangeParams(DocumentParams, frozen=True):
     range: Range
 
 
-class ReferenceContext(Part, frozen=True):
+class ReferenceContext(ProtocolStruct, frozen=True):
     """The context of a request for references, which may include the definition."""
 
     include_declaration: bool = True
@@ -121,7 +121,7 @@ class ReferenceParams(PositionParams, frozen=True):
     context: ReferenceContext = ReferenceContext()
 
 
-class ActionContext(Part, frozen=True):
+class ActionContext(ProtocolStruct, frozen=True):
     """The kinds of actions that are requested; all without `only`."""
 
     only: tuple[str, ...] | None = None
@@ -145,39 +145,39 @@ class PreviousResult(Uri, frozen=True):
     value: str
 
 
-class WorkspaceDiagnosticParams(Part, frozen=True):
+class WorkspaceDiagnosticParams(ProtocolStruct, frozen=True):
     """workspace/diagnostic."""
 
     previous_result_ids: tuple[PreviousResult, ...] = ()
 
 
-class WorkspaceSymbolParams(Part, frozen=True):
+class WorkspaceSymbolParams(ProtocolStruct, frozen=True):
     """workspace/symbol."""
 
     query: str = ""
 
 
-class FileRename(Part, frozen=True):
+class FileRename(ProtocolStruct, frozen=True):
     """The old and the new URI of a file."""
 
     old_uri: str
     new_uri: str
 
 
-class RenameFilesParams(Part, frozen=True):
+class RenameFilesParams(ProtocolStruct, frozen=True):
     """workspace/willRenameFiles."""
 
     files: tuple[FileRename, ...]
 
 
-class Command(Part, frozen=True):
+class CommandParams(ProtocolStruct, frozen=True):
     """workspace/executeCommand."""
 
     command: str
     arguments: tuple[Any, ...] = ()
 
 
-class Lens(Part, frozen=True):
+class Lens(ProtocolStruct, frozen=True):
     """A text above a line; it gets its `command`, which has the text, when it is shown."""
 
     range: Range
@@ -189,7 +189,7 @@ class Lens(Part, frozen=True):
 CompletionItem = dict[str, Any]
 
 
-class Initialize(Part, frozen=True):
+class Initialize(ProtocolStruct, frozen=True):
     """A client's capabilities, settings and folders."""
 
     root_uri: str | None = None
@@ -198,26 +198,26 @@ class Initialize(Part, frozen=True):
     workspace_folders: tuple[Uri, ...] | None = None
 
 
-class FolderChanges(Part, frozen=True):
+class FolderChanges(ProtocolStruct, frozen=True):
     """The folders that were added to the workspace, and the removed ones."""
 
     added: tuple[Uri, ...]
     removed: tuple[Uri, ...]
 
 
-class DidChangeFolders(Part, frozen=True):
+class DidChangeFolders(ProtocolStruct, frozen=True):
     """workspace/didChangeWorkspaceFolders."""
 
     event: FolderChanges
 
 
-class DidChangeFiles(Part, frozen=True):
+class DidChangeFiles(ProtocolStruct, frozen=True):
     """workspace/didChangeWatchedFiles."""
 
     changes: tuple[Uri, ...]
 
 
-class DidChangeSettings(Part, frozen=True):
+class DidChangeSettings(ProtocolStruct, frozen=True):
     """workspace/didChangeConfiguration."""
 
     settings: Any = None

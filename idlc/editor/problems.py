@@ -17,7 +17,13 @@ from idlc.diagnostics import codes, explain
 from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.editor.documents import TOP, Document
 from idlc.editor.elements import uses
-from idlc.editor.parts import DocumentParams, Location, Part, Range, WorkspaceDiagnosticParams
+from idlc.editor.parts import (
+    DocumentParams,
+    Location,
+    ProtocolStruct,
+    Range,
+    WorkspaceDiagnosticParams,
+)
 from idlc.editor.protocol import requests_problems
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Workspace, in_folder
@@ -30,26 +36,26 @@ _NEEDLESS = frozenset({codes.UNUSED_DEPENDENCY.id, codes.UNUSED_IGNORE.id})
 _PAGES = Path(explain.__file__).parent / "explain"
 
 
-class Page(Part, frozen=True):
+class CodeDescription(ProtocolStruct, frozen=True):
     """The page of a code."""
 
     href: str
 
 
-class RelatedInformation(Part, frozen=True):
+class RelatedInformation(ProtocolStruct, frozen=True):
     """A second place that explains the first."""
 
     location: Location
     message: str
 
 
-class DocumentDiagnostic(Part, frozen=True):
+class DocumentDiagnostic(ProtocolStruct, frozen=True):
     """A problem at its place in a document."""
 
     range: Range
     severity: int
     code: str
-    code_description: Page
+    code_description: CodeDescription
     source: str
     message: str
     tags: tuple[int, ...] = ()
@@ -74,7 +80,7 @@ class Problem(NamedTuple):
             range=state.range(problem.span) if problem.span else TOP,
             severity=_SEVERITIES[problem.severity],
             code=problem.code,
-            code_description=Page((_PAGES / f"{problem.code}.md").as_uri()),
+            code_description=CodeDescription((_PAGES / f"{problem.code}.md").as_uri()),
             source="idlc",
             message="\n".join(filter(None, lines)),
             tags=(_UNNECESSARY,) if problem.code in _NEEDLESS else (),

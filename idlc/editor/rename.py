@@ -13,7 +13,7 @@ from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
 from idlc.editor.documents import to_path
-from idlc.editor.elements import Element, by_uri, spot_at, users, uses, workspace_edit
+from idlc.editor.elements import Declaration, by_uri, spot_at, users, uses, workspace_edit
 from idlc.editor.navigation import mentions
 from idlc.editor.parts import PositionParams, RenameFilesParams, RenameParams, TextEdit
 from idlc.editor.protocol import REQUEST_FAILED, RequestError
@@ -90,7 +90,9 @@ def rename(state: ServerState, params: RenameParams) -> dict[str, object] | None
     return rename_interface(home, params.new_name, context)
 
 
-def _rename_definition(element: Element, context: InterfaceContext, new: str) -> dict[str, object]:
+def _rename_definition(
+    element: Declaration, context: InterfaceContext, new: str
+) -> dict[str, object]:
     is_constant = isinstance(element.meaning, ir.Constant)
     valid = names.is_constant_name(new) if is_constant else names.is_field_name(new)
     if not valid:

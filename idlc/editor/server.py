@@ -31,7 +31,7 @@ METHODS = {
     "textDocument/completion": ("completion", "complete", "PositionParams"),
     "completionItem/resolve": ("completion", "resolve", "CompletionItem"),
     "textDocument/codeAction": ("actions", "actions", "CodeActionParams"),
-    "workspace/executeCommand": ("actions", "execute", "Command"),
+    "workspace/executeCommand": ("actions", "execute", "CommandParams"),
     "textDocument/prepareRename": ("rename", "prepare", "PositionParams"),
     "textDocument/rename": ("rename", "rename", "RenameParams"),
     "workspace/willRenameFiles": ("rename", "files", "RenameFilesParams"),
@@ -79,9 +79,9 @@ QUIET = 0.3
 #: Seconds between such polls at most.
 PATIENCE = 10.0
 #: An arrival: a message, the error for a malformed one, or the end.
-Message: TypeAlias = "dict[str, Any]"
-Arrival: TypeAlias = "Message | RequestError | None"
-Answer: TypeAlias = Callable[[Any], None]
+RpcMessage: TypeAlias = "dict[str, Any]"
+Incoming: TypeAlias = "RpcMessage | RequestError | None"
+Responder: TypeAlias = Callable[[Any], None]
 
 
 def serve(reader: BinaryIO, writer: BinaryIO) -> int:
@@ -95,13 +95,13 @@ class Server:
     def __init__(self, reader: BinaryIO, writer: BinaryIO) -> None:
         self._reader = reader
         self._writer = writer
-        self._arrivals: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        self._arrivals: queue.SimpleQueue[Incoming] = queue.SimpleQueue()
         #: The number of requests of each id that wait for their answer, and the cancelled ids.
         self._waiting: Counter[int | str | None] = Counter()
         self._cancelled: set[int | str] = set()
         self._lock = threading.Lock()
         self._ids = count()
-        self._asked: dict[int, Answer] = {}
+        self._asked: dict[int, Responder] = {}
         #: The parameters of `initialize`. The state is made of them when it is needed: its imports
         #: take long.
         self._initialize: dict[str, Any] | None = None
@@ -252,7 +252,7 @@ class Server:
                 break
         self._arrivals.put(None)
 
-    def _dispatch(self, arrival: Message | RequestError) -> None:
+    def _dispatch(self, arrival: RpcMessage | RequestError) -> None:
         if isinstance(arrival, RequestError):
             self._fail(None, arrival)
         elif "method" not in arrival:
@@ -266,7 +266,7 @@ class Server:
             name, params = arrival["method"], arrival.get("params")
             self._attempt(name, lambda: self.handle_notification(name, params))
 
-    def _answer(self, request: Message) -> None:
+    def _answer(self, request: RpcMessage) -> None:
         id_, name = request["id"], request["method"]
         with self._lock:
             self._waiting[id_] -= 1
@@ -315,7 +315,7 @@ class Server:
         """Send a notification to the client."""
         self._write({"jsonrpc": "2.0", "method": method, "params": params})
 
-    def ask(self, method: str, params: object, answer: Answer | None = None) -> None:
+    def ask(self, method: str, params: object, answer: Responder | None = None) -> None:
         """Send a request to the client; `answer` takes its result."""
         id_ = next(self._ids)
         if answer is not None:
@@ -326,7 +326,7 @@ class Server:
         protocol.write(self._writer, self.encode(message))
 
 
-def _message(body: bytes) -> Message:
+def _message(body: bytes) -> RpcMessage:
     """Return a message; raises RequestError if it is none."""
     try:
         message = json.loads(body)
@@ -342,7 +342,7 @@ def _message(body: bytes) -> Message:
     return message
 
 
-def _params(request: Message) -> object:
+def _params(request: RpcMessage) -> object:
     """Return the parameters of a request; raises RequestError for malformed strings."""
     if not _is_text(request):
         raise RequestError(protocol.INVALID_PARAMS, "a string has one half of a surrogate pair")
@@ -358,7 +358,7 @@ def _is_text(value: object) -> bool:
     return True
 
 
-def _cancelled(message: Message) -> int | str:
+def _cancelled(message: RpcMessage) -> int | str:
     """Return the id of the request that is cancelled; raises RequestError."""
     params = message.get("params")
     id_ = params.get("id") if isinstance(params, dict) else None
@@ -367,5 +367,5 @@ def _cancelled(message: Message) -> int | str:
     return id_
 
 
-def _is_exit(arrival: Message | RequestError) -> bool:
+def _is_exit(arrival: RpcMessage | RequestError) -> bool:
     return isinstance(arrival, dict) and arrival.get("method") == "exit"

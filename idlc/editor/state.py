@@ -14,7 +14,7 @@ from idlc.editor.documents import Document, Places, file_of, inside, is_built_in
 from idlc.editor.protocol import INVALID_REQUEST, RequestError
 from idlc.editor.workspace import (
     OTHER_INPUTS,
-    Settings,
+    EditorSettings,
     Snapshot,
     Workspace,
     in_folder,
@@ -88,7 +88,7 @@ class ServerState:
         self.ask = ask
         self.root = Root.here()
         self.documents: dict[str, Document] = {}
-        self.settings = Settings()
+        self.settings = EditorSettings()
         self.renaming: Renaming | None = None
         #: Whether problems may have changed since they were published.
         self.is_changed = False
@@ -330,7 +330,7 @@ class ServerState:
         own = settings.get("idlc", settings) if isinstance(settings, dict) else {}
         before = self.settings
         try:
-            self.settings = msgspec.convert(own, Settings)
+            self.settings = msgspec.convert(own, EditorSettings)
         except msgspec.ValidationError as error:
             message = f"invalid settings for idlc: {error}"
             self.notify("window/showMessage", {"type": 2, "message": message})

@@ -73,11 +73,11 @@ def workspace(state: ServerState, params: parts.WorkspaceSymbolParams) -> list[d
     return list(interfaces.values())[:MOST]
 
 
-class Selection(parts.Part, frozen=True):
+class SelectionRange(parts.ProtocolStruct, frozen=True):
     """A range, and the one around it."""
 
     range: parts.Range
-    parent: Selection | None = None
+    parent: SelectionRange | None = None
 
 
 def folds(context: InterfaceContext, _: parts.DocumentParams) -> list[dict[str, object]]:
@@ -100,7 +100,7 @@ def folds(context: InterfaceContext, _: parts.DocumentParams) -> list[dict[str, 
     ]
 
 
-def selections(state: ServerState, params: parts.PositionsParams) -> list[Selection]:
+def selections(state: ServerState, params: parts.PositionsParams) -> list[SelectionRange]:
     """Return for each position the ranges around it: a part, its line, its section, the file."""
     context = state.context(params.text_document.uri)
     spans = [] if context is None else [Span(context.source, 0, len(context.source.text))]
@@ -121,8 +121,8 @@ def selections(state: ServerState, params: parts.PositionsParams) -> list[Select
         selected = last = None
         for span in sorted(around.values(), key=lambda span: span.start - span.end):
             if last is None or (last.start <= span.start and span.end <= last.end):
-                selected, last = Selection(state.range(span), selected), span
-        answers.append(selected or Selection(parts.Range(position, position)))
+                selected, last = SelectionRange(state.range(span), selected), span
+        answers.append(selected or SelectionRange(parts.Range(position, position)))
     return answers
 
 

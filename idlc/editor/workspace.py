@@ -24,7 +24,7 @@ from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
-from idlc.project.find import RULES, DiskSnapshot, InterfaceFile, Listing, list_files, root_of
+from idlc.project.find import RULES, DiskSnapshot, FileListing, InterfaceFile, list_files, root_of
 from idlc.project.inputs import Inputs, output_folders
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
@@ -50,7 +50,7 @@ OTHER_INPUTS = (
 )
 
 
-class Settings(msgspec.Struct, frozen=True, rename="camel"):
+class EditorSettings(msgspec.Struct, frozen=True, rename="camel"):
     """An editor's settings below `idlc`: options of `idlc check`, and of features.
 
     `against` is the version that the lens on breaking changes compares with.
@@ -132,7 +132,7 @@ class Workspace:
     def __init__(
         self,
         folder: Path,
-        options: Settings,
+        options: EditorSettings,
         texts: Callable[[], Mapping[Path, bytes]],
         paths: tuple[str, ...] = (),
     ) -> None:
@@ -154,7 +154,7 @@ class Workspace:
         self._fixed = report = Report()  # problems that do not depend on texts
         self._old_baseline, self._baseline = self._baseline or self._old_baseline, None
         self._packages: tuple[Inputs, ...] = ()
-        files = Listing((), (), (), {})
+        files = FileListing((), (), (), {})
         begun = time.time_ns()
         self._root = root = Root.at(self.folder, self._texts())
         with without_options():

@@ -18,18 +18,18 @@ from idlc.model.distros import Distro
 from idlc.model.link import Model
 from idlc.project import lock
 from idlc.project.library import Library
-from idlc.project.write import Plan
+from idlc.project.write import WritePlan
 from idlc.version import __version__
 
 #: A requirement of numpy, which arrays of a fixed size need.
 NUMPY = re.compile(r"\s*numpy(?![\w.-])", re.IGNORECASE)
 
 
-class Package(NamedTuple):
+class PlannedPackage(NamedTuple):
     """A package ready to be written."""
 
     target: Target
-    plan: Plan
+    plan: WritePlan
     lock: lock.Lock
 
 
@@ -48,7 +48,7 @@ def package_of(
     vendoring: lock.Vendoring = "",
     copies: Sequence[Model] = (),
     beside: Sequence[str] = (),
-) -> Package | None:
+) -> PlannedPackage | None:
     """Return a sound model rendered and compared with the files on disk.
 
     `copies` are models of other packages' types that are written into it, `beside` the packages
@@ -85,7 +85,7 @@ def package_of(
     others = {name for each in (model, *copies) for name in each.interfaces if name not in own}
     references = {name for interface in model.own for name in derive.references(interface)}
     imports = {f"{n.package}.{n.kind}" for n in references if n.package != model.package}
-    return Package(
+    return PlannedPackage(
         target,
         plan,
         lock.Lock(
@@ -130,7 +130,7 @@ class Generated(NamedTuple):
         return ", ".join(done) or "unchanged"
 
 
-def generated(package: Package) -> Generated:
+def generated(package: PlannedPackage) -> Generated:
     """Return the outcome for a package that is ready to be written."""
     removed = sum(change.new is None for change in package.plan.changes)
     written = len(package.plan.changes) - removed

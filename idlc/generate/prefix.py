@@ -12,7 +12,7 @@ from idlc.compiler.compiler import stage
 from idlc.diagnostics.report import Report
 from idlc.generate.native.elf import Machine
 from idlc.generate.native.inspect import inspect
-from idlc.generate.native.layouts import LAYOUTS, Layout
+from idlc.generate.native.layouts import LAYOUTS, StructLayout
 from idlc.generate.native.library import MACHINES, libraries
 from idlc.generate.target import Output, Target
 from idlc.model.idl_text import file_text, idl
@@ -21,7 +21,7 @@ from idlc.project import prefixes, write
 from idlc.project.library import Library
 from idlc.project.lock import Tree
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
-from idlc.project.write import Change, Plan
+from idlc.project.write import FileChange, WritePlan
 
 
 class Libraries(NamedTuple):
@@ -59,7 +59,7 @@ def build_tag(model: Model, *libraries: str) -> str:
     return "" if list(names) == [DEFAULT] else f"1{'_'.join(names)}"
 
 
-def target_of(distro: Distribution) -> tuple[Machine, Layout] | str:
+def target_of(distro: Distribution) -> tuple[Machine, StructLayout] | str:
     """Return the processor and layout of libraries on this machine, or why there are none."""
     machine = MACHINES.get(prefixes.machine())
     layout = LAYOUTS.get(distro.name)
@@ -150,7 +150,7 @@ class Overlay(Target):
         home = Library((), self._output.root, Report()).home(package)
         return Overlay(self.name, package, home, self._for_others)
 
-    def cause(self, change: Change) -> str:
+    def cause(self, change: FileChange) -> str:
         """Say why a library differs, if another distribution is the reason."""
         old, new = (inspect(data or b"") for data in (change.old, change.new))
         if old is None or new is None or old.stamp == new.stamp:
@@ -186,13 +186,13 @@ def write_setup_scripts(overlay: Target) -> bool:
         for path in (f"local_setup.{shell}", f"setup.{shell}"):
             old = tree.read(path)
             if old is None or (isinstance(old, bytes) and old.startswith(MARK)):
-                changes += [] if old == new else [Change(path, old, new)]
+                changes += [] if old == new else [FileChange(path, old, new)]
             else:
                 overlay.report.notes.append(
                     f"`{overlay.name}/{path}` was not written by idlc: add `{overlay.name}` to "
                     "AMENT_PREFIX_PATH"
                 )
-    return write.apply(Plan(overlay.path, tuple(changes), {}), overlay.name, overlay.report)
+    return write.apply(WritePlan(overlay.path, tuple(changes), {}), overlay.name, overlay.report)
 
 
 def _rendered(template: str, **variables: object) -> str:

@@ -7,14 +7,14 @@ from functools import partial
 
 from idlc.compiler.compiler import Compiler
 from idlc.diagnostics.report import Report
-from idlc.generate.package import Package, as_inputs, package_of
+from idlc.generate.package import PlannedPackage, as_inputs, package_of
 from idlc.generate.target import Target
 from idlc.model import derive
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.inputs import accept_name
 from idlc.project.lock import FILE, Vendoring, load_lock
-from idlc.project.write import Plan
+from idlc.project.write import WritePlan
 
 
 def planned(
@@ -22,12 +22,12 @@ def planned(
     requested: Mapping[Target, inputs.Inputs],
     compiler: Compiler,
     vendoring: Vendoring,
-) -> list[Package]:
+) -> list[PlannedPackage]:
     """Return sound models, and packages to vendor, ready to be written; empty after an error."""
     library = compiler.library
     own = {model.package for model in models}
     #: Each ready to be written, `None` for one that must not be.
-    others: dict[str, Package | None] = {}
+    others: dict[str, PlannedPackage | None] = {}
     needed: dict[str, set[str]] = {}
 
     def needed_by(target: Target, package: str) -> set[str]:
@@ -45,7 +45,7 @@ def planned(
                 others[package] = package_of(whole, place, digests, library)
         return needed[package]
 
-    packages: list[Package | None] = []
+    packages: list[PlannedPackage | None] = []
     for model, (target, package) in zip(models, requested.items(), strict=True):
         beside = set[str]()
         if vendoring == "beside":
@@ -84,7 +84,7 @@ def _needed(model: Model) -> set[str]:
     return implied | {name.package for name in model.interfaces}
 
 
-def leftovers(packages: Iterable[Package]) -> Iterator[tuple[Target, Plan | None]]:
+def leftovers(packages: Iterable[PlannedPackage]) -> Iterator[tuple[Target, WritePlan | None]]:
     """Yield packages that earlier runs wrote beside these, with the plans that remove them.
 
     Those that another package beside them imports are left out. A plan is `None` if files must not

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
-from idlc.diagnostics.codes import Code
+from idlc.diagnostics.codes import DiagnosticCode
 from idlc.diagnostics.source import Source, Span
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Constant(msgspec.Struct, frozen=True):
 class Fault(msgspec.Struct, frozen=True):
     """A problem of a line or a value; `start` and `end` count from the beginning of its text."""
 
-    code: Code
+    code: DiagnosticCode
     message: str
     start: int
     end: int

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from idlc.model import ir
 
-Node = TypeVar("Node", bound=Hashable)
+_Node = TypeVar("_Node", bound=Hashable)
 
 SERVICE_EVENT_INFO = ir.TypeName("service_msgs", "msg", "ServiceEventInfo")
 UUID = ir.TypeName("unique_identifier_msgs", "msg", "UUID")
@@ -113,9 +113,9 @@ def sections(interface: ir.Interface) -> tuple[ir.Message, ...]:
             return (interface.goal, interface.result, interface.feedback)
 
 
-def closure(names: Iterable[Node], targets: Callable[[Node], Iterable[Node]]) -> set[Node]:
+def closure(names: Iterable[_Node], targets: Callable[[_Node], Iterable[_Node]]) -> set[_Node]:
     """Return names and all that they lead to, in linear time, circles or not."""
-    reached: set[Node] = set()
+    reached: set[_Node] = set()
     waiting = list(names)
     while waiting:
         name = waiting.pop()

@@ -7,10 +7,12 @@ hash that the program announces; idlc prints its names, and uses them for nothin
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+
+from msgspec.structs import replace
 
 from idlc.diagnostics.report import Report
-from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.source import INCOMPLETE, Source, Span
 from idlc.diagnostics.text import one_line
 from idlc.language.parse import parse
 from idlc.model import catalog, ir
@@ -26,7 +28,8 @@ from idlc.model.describe import (
 from idlc.model.distros import NEWEST
 from idlc.model.ir import spell
 from idlc.model.link import Model, circles, link
-from idlc.model.lowering.lower import lower
+from idlc.model.lowering.lower import SECTIONS, lower
+from idlc.model.node_sources import Defaults, default_of, field_line, field_lines, restore
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _PRIMITIVES = {
@@ -72,23 +75,34 @@ def message_of(part: IndividualDict, program: str) -> ir.Message:
     name = _type_name(part["type_name"])
     bare: list[FieldDict] = [{**field, "default_value": ""} for field in part["fields"]]
     written = part["fields"] if bare != individual(ir.Message(name=name))["fields"] else []
-    types: dict[str, ir.FieldType] = {}
+    bare_fields: dict[str, ir.Field] = {}
     for field in written:
-        if not _NAME.fullmatch(field["name"]) or field["name"] in types:
-            raise DescriptionError(f"`{one_line(field['name'])}` is not the name of one field")
-        types[field["name"]] = _type(field["type"])
-    lines = {field: spell(type_, name.package) for field, type_ in types.items()}
-    text = "".join(f"{type_} {field}\n" for field, type_ in lines.items())
-    source = Source(f"{name} ({program})", text)
+        own = field["name"]
+        if not _NAME.fullmatch(own) or own in bare_fields:
+            raise DescriptionError(f"`{one_line(own)}` is not the name of one field")
+        type_ = _type(field["type"])
+        default = default_of(type_, field["default_value"])
+        bare_fields[own] = ir.Field(name=own, type=type_, default=default)
+    lines = [field_line(field, name.package) for field in bare_fields.values()]
+    source = Source(f"{name} ({program})", f"{''.join(lines)}{INCOMPLETE}\n", program)
     fields: list[ir.Field] = []
     start = 0
-    for own, type_ in types.items():
-        middle = start + len(lines[own])
-        end = middle + 1 + len(own)
-        spans = Span(source, start, middle), Span(source, middle + 1, end)
-        fields.append(ir.Field(name=own, type=type_, type_span=spans[0], name_span=spans[1]))
-        start = end + 1
+    for own_field, line in zip(bare_fields.values(), lines, strict=True):
+        middle = start + len(spell(own_field.type, name.package))
+        spans = (
+            Span(source, start, middle),
+            Span(source, middle + 1, middle + 1 + len(own_field.name)),
+        )
+        fields.append(replace(own_field, type_span=spans[0], name_span=spans[1]))
+        start += len(line)
     return ir.Message(name=name, source=source, fields=tuple(fields))
+
+
+def defaults_of(description: DescriptionDict) -> Defaults:
+    """Return the default values in a description, as the node sends them."""
+    every = (description["type_description"], *description["referenced_type_descriptions"])
+    owners = ((_type_name(part["type_name"]), field) for part in every for field in part["fields"])
+    return {(name, field["name"]): field["default_value"] for name, field in owners}
 
 
 def _type_name(text: str) -> ir.TypeName:
@@ -137,7 +151,7 @@ def model_of_sources(
         return None
     report = Report()
     own = [
-        lower(parse(Source(f"{own} ({program})", text)), own, report, NEWEST)
+        lower(parse(Source(f"{own} ({program})", text, program)), own, report, NEWEST)
         for own, text in texts.items()
     ]
     model = link(name.package, own, catalog, report)
@@ -156,10 +170,36 @@ def reported_model(
     The sources have constants, units and comments, so they are preferred if they have that hash. A
     program may leave them out, and has none for the types that services and actions imply.
     """
-    texts = {_type_name(text_name): text for text_name, text in sources.items()}
+    described = model_of_description(description, name, type_hash, program)
     top = _type_name(name)
-    is_file = top.kind == "msg" and top in texts
-    model = model_of_sources(texts, top, type_hash, program) if is_file else None
-    return (
-        model.only({top}) if model else model_of_description(description, name, type_hash, program)
-    )
+    if top.kind != "msg":
+        return described
+    texts = node_texts(described.messages, sources, described.messages, defaults_of(description))
+    model = model_of_sources(texts, top, type_hash, program)
+    return model.only({top}) if model else described
+
+
+def node_texts(
+    names: Iterable[ir.TypeName],
+    sources: Mapping[str, str],
+    messages: Mapping[ir.TypeName, ir.Message],
+    defaults: Defaults,
+) -> dict[ir.TypeName, str]:
+    """Return texts of interfaces by name: a node's sources as far as they are sound.
+
+    `messages` are described by nodes. Interfaces without a sound source are made of them.
+    """
+    sources = sources if sum(map(len, sources.values())) <= MAX_TEXT else {}
+    texts: dict[ir.TypeName, str] = {}
+    for name in names:
+        sections = [name._replace(name=name.name + suffix) for suffix in SECTIONS[name.kind]]
+        parts = [messages[section] for section in sections if section in messages]
+        if len(parts) < len(sections):
+            continue
+        source = sources.get(str(name))
+        text = None if source is None else restore(name, source, parts, defaults)
+        if text is None:
+            described = (field_lines(part.fields, name.package) for part in parts)
+            text = "---\n".join(described) + f"{INCOMPLETE}\n"
+        texts[name] = text
+    return texts

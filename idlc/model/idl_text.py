@@ -36,7 +36,7 @@ def _section(message: ir.Message) -> Iterator[str]:
     for field in message.fields:
         yield from _comment(field.comment)
         optional = f"{OPTIONAL} " if field.optional else ""
-        default = "" if field.default is None else f" {_value(field.default.value)}"
+        default = "" if field.default is None else f" {spell_default(field.default.value)}"
         unit = "" if field.unit is None else f"  # [{field.unit}]"
         type_ = spell(field.type, message.name.package)
         yield f"{optional}{type_} {field.name}{default}{unit}"
@@ -46,7 +46,8 @@ def _comment(lines: tuple[str, ...]) -> Iterator[str]:
     return (f"# {line}".rstrip() for line in lines)
 
 
-def _value(value: ir.Value) -> str:
+def spell_default(value: ir.Value) -> str:
+    """Return a default value as interface files have it."""
     if not isinstance(value, tuple):
         return _scalar(value)
     elements = (

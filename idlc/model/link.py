@@ -22,24 +22,26 @@ from idlc.model.lowering.lower_types import STRINGS
 if TYPE_CHECKING:
     from idlc.model.describe import Describer
 
-Node = TypeVar("Node", bound=Hashable)
-Edge = TypeVar("Edge")
+_Node = TypeVar("_Node", bound=Hashable)
+_Edge = TypeVar("_Edge")
 #: Messages of a circle that are named.
 NAMED = 10
 
 
 def circles(
-    roots: Iterable[Node], edges: Callable[[Node], Iterable[tuple[Edge, Node]]], done: set[Node]
-) -> Iterator[tuple[list[Node], Edge]]:
+    roots: Iterable[_Node],
+    edges: Callable[[_Node], Iterable[tuple[_Edge, _Node]]],
+    done: set[_Node],
+) -> Iterator[tuple[list[_Node], _Edge]]:
     """Yield each circle as its nodes, with the edge from the last back to the first.
 
     Nodes in `done` are skipped; every node that is reached is added to them.
     """
     for root in roots:
-        path: list[Node] = []
-        rest: list[Iterator[tuple[Edge, Node]]] = []
-        places: dict[Node, int] = {}
-        entered: Node | None = None if root in done else root
+        path: list[_Node] = []
+        rest: list[Iterator[tuple[_Edge, _Node]]] = []
+        places: dict[_Node, int] = {}
+        entered: _Node | None = None if root in done else root
         while entered is not None or path:
             if entered is not None:
                 places[entered] = len(path)
@@ -92,7 +94,9 @@ class Entry(msgspec.Struct, frozen=True):
 
 
 #: Interfaces with the names that they refer to; `None` for a name without an interface.
-Graph: TypeAlias = dict[ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]]
+LoweredInterfaces: TypeAlias = dict[
+    ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]
+]
 #: Lowered interfaces by name, valid for the same `Source` and distribution.
 Memory: TypeAlias = dict[ir.TypeName, Entry]
 
@@ -103,7 +107,7 @@ class Pool:
     Pools of one library may share a `memory`, so that only texts that changed are lowered again.
     """
 
-    def __init__(self, library: Library, memory: Memory | None = None) -> None:
+    def __init__(self, library: InterfaceSource, memory: Memory | None = None) -> None:
         self.library = library
         self._memory = {} if memory is None else memory
         self._entries: dict[ir.TypeName, Entry | None] = {}
@@ -142,9 +146,9 @@ class Pool:
             if self._entries.get(target):
                 yield field, target
 
-    def graph(self, names: Iterable[ir.TypeName]) -> Graph:
+    def graph(self, names: Iterable[ir.TypeName]) -> LoweredInterfaces:
         """Return interfaces and all that they refer to, `None` for missing ones."""
-        graph: Graph = {}
+        graph: LoweredInterfaces = {}
 
         def targets(name: ir.TypeName) -> Iterable[ir.TypeName]:
             entry = self.get(name)
@@ -195,7 +199,7 @@ SUGGESTIONS = 200
 _PRIMITIVES = (*ir.PRIMITIVES, *STRINGS)
 
 
-class Library(Protocol):
+class InterfaceSource(Protocol):
     """The sources of other packages' interfaces, in order of precedence."""
 
     def source(self, name: ir.TypeName) -> Source | None:
@@ -279,7 +283,7 @@ class Model:
             entry = self._pool.get(interface.name)
             yield from entry.references if entry else ()
 
-    def graph(self) -> Graph:
+    def graph(self) -> LoweredInterfaces:
         """Return the own interfaces and all that they refer to, `None` for missing ones."""
         return self._pool.graph(interface.name for interface in self.own)
 
@@ -313,7 +317,7 @@ def _is_in(interface: ir.Interface, paths: Container[str]) -> bool:
 def link(
     package: str,
     own: Iterable[ir.Interface],
-    library: Library,
+    library: InterfaceSource,
     report: Report,
     pool: Pool | None = None,
 ) -> Model:
@@ -357,7 +361,7 @@ def _load_references(interfaces: dict[ir.TypeName, ir.Interface], pool: Pool) ->
                 errors.append(unknown.problem(target, field.type_span))
 
 
-def _is_implied_only(target: ir.TypeName, library: Library) -> bool:
+def _is_implied_only(target: ir.TypeName, library: InterfaceSource) -> bool:
     """Return whether a message exists only for service events, which Humble does not have."""
     return target == derive.SERVICE_EVENT_INFO and target.name not in library.names(target.package)
 
@@ -368,7 +372,9 @@ class _UnknownTypes:
     A search for the nearest name goes through all packages, so only the first problems get one.
     """
 
-    def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface], library: Library) -> None:
+    def __init__(
+        self, interfaces: Mapping[ir.TypeName, ir.Interface], library: InterfaceSource
+    ) -> None:
         self._interfaces = interfaces
         self._library = library
         self._hints = SUGGESTIONS

@@ -114,18 +114,27 @@ _WRITING = frozenset({"configure_file", "execute_process", "file"})
 _LONGEST_WORD, _LONGEST_VALUE, _MOST = 1024, 256, 1_000_000
 
 
+def _runs_another_file(call: Call) -> bool:
+    """Return whether a command runs commands that the file does not contain."""
+    if call.name == "include":
+        return re.search(r"[/$.]", " ".join(call.words)) is not None
+    return call.name in ("add_subdirectory", "cmake_language")
+
+
 class Script:
     """The arguments that a CMakeLists.txt passes to rosidl and ament.
 
     `files` are the interfaces of all calls of `GENERATE`, `dependencies` the packages of the last;
     `found` what `find_package` finds, in `finding` those calls that no condition surrounds;
     `exported` what `ament_export_dependencies` names. `writes` is whether CMake may write files.
+    `unconditional` are the commands that always run; `reads_others`: so do some of other files.
     """
 
     def __init__(self, source: Source) -> None:
         self.commands = tuple(calls(source))
         self.generating: list[Call] = []
         self.finding: list[Call] = []
+        self.unconditional: list[Call] = []
         self.files: Items = []
         self.dependencies: Items = []
         self.found: Items = []
@@ -135,7 +144,7 @@ class Script:
         self._changed: set[str] = set()  # by functions and macros
         self._open: list[str] = []
         self._routines = 0  # that are open
-        self._has_others = False  # files that are read may set lists
+        self.reads_others = False  # they may set lists
         self._left = _MOST
         for call in self.commands:
             self._run(call)
@@ -158,6 +167,7 @@ class Script:
 
     def _run(self, call: Call) -> None:
         name, words = call.name, call.words
+        self.unconditional += [] if self._open or name == "return" else [call]
         if name.startswith("end") and self._open:
             self._routines -= self._open.pop() in _ROUTINES
         elif self._routines:
@@ -178,11 +188,9 @@ class Script:
             self.exported = self._added(self.exported, self._expanded(words, call.places))
         elif name.startswith("ament_auto_"):
             self.found = self.exported = None
-        elif name in ("add_subdirectory", "cmake_language") or (
-            name == "include" and re.search(r"[/$.]", " ".join(words))
-        ):
+        elif _runs_another_file(call):
             self.files = self.found = self.exported = None
-            self._lists, self._has_others = {}, True
+            self._lists, self.reads_others = {}, True
         elif name not in _BLOCKS and not name.startswith(_HARMLESS):
             self._lists.update(dict.fromkeys(words))
         self.writes |= name in _WRITING and words[:1] != ("GLOB",)
@@ -219,7 +227,7 @@ class Script:
                 pass
             case _:
                 return
-        unset: Items = None if self._has_others else []
+        unset: Items = None if self.reads_others else []
         before = self._lists.get(name, unset) if keep else []
         self._lists[name] = None if name in self._changed else self._added(before, items)
 

@@ -11,6 +11,7 @@ import msgspec
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.packaging.cmake import GENERATE, calls
+from idlc.packaging.neighbours import Neighbours
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
 from idlc.project.lock import BUILD_STEP, FILE, Runtime, load_lock
@@ -18,12 +19,6 @@ from idlc.project.package_xml import Statement, statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
-#: Python packages of ROS 2 that have no interfaces.
-_LIBRARIES = frozenset(
-    "ament_index_python cv_bridge geometry_msgs launch launch_ros launch_testing message_filters "
-    "rclpy ros2cli ros2launch rosbag2_py rosidl_runtime_py sensor_msgs_py tf2_geometry_msgs "
-    "tf2_ros tf_transformations".split()
-)
 _SETUP_FILES = ("setup.py", "setup.cfg", "pyproject.toml")
 _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
@@ -45,7 +40,9 @@ class Facts(msgspec.Struct, frozen=True):
     interface files by name within the package, empty without `outputs`; `whole` is whether the
     package has no others. `generates` is whether its CMakeLists.txt generates interfaces that are
     installed, `native` whether it has C or C++ sources, `marker` whether resource/NAME exists.
-    `available` are the names of ROS packages that can be found.
+    `available` are the names of ROS packages that can be found, `providers` those that provide a
+    Python module by its name. `contained` are the names of the package's modules, at any depth.
+    `dependents` are the packages of the workspace that need this one.
     `files` are the paths of interface files in the package's folder by name within the package.
     `interfaces` are the paths of all, checked or not, .idl files included.
     `folders` are those with files by dotted name, and whether they are Python packages.
@@ -67,6 +64,9 @@ class Facts(msgspec.Struct, frozen=True):
     whole: bool = False
     outputs: tuple[GeneratedOutput, ...] = ()
     available: frozenset[str] = frozenset()
+    providers: Mapping[str, frozenset[str]] = {}
+    contained: frozenset[str] = frozenset()
+    dependents: frozenset[str] = frozenset()
     files: Mapping[str, str] = {}
     interfaces: frozenset[str] = frozenset()
     folders: Mapping[str, bool] = {}
@@ -98,7 +98,12 @@ class Facts(msgspec.Struct, frozen=True):
         return next(iter(named.values())).span if named else Span(self.manifest, 0, 0)
 
 
-def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
+def facts(
+    package: Inputs,
+    ros_packages: Callable[[], Iterable[str]],
+    neighbours: Neighbours,
+    scope: Scope,
+) -> Facts | None:
     """Return the facts about a package; `None` without a package.xml.
 
     `ros_packages` returns the names of ROS packages; it is called only with Python code.
@@ -126,6 +131,8 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         is_code = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
         if is_code and file not in generated and (module := _optional(file, root)):
             modules[".".join((*parts[:-1], file.stem))] = module
+    available = frozenset(ros_packages() if modules else ())
+    present = folders(folder, files)
     return Facts(
         name=package.package,
         manifest=source,
@@ -153,9 +160,12 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
         interfaces=frozenset(
             file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
         ),
-        folders=folders(folder, files),
+        folders=present,
         has_build_step=any(file.name == BUILD_STEP for file in files),
-        available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
+        available=available,
+        providers=neighbours.providers(available) if modules else {},
+        contained=_contained(files, present),
+        dependents=neighbours.dependents(package.package) if modules else frozenset(),
     )
 
 
@@ -169,6 +179,15 @@ def folders(folder: Path, files: Iterable[Path] | None = None) -> dict[str, bool
         if file.name == "__init__.py" and parts:
             is_package[".".join(parts)] = True
     return is_package
+
+
+def _contained(files: Iterable[Path], present: Mapping[str, bool]) -> frozenset[str]:
+    """Return the names of the modules and packages in a package's folder, at any depth."""
+    code = [file for file in files if file.suffix == ".py"]
+    packages = {name.rpartition(".")[2] for name, is_package in present.items() if is_package}
+    # a folder without an __init__.py can be a package, too
+    others = {file.parent.name for file in code} - _NOT_NODES
+    return frozenset({file.stem for file in code} | packages | others)
 
 
 def home_of(folder: Path, package: str, root: Root) -> Path:

@@ -94,8 +94,8 @@ SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
 #: The name of a type or package, as ROS 2, Python or C++ writes it.
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
-#: A configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
-_ADDRESS = re.compile(r"zenoh:|(?:tcp|tls|quic|udp|ws)/")
+#: DDS, a configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
+_ADDRESS = re.compile(r"dds(?:[:/]|\Z)|zenoh:|(?:tcp|tls|quic|udp|ws)/")
 NOTHING = Exclusions()
 
 
@@ -133,7 +133,7 @@ def is_address(word: str) -> bool:
     return _ADDRESS.match(word) is not None and not os.path.lexists(word)
 
 
-class Listing(msgspec.Struct, frozen=True):
+class FileListing(msgspec.Struct, frozen=True):
     """The files below some paths: interface files, each once, sorted, and the folders of packages.
 
     `empty` are the listed folders without interface files, `folders` all that were searched, by
@@ -169,7 +169,7 @@ def no_interfaces(
 
 def list_files(
     paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING
-) -> Listing:
+) -> FileListing:
     """Return the files that paths mean; a folder means everything below it.
 
     Reports IDL601, IDL602, IDL605 and IDL622.
@@ -200,7 +200,7 @@ def list_files(
         if not has_files:
             empty.setdefault(argument)
     files = sorted(by_path.values(), key=lambda file: (file.shown, file.argument))
-    return Listing(tuple(files), tuple(sorted(packages)), tuple(empty), folders)
+    return FileListing(tuple(files), tuple(sorted(packages)), tuple(empty), folders)
 
 
 def _files_of(

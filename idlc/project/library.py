@@ -25,7 +25,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 #: The texts of interfaces by name.
-Texts: TypeAlias = Mapping[ir.TypeName, Source]
+InterfaceTexts: TypeAlias = Mapping[ir.TypeName, Source]
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -59,7 +59,7 @@ class Folder:
         return by_name
 
 
-class Prefix:
+class InstallPrefix:
     """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg.
 
     Standard interfaces are ignored if it is of another distribution than files are read for.
@@ -108,13 +108,13 @@ class Library:
         own: Mapping[str, Sequence[Path]] | None = None,
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
-        texts: Texts = MappingProxyType({}),
+        texts: InterfaceTexts = MappingProxyType({}),
     ) -> None:
         self.distro = distro
         self.texts = texts
         self._missing = [path for path in folders if not is_folder(Path(root.path(path)))]
-        self._places: list[Folder | Prefix] = [Folder(path, root) for path in folders]
-        self._places += [Prefix(path, distro) for path in prefixes.ament_prefixes()]
+        self._places: list[Folder | InstallPrefix] = [Folder(path, root) for path in folders]
+        self._places += [InstallPrefix(path, distro) for path in prefixes.ament_prefixes()]
         self._own = own or {}
         self._exclude = exclude
         self._root = root
@@ -236,7 +236,7 @@ _DIVIDER = re.compile(r"/|\.|::")
 _LISTED = 5
 
 
-class Package(NamedTuple):
+class AvailablePackage(NamedTuple):
     """A package in reach; `path` is `None` if it is built in."""
 
     name: str
@@ -251,12 +251,14 @@ class ResolvedType(NamedTuple):
     interface: ir.TypeName
 
 
-def packages(scope: Scope, report: Report) -> list[Package]:
+def packages(scope: Scope, report: Report) -> list[AvailablePackage]:
     """Return all packages in reach, including the packages below the base."""
     library = _library(scope, report)
     homes = ((name, library.home(name)) for name in library.packages())
     return [
-        Package(name, len(library.interfaces(name)), scope.root.shown(home) if home else None)
+        AvailablePackage(
+            name, len(library.interfaces(name)), scope.root.shown(home) if home else None
+        )
         for name, home in homes
     ]
 

@@ -101,7 +101,7 @@ def _is(path: str, mode: int) -> str:
     return f"`{path}` is {'a file' if stat.S_ISREG(mode) else kind_of(mode)}"
 
 
-Content = TypeVar("Content")
+_Content = TypeVar("_Content")
 
 FILE = "idlc.lock"
 #: The file beside it by which builds without idlc notice that classes are out of date.
@@ -242,7 +242,7 @@ def load_lock(out: Path, name: str, report: Report, again: str = "idlc gen") -> 
         return None
 
 
-def _decoded(data: bytes, kind: type[Content]) -> Content:
+def _decoded(data: bytes, kind: type[_Content]) -> _Content:
     try:
         return msgspec.json.decode(data, type=kind)
     except RecursionError as error:

@@ -40,7 +40,7 @@ _DEPTHS = tuple(len(parents) + 1 for parents in _PARENTS)
 NOT_XML = (expat.ExpatError, ValueError, LookupError)
 
 
-class Element(NamedTuple):
+class XmlElement(NamedTuple):
     """An element with its parents and all text in it; `start` and `end` are offsets of bytes."""
 
     parents: tuple[str, ...]
@@ -55,7 +55,7 @@ class Manifest(NamedTuple):
     """The elements of a package.xml in order, including its `<export>`."""
 
     format: str
-    elements: tuple[Element, ...]
+    elements: tuple[XmlElement, ...]
 
     def texts(self, *tags: str) -> list[str]:
         """Return the texts of the elements directly within `<package>` with one of these tags."""
@@ -69,7 +69,7 @@ def read(data: bytes, encoding: str | None = None) -> Manifest:
     `encoding` overrides the file's own declaration.
     """
     format_ = ""
-    elements: list[Element] = []
+    elements: list[XmlElement] = []
     tags: list[str] = []  # of the open elements
     # start, attributes and texts of those among them that are at one of the depths to collect
     begun: list[tuple[int, dict[str, str], list[str]]] = []
@@ -92,7 +92,7 @@ def read(data: bytes, encoding: str | None = None) -> Manifest:
             if (parents := tuple(tags)) in _PARENTS:
                 last = data.find(b">", parser.CurrentByteIndex) + 1
                 text = "".join(texts).strip()
-                elements.append(Element(parents, tag, text, first, last, attributes))
+                elements.append(XmlElement(parents, tag, text, first, last, attributes))
 
     def add(text: str) -> None:
         for _, _, texts in begun:

@@ -26,14 +26,14 @@ from idlc.project.lock import Runtime, Vendoring
 from idlc.project.prefixes import distribution
 from idlc.project.root import Root
 
-Text = Annotated[str, Meta(title="a string")]
-Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
-TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
+TextValue = Annotated[str, Meta(title="a string")]
+TextsValue = Annotated[tuple[str, ...], Meta(title="a list of strings")]
+TextOrTextsValue = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
 Mode = Annotated[Runtime | None, Meta(title='"carried" or "installed"')]
 Switch = Annotated[bool, Meta(title="true or false")]
 SwitchOrBeside = Annotated[bool | Literal["beside"], Meta(title='true, false or "beside"')]
-Table = Annotated[dict[str, Any], Meta(title="a table")]
-Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
+TableValue = Annotated[dict[str, Any], Meta(title="a table")]
+TablesValue = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
 
 _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
@@ -127,17 +127,17 @@ _COSTLY = 10_000_000
 class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     """`[tool.idlc]` as written in the file; `command_table` reads the tables of commands."""
 
-    paths: Texts = ()
-    include: Texts = ()
-    exclude: Texts = ()
-    out: Text = ""
-    package: Text = ""
+    paths: TextsValue = ()
+    include: TextsValue = ()
+    exclude: TextsValue = ()
+    out: TextValue = ""
+    package: TextValue = ""
     runtime: Mode = None
     vendor_deps: SwitchOrBeside = False
     enums: Switch = False
-    distro: TextOrTexts = ()
-    breaking: Table = {}
-    check: Table = {}
+    distro: TextOrTextsValue = ()
+    breaking: TableValue = {}
+    check: TableValue = {}
 
 
 class Config(Settings, frozen=True, kw_only=True):

@@ -44,7 +44,7 @@ class Ownership(enum.Enum):
     USERS = "a file that idlc did not write, and that stays"
 
 
-class Change(NamedTuple):
+class FileChange(NamedTuple):
     """One file to create, replace or remove; `path` is relative to the folder of its plan.
 
     `old` and `new` are its content before and after, `None` where there is no file. A copy is
@@ -57,14 +57,14 @@ class Change(NamedTuple):
     ownership: Ownership = Ownership.OWN
 
 
-class Plan(NamedTuple):
+class WritePlan(NamedTuple):
     """Changes in the order in which to make them, and the digests of all files afterwards.
 
     `record` is the path of the record, if there is one, and `recorded` its content before.
     """
 
     out: Path
-    changes: tuple[Change, ...]
+    changes: tuple[FileChange, ...]
     outputs: dict[str, str]
     record: str = ""
     recorded: bytes | None = None
@@ -72,7 +72,7 @@ class Plan(NamedTuple):
 
 def compare(
     out: Path, name: str, files: Mapping[str, bytes], owned: Owned, report: Report
-) -> list[Change]:
+) -> list[FileChange]:
     """Return the changes after which `out` holds `files`, and no other files of `owned`.
 
     `name` is the name of `out` in messages. Reports IDL614 for what is in the way.
@@ -88,7 +88,7 @@ def compare(
             if new is not None:
                 report.add(_in_the_way(shown(name, path), old))
         elif not is_same(old, new):
-            changes.append(Change(path, old, new, _ownership(path, old, owned)))
+            changes.append(FileChange(path, old, new, _ownership(path, old, owned)))
     return changes
 
 
@@ -116,7 +116,7 @@ def plan(
     record: str,
     force: bool = False,
     again: str = "",
-) -> Plan | None:
+) -> WritePlan | None:
     """Return the changes after which `out` holds `files`; `None` after a report if it must not.
 
     A file that is not owned, or was edited since, is only replaced with `force`, which is what
@@ -139,7 +139,7 @@ def plan(
     if problems.had_errors or isinstance(recorded, Obstacle):
         return None
     outputs = {path: digest(data) for path, data in files.items() if path not in left_alone}
-    return Plan(out, tuple(changes), outputs, record, recorded)
+    return WritePlan(out, tuple(changes), outputs, record, recorded)
 
 
 def _in_the_way(shown_path: str, obstacle: Obstacle) -> Diagnostic:
@@ -148,7 +148,7 @@ def _in_the_way(shown_path: str, obstacle: Obstacle) -> Diagnostic:
     return codes.FOREIGN_FILE.of(shown_path, message, hint=hint)
 
 
-def _refusal(path: str, change: Change, again: str, *, in_full: bool) -> Diagnostic:
+def _refusal(path: str, change: FileChange, again: str, *, in_full: bool) -> Diagnostic:
     diff = ""
     if in_full and change.new is not None:
         diff = "\n".join(difference(change.old or b"", change.new))
@@ -188,7 +188,7 @@ def owned_files(outputs: Mapping[str, str]) -> dict[str, frozenset[str]]:
     }
 
 
-def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -> bool:
+def apply(plan: WritePlan, name: str, report: Report, render: Render | None = None) -> bool:
     """Make changes, all or none; report IDL612 and return `False` on a failure.
 
     After a failure every file is as it was, or the report names the others. `render` makes the
@@ -196,7 +196,7 @@ def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -
     """
     with exclusive(plan.out) as is_locked:
         tree, changes = Tree(plan.out), []
-        record = [Change(plan.record, plan.recorded, plan.recorded)] if render else []
+        record = [FileChange(plan.record, plan.recorded, plan.recorded)] if render else []
         for change in (*plan.changes, *record):
             now = tree.read(change.path)
             if now not in (change.old, change.new):
@@ -221,7 +221,7 @@ def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -
         return not changes or _Transaction(plan, home / STAGE).run(changes, name, report)
 
 
-def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]:
+def _recorded(changes: list[FileChange], plan: WritePlan, render: Render) -> list[FileChange]:
     """Return changes with those of the record: both digests before the others, one after them."""
     final = render(plan.outputs)
     first = final
@@ -231,7 +231,10 @@ def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]
             if old is not None and ownership is Ownership.OWN:
                 digests[path] = f"{digests.get(path, '')} {digest(old)}".lstrip()
         first = render(digests)
-    before, after = Change(plan.record, plan.recorded, first), Change(plan.record, first, final)
+    before, after = (
+        FileChange(plan.record, plan.recorded, first),
+        FileChange(plan.record, first, final),
+    )
     return [each for each in (before, *changes, after) if each.old != each.new]
 
 
@@ -255,7 +258,7 @@ def _remove(stage: Path) -> None:
 class _Transaction:
     """Moves drafts into place, and can undo that."""
 
-    def __init__(self, plan: Plan, stage: Path) -> None:
+    def __init__(self, plan: WritePlan, stage: Path) -> None:
         self._out = plan.out
         self._record = plan.record
         self._stage = stage
@@ -263,7 +266,7 @@ class _Transaction:
         self._done: list[tuple[str, bytes | None, int]] = []
         self._current = ""
 
-    def run(self, changes: list[Change], name: str, report: Report) -> bool:
+    def run(self, changes: list[FileChange], name: str, report: Report) -> bool:
         """Make all changes, in order, or none; report IDL612."""
         try:
             make_folder(self._stage.parent, self._created)
@@ -295,7 +298,7 @@ class _Transaction:
         self._tidy(changes)
         return True
 
-    def _make(self, change: Change, draft: str) -> None:
+    def _make(self, change: FileChange, draft: str) -> None:
         path, old, new, ownership = change
         target, mode = self._out / path, 0
         if ownership is not Ownership.OWN and old is not None:
@@ -344,7 +347,7 @@ class _Transaction:
                 folder.rmdir()
         return torn
 
-    def _tidy(self, changes: list[Change]) -> None:
+    def _tidy(self, changes: list[FileChange]) -> None:
         """Remove drafts, byte code of removed modules, and folders that are empty now."""
         folders: set[Path] = set()
         for change in changes:
@@ -367,9 +370,9 @@ def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     A link stays one, and the file that it leads to is replaced.
     """
     target = path.resolve()
-    change = Change(target.name, old.encode("utf-8"), new.encode("utf-8"))
+    change = FileChange(target.name, old.encode("utf-8"), new.encode("utf-8"))
     folder = PurePosixPath(name).parent.as_posix()
-    return apply(Plan(target.parent, (change,), {}), folder, report)
+    return apply(WritePlan(target.parent, (change,), {}), folder, report)
 
 
 class EditedFile(NamedTuple):

@@ -14,7 +14,7 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.model import ir
 from idlc.project import inputs, prefixes
-from idlc.project.library import Texts
+from idlc.project.library import InterfaceTexts
 from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
@@ -70,7 +70,7 @@ def recorded_packages(
     report: Report,
     *,
     whole: bool,
-) -> tuple[list[inputs.Inputs], Texts]:
+) -> tuple[list[inputs.Inputs], InterfaceTexts]:
     """Return the packages of recorded types with all that these need, and their definitions.
 
     `whole` packages are for a prefix, where they hide those of the same name in others.

@@ -21,7 +21,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
-from idlc.project.library import Library, Texts
+from idlc.project.library import InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
@@ -144,7 +144,7 @@ class Contents:
     def __init__(self) -> None:
         self._contents: dict[tuple[ir.TypeName, str, bool], Hashable] = {}
 
-    def agree(self, some: Texts, others: Texts) -> bool:
+    def agree(self, some: InterfaceTexts, others: InterfaceTexts) -> bool:
         """Return whether no name has different definitions in both."""
         return all(
             self.same(name, source, others[name]) for name, source in some.items() if name in others
@@ -174,6 +174,10 @@ WRONG = "the recorded hash does not match the definition of"
 _RECORDERS = "the recorder and the publisher used different versions of the interface files"
 
 
+def _named(names: Iterable[ir.TypeName]) -> str:
+    return first_few((f"`{name}`" for name in sorted(names)), NAMED)
+
+
 class DefinedTopic(NamedTuple):
     """A topic of a type that is defined, in the recording or locally."""
 
@@ -185,7 +189,9 @@ class DefinedTopic(NamedTuple):
 class LocalTypes:
     """The types that are defined locally, without any recording; `texts` take precedence."""
 
-    def __init__(self, scope: Scope, report: Report, texts: Texts = MappingProxyType({})) -> None:
+    def __init__(
+        self, scope: Scope, report: Report, texts: InterfaceTexts = MappingProxyType({})
+    ) -> None:
         self.scope = scope
         self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
@@ -218,6 +224,7 @@ def recorded_types(version: Version, local: LocalTypes, report: Report) -> Recor
     types = RecordedTypes(version, local, problems, {})
     faulty = {diagnostic.where[0] for diagnostic in types.errors}
     broken = {
+        **{name: ABSENT for name, own in types.texts.items() if own.is_incomplete},
         **dict.fromkeys(types.empty, ABSENT),
         **dict.fromkeys(types.wrong, WRONG),
         **{name: UNREADABLE for name, own in types.texts.items() if own.path in faulty},
@@ -321,12 +328,25 @@ class RecordedTypes:
                 if why != ABSENT or not sure:
                     doubtful.setdefault((typed.recorded.recording, why, sure), set()).add(name)
         for (recording, why, sure), undefined in doubtful.items():
-            names = first_few((f"`{name}`" for name in sorted(undefined)), NAMED)
+            names = _named(undefined)
             which = "the recorded hash" if sure else "the same name"
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
             message = f"{why} {names}; idlc uses the local type, which has {which}"
             hint = _RECORDERS if why == WRONG else None
             yield code.of(recording, message, hint=hint if sure else BORROWED)
+        partial: dict[str, set[ir.TypeName]] = {}
+        for typed in self.topics:
+            texts = ((name, self.texts.get(name)) for name in self.names_of(typed))
+            names_of_partial = {name for name, own in texts if own and own.is_incomplete}
+            partial.setdefault(typed.recorded.recording, set()).update(names_of_partial)
+        for recording, incomplete in partial.items():
+            if incomplete:
+                yield codes.MISSING_DEFINITION.of(
+                    recording,
+                    f"constants, default values and comments may be missing in {_named(incomplete)}"
+                    ", because nodes of ROS 2 sent incomplete texts",
+                    hint=f"{including('DIR')}, where DIR contains the package's sources",
+                )
 
     def names_of(self, topic: DefinedTopic) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of, without those that ROS 2 adds."""

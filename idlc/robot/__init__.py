@@ -1,4 +1,4 @@
-"""A live robot: its graph and types, and nodes without ROS, over the protocol of rmw_zenoh."""
+"""A live robot: its graph and types, and nodes without ROS, over DDS or Zenoh."""
 
 from idlc.robot.actions import ActionClient as ActionClient
 from idlc.robot.actions import ActionServer as ActionServer

@@ -2,8 +2,9 @@
 
   Usage: python -m idlc.robot [FILE | -m MODULE] [ARGUMENTS]...
 
-The node speaks the protocol of rmw_zenoh. ARGUMENTS are arguments for the node, such as
-`--ros-args -r a:=b`. docs/robot-nodes.md lists the names of rclpy that idlc offers.
+The node speaks DDS, or Zenoh if RMW_IMPLEMENTATION is rmw_zenoh_cpp. ARGUMENTS are arguments for
+the node, such as `--ros-args -r a:=b`. docs/robot-nodes.md lists the names of rclpy that idlc
+offers.
 """
 
 from __future__ import annotations

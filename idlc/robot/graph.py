@@ -8,7 +8,7 @@ from itertools import islice
 from threading import Condition
 from typing import TypeVar
 
-from idlc.robot.keys import Entity, Kind, all_tokens, parse_token
+from idlc.robot.keys import Entity, Kind, parse_token
 from idlc.robot.transport import Transport
 
 #: The memory of a graph's entities, about so much for each and for each character of its token.
@@ -44,19 +44,18 @@ class Graph:
         self._entities: dict[str, Entity] = {}
         self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
         self._changed = Condition()
-        pattern = all_tokens(domain)
         end = time.monotonic() + _PATIENCE
         # Zenoh may answer with nothing after the watch; what goes in between never arrives
-        self._expected, known = self._ask(transport, pattern), 0
+        self._expected, known = self._ask(transport, domain), 0
         while _UNKNOWN in self._expected and known < len(self._expected) and time.monotonic() < end:
             known = len(self._expected)
-            self._expected = self._ask(transport, pattern)
-        self._watch = transport.watch(pattern, self._update)
+            self._expected = self._ask(transport, domain)
+        self._watch = transport.watch(domain, self._update)
         for _ in range(_TIMES):
             known = len(self._entities)
             if self.wait_for(Graph._has_expected, _SETTLED):
                 break
-            answer = self._ask(transport, pattern)
+            answer = self._ask(transport, domain)
             self._expected = answer or self._expected
             is_over = time.monotonic() > end
             if is_over or (_UNKNOWN in answer and len(self._entities) == known):
@@ -64,10 +63,10 @@ class Graph:
         self.is_incomplete = not self._has_expected()
         self._expected.clear()
 
-    def _ask(self, transport: Transport, pattern: str) -> set[str]:
+    def _ask(self, transport: Transport, domain: int) -> set[str]:
         """Return the valid tokens that exist, so many as have room."""
         tokens: set[str] = set()
-        valid = filter(parse_token, transport.tokens(pattern, _TIMEOUT))
+        valid = filter(parse_token, transport.tokens(domain, _TIMEOUT))
         try:
             tokens.update(islice(valid, self._limit // ENTITY_BYTES))
         except TimeoutError:

@@ -82,13 +82,24 @@ def open_session(
 ) -> Session:
     """Return a session with a robot.
 
-    An address is an endpoint such as `tcp/robot:7447`, or `zenoh:FILE`, a configuration file of
-    Zenoh. The session is a client of the endpoint, which answers within `timeout` seconds. Without
-    an address, it is a peer as in rmw_zenoh: of ZENOH_SESSION_CONFIG_URI, or of the router on
-    localhost, which may start later. ROS_DOMAIN_ID is the default of `domain`, and
-    ZENOH_CONFIG_OVERRIDE applies always. Only a configuration can admit other machines. Raises
+    An address is `dds`, with a domain or a peer such as `dds:7` or `dds/192.168.1.20`, an endpoint
+    such as `tcp/robot:7447`, or `zenoh:FILE`, a configuration file of Zenoh. The session is a
+    client of the endpoint, which answers within `timeout` seconds. Without an address, it is on
+    DDS, unless RMW_IMPLEMENTATION is `rmw_zenoh_cpp` or a variable configures Zenoh. Then it is a
+    peer as in rmw_zenoh: of ZENOH_SESSION_CONFIG_URI, or of the router on localhost, which may
+    start later. ROS_DOMAIN_ID is the default of `domain`, and ZENOH_CONFIG_OVERRIDE applies always
+    to Zenoh. Only an address, a variable or a configuration can admit other machines. Raises
     RobotError.
     """
+    zenoh_is_wanted = environ.get("RMW_IMPLEMENTATION") == "rmw_zenoh_cpp" or any(
+        environ.get(name) for name in ("ZENOH_SESSION_CONFIG_URI", "ZENOH_CONFIG_OVERRIDE")
+    )
+    if re.match(r"dds(?:[:/]|\Z)", address) or not (address or zenoh_is_wanted):
+        from idlc.robot.dds.address import parse_place
+        from idlc.robot.dds.transport import DdsTransport
+
+        place = parse_place(address or "dds", domain, environ)
+        return Session(DdsTransport(place), place.domain)
     path = environ.get("ZENOH_SESSION_CONFIG_URI", "")
     if address:
         path = address.removeprefix(_FILE) if address.startswith(_FILE) else ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import NamedTuple, Protocol, TypeAlias
 
-from idlc.robot.qos import QoSProfile
+from idlc.robot.keys import Entity
 
 
 class Sample(NamedTuple):
@@ -55,33 +55,46 @@ class Transport(Protocol):
 
     id: str
 
-    def publisher(self, key: str, qos: QoSProfile) -> Sender:
+    def gid(self, entity: Entity) -> bytes:
+        """Return the 16 bytes by which others know an endpoint of this connection."""
+
+    def publisher(self, entity: Entity) -> Sender:
         """Declare a publisher; one that is latched keeps its last messages."""
 
-    def subscriber(
-        self, key: str, qos: QoSProfile, callback: Callable[[Sample], None]
-    ) -> Closeable:
+    def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
         """Call `callback` with each message; a latched profile also gets earlier ones."""
 
-    def service(self, key: str, callback: Callable[[Request], None]) -> Closeable:
+    def service(self, entity: Entity, callback: Callable[[Request], None]) -> Closeable:
         """Call `callback` with each request."""
 
     def call(
-        self, key: str, payload: bytes, attachment: bytes, callback: OnReply, *, timeout: float
+        self,
+        entity: Entity,
+        payload: bytes,
+        attachment: bytes,
+        callback: OnReply,
+        *,
+        timeout: float,
     ) -> None:
-        """Send a request; the end comes when all have replied, or after `timeout` seconds."""
+        """Send a request of a client.
 
-    def announce(self, token: str) -> Closeable:
-        """Show a token to all sessions while the declaration lasts."""
+        The end comes when all services have replied, or after `timeout` seconds.
+        """
 
-    def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
-        """Call `callback` with each token that matches, now and later: True appears, False goes."""
+    def announce(self, entity: Entity) -> Closeable:
+        """Show a node or an endpoint to all sessions while the declaration lasts."""
 
-    def tokens(self, pattern: str, timeout: float) -> Iterable[str]:
-        """Yield the tokens that match now.
+    def watch(self, domain: int, callback: Callable[[str, bool], None]) -> Closeable:
+        """Call `callback` with each token of a domain, now and later: True appears, False goes."""
+
+    def tokens(self, domain: int, timeout: float) -> Iterable[str]:
+        """Yield the tokens of a domain that exist now.
 
         Raises TimeoutError after `timeout` seconds if answers may be missing.
         """
+
+    def notes(self) -> list[str]:
+        """Return sentences about what this connection cannot show."""
 
     def close(self) -> None:
         """Close the connection; all declarations end with it."""

@@ -12,7 +12,8 @@ import zenoh
 from zenoh import CongestionControl, Reliability, ext
 
 from idlc.project.atomic import without_ctrl_c
-from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from idlc.robot.keys import Entity, all_tokens
+from idlc.robot.qos import HistoryPolicy, ReliabilityPolicy
 from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
 #: Seconds between the heartbeats by which subscriptions notice that they missed a message.
@@ -35,8 +36,13 @@ class ZenohTransport:
         #: Zenoh withdraws declarations that nobody refers to.
         self._declared: set[_Declared] = set()
 
-    def publisher(self, key: str, qos: QoSProfile) -> Sender:
+    def gid(self, entity: Entity) -> bytes:
+        """Return the hash of the token."""
+        return entity.gid
+
+    def publisher(self, entity: Entity) -> Sender:
         """Declare a publisher."""
+        key, qos = entity.key, entity.qos
         reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         blocks = reliable and qos.history is HistoryPolicy.KEEP_ALL
         options: dict[str, Any] = {
@@ -54,10 +60,9 @@ class ZenohTransport:
         )
         return _LatchedSender(self._declared, publisher)
 
-    def subscriber(
-        self, key: str, qos: QoSProfile, callback: Callable[[Sample], None]
-    ) -> Closeable:
+    def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
         """Declare a subscriber."""
+        key, qos = entity.key, entity.qos
 
         def put(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
@@ -75,15 +80,22 @@ class ZenohTransport:
         )
         return _Declared(self._declared, subscriber)
 
-    def service(self, key: str, callback: Callable[[Request], None]) -> Closeable:
+    def service(self, entity: Entity, callback: Callable[[Request], None]) -> Closeable:
         """Declare a queryable."""
+        key = entity.key
         receive = _direct(lambda query: callback(_Request(query, key)))
         queryable = self._session.declare_queryable(key, receive, complete=True)
         return _Declared(self._declared, queryable)
 
     @without_ctrl_c()
     def call(
-        self, key: str, payload: bytes, attachment: bytes, callback: OnReply, *, timeout: float
+        self,
+        entity: Entity,
+        payload: bytes,
+        attachment: bytes,
+        callback: OnReply,
+        *,
+        timeout: float,
     ) -> None:
         """Send a query to all services."""
 
@@ -92,7 +104,7 @@ class ZenohTransport:
                 callback(_sample(sample))
 
         self._session.get(
-            key,
+            entity.key,
             _direct(answer, lambda: callback(None)),
             payload=payload,
             attachment=attachment,
@@ -102,21 +114,22 @@ class ZenohTransport:
         )
 
     @without_ctrl_c()
-    def announce(self, token: str) -> Closeable:
+    def announce(self, entity: Entity) -> Closeable:
         """Declare a liveliness token."""
-        return _Declared(self._declared, self._liveliness.declare_token(token))
+        return _Declared(self._declared, self._liveliness.declare_token(entity.token))
 
     @without_ctrl_c()
-    def watch(self, pattern: str, callback: Callable[[str, bool], None]) -> Closeable:
+    def watch(self, domain: int, callback: Callable[[str, bool], None]) -> Closeable:
         """Subscribe to liveliness tokens, with those that exist."""
 
         def receive(sample: zenoh.Sample) -> None:
             callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
+        pattern = all_tokens(domain)
         subscriber = self._liveliness.declare_subscriber(pattern, _direct(receive), history=True)
         return _Declared(self._declared, subscriber)
 
-    def tokens(self, pattern: str, timeout: float) -> Iterator[str]:
+    def tokens(self, domain: int, timeout: float) -> Iterator[str]:
         """Query the liveliness tokens that exist."""
         # The session answers from its own memory before `get` returns, so nothing may block there
         replies: SimpleQueue[Any] = SimpleQueue()
@@ -127,11 +140,15 @@ class ZenohTransport:
 
         end = partial(replies.put, None)
         with without_ctrl_c():
-            self._liveliness.get(pattern, _direct(receive, end), timeout=timeout)
+            self._liveliness.get(all_tokens(domain), _direct(receive, end), timeout=timeout)
         while (reply := replies.get()) is not None:
             if reply.ok is None:
                 raise TimeoutError
             yield str(reply.ok.key_expr)
+
+    def notes(self) -> list[str]:
+        """Return nothing."""
+        return []
 
     def close(self) -> None:
         """Close the Zenoh session."""

@@ -22,7 +22,7 @@ from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
-from idlc.project.write import Change, Plan, apply, compare, difference, shown
+from idlc.project.write import FileChange, WritePlan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, Endpoint, Role
 
 
@@ -164,10 +164,10 @@ class Project:
             return None
         if self._settings.dry_run:
             return Result(self.name, tuple(done), tuple(self._diff(changes.values())))
-        plan = Plan(self.path, (*changes.values(),), {})
+        plan = WritePlan(self.path, (*changes.values(),), {})
         return Result(self.name, tuple(done)) if apply(plan, self.name, self._report) else None
 
-    def _diff(self, changes: Iterable[Change]) -> Iterator[str]:
+    def _diff(self, changes: Iterable[FileChange]) -> Iterator[str]:
         """Yield the lines of a unified diff of planned changes."""
         for change in changes:
             path = self.shown(change.path)

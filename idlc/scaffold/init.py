@@ -382,7 +382,9 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
         return ""
     note = f"idlc does not run {SETUP}, which computes `packages`; a build with idlc adds the "
     note += "generated packages; for builds without idlc, write "
-    note += f"`packages=find_packages(exclude=['test'])`, or add `{name}` and its subpackages"
+    note += (
+        f"`packages=find_packages(exclude=['test', 'test.*'])`, or add `{name}` and its subpackages"
+    )
     return note
 
 

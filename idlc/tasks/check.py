@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check import cmake_lists, outputs
+from idlc.check import builds, cmake_lists, outputs
 from idlc.check.registry import advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
 from idlc.compiler.compiler import Compiler, library_for, stage
@@ -18,6 +18,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.packaging.facts import Facts, facts
+from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
 from idlc.project.find import KINDS, RULES, list_files, no_interfaces
@@ -104,8 +105,9 @@ def _check_files(options: CheckOptions, report: Report) -> CheckResult:
     report.extend((*looked, *problems))
     report.notes += looked.notes
     first = next(iter(checking.values()))
-    looked_at = filter(None, map(first.package_facts, packages))
-    notes = tuple(filter(None, map(cmake_lists.unknown, looked_at)))
+    looked_at = [*filter(None, map(first.package_facts, packages))]
+    unjudged = (note(each) for each in looked_at for note in (cmake_lists.unknown, builds.unjudged))
+    notes = tuple(filter(None, unjudged))
     return CheckResult(files, len(packages), fixed, distros, notes, texts)
 
 
@@ -182,6 +184,8 @@ class Checker:
     ) -> None:
         self._scope = scope
         self.library = library_for(packages, scope, Report())
+        folders = {package.package: package.folders for package in packages}
+        self._neighbours = Neighbours(folders, scope.root)
         self._lowered: link.Memory = {}
         # dependencies between interfaces are only worth remembering for a next run
         self._checked = IncrementalFindings() if again else None
@@ -219,7 +223,9 @@ class Checker:
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""
         if package.package not in self._facts:
-            self._facts[package.package] = facts(package, self.library.packages, self._scope)
+            self._facts[package.package] = facts(
+                package, self.library.packages, self._neighbours, self._scope
+            )
         current = self._facts[package.package]
         if current is None or not current.inputs:
             return current

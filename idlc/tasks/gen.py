@@ -10,7 +10,7 @@ import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for
 from idlc.diagnostics.report import Report, first_few
-from idlc.generate.package import Generated, Package, generated, up_to_date, with_needs
+from idlc.generate.package import Generated, PlannedPackage, generated, up_to_date, with_needs
 from idlc.generate.target import (
     Output,
     Target,
@@ -24,7 +24,7 @@ from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
-from idlc.project.library import Library, Texts, resolve
+from idlc.project.library import InterfaceTexts, Library, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.requests import (
@@ -111,7 +111,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     paths = [word for word in others if not is_name(word, root)]
     words = [word for word in others if is_name(word, root)]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
-    texts: Texts = {}
+    texts: InterfaceTexts = {}
     if recordings and not report.had_errors:
         from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_packages
@@ -202,7 +202,10 @@ def named_packages(
 
 
 def _compile_and_write(
-    requested: Mapping[Target, inputs.Inputs], texts: Texts, options: GenOptions, report: Report
+    requested: Mapping[Target, inputs.Inputs],
+    texts: InterfaceTexts,
+    options: GenOptions,
+    report: Report,
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(requested.values()), options.scope, report, texts)
     if not options.check and not report.had_errors and not _may_be_refused(requested, library):
@@ -238,7 +241,7 @@ def _may_be_refused(requested: Mapping[Target, inputs.Inputs], library: Library)
     return any(OPTIONAL.encode() in file.data for file in files)
 
 
-def _write(packages: Sequence[Package]) -> bool:
+def _write(packages: Sequence[PlannedPackage]) -> bool:
     """Write packages and remove what earlier runs left; return whether all of it was possible."""
     stale = tuple(leftovers(packages))
     removals = [(target, plan) for target, plan in stale if plan]

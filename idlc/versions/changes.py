@@ -9,7 +9,7 @@ from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
-from idlc.diagnostics.codes import Code
+from idlc.diagnostics.codes import DiagnosticCode
 from idlc.diagnostics.report import Diagnostic, Label
 from idlc.diagnostics.source import Span
 from idlc.model import ir
@@ -30,7 +30,7 @@ class Change(NamedTuple):
     path of a missing file. `detail` is text of several lines.
     """
 
-    code: Code
+    code: DiagnosticCode
     subject: str
     message: str
     levels: frozenset[Level]

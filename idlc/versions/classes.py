@@ -11,7 +11,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import NEWEST
 from idlc.model.from_description import model_of_description
-from idlc.project.library import Library, Texts
+from idlc.project.library import InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.recordings.definitions import interface_of
 from idlc.runtime.names import owner_of
@@ -92,7 +92,7 @@ class _Texts(Library):
         return self.texts.get(name)
 
 
-def version_of_texts(texts: Texts, name: ir.TypeName) -> Version | None:
+def version_of_texts(texts: InterfaceTexts, name: ir.TypeName) -> Version | None:
     """Return the version of a type that texts define; `None` after errors, or over a limit."""
     report = Report()
     library = _Texts((), Root.here(), report, distro=NEWEST, texts=texts)

@@ -36,7 +36,7 @@ class Sides(NamedTuple):
 
     def change(
         self,
-        code: codes.Code,
+        code: codes.DiagnosticCode,
         element: ir.Field | ir.Constant,
         message: str,
         levels: Iterable[Level],
@@ -55,6 +55,12 @@ class Sides(NamedTuple):
         return self.before.describer.hash(name), self.after.describer.hash(name)
 
     @property
+    def is_incomplete(self) -> bool:
+        """True if a version may lack constants and default values, so that these tell nothing."""
+        sources = self.old.source, self.new.source
+        return any(source is not None and source.is_incomplete for source in sources)
+
+    @property
     def top(self) -> Span | None:
         """The beginning of the new version, for what it no longer has."""
         return Span(self.new.source, 0, 0) if self.new.source else None
@@ -67,6 +73,8 @@ def field_changes(sides: Sides) -> Iterator[Change]:
     """
     broken = not reads_alike(sides.old, sides.new, sides.before.messages, sides.after.messages)
     changes = with_wire(list(_changes(sides)), broken)
+    if sides.is_incomplete:
+        changes = [change for change in changes if change.code is not codes.FIELD_DEFAULT_CHANGED]
     if any("hash" in change.levels for change in changes) and len({*sides.hashes}) == 1:
         changes = [change.without("hash") for change in changes]
     yield from (change for change in changes if change.levels)
@@ -210,6 +218,8 @@ def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
 
 def constant_changes(sides: Sides) -> Iterator[Change]:
     """Yield the changes of the constants; their order has no meaning."""
+    if sides.is_incomplete:
+        return
     pairing = pair(sides.old.constants, sides.new.constants, _content)
     source: tuple[Level] = ("source",)
     for constant in pairing.removed:
@@ -238,6 +248,8 @@ def constant_changes(sides: Sides) -> Iterator[Change]:
 
 def added(sides: Sides) -> Iterator[str]:
     """Yield the constants that only the new version has."""
+    if sides.is_incomplete:
+        return
     for constant in pair(sides.old.constants, sides.new.constants, _content).added:
         yield f"constant `{sides.new.name}.{constant.name}`"
 

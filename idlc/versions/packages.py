@@ -18,7 +18,14 @@ from idlc.diagnostics.text import edit_distance
 from idlc.model import derive, ir
 from idlc.model.ir import meaning
 from idlc.model.link import Model
-from idlc.project.settings import Config, TableLocation, Tables, Text, command_table, read_table
+from idlc.project.settings import (
+    Config,
+    TableLocation,
+    TablesValue,
+    TextValue,
+    command_table,
+    read_table,
+)
 from idlc.versions.changes import LEVELS, Change, Level
 from idlc.versions.fields import Sides, added, constant_changes, field_changes
 
@@ -205,8 +212,8 @@ def raised(version: str, part: Literal["major", "minor", "patch"]) -> str | None
 class BreakingSettings(msgspec.Struct, frozen=True):
     """`[tool.idlc.breaking]`."""
 
-    allow: Tables = ()
-    against: Text = ""
+    allow: TablesValue = ()
+    against: TextValue = ""
 
 
 def _words(description: str) -> Meta:
@@ -227,7 +234,7 @@ class Allowance(msgspec.Struct, frozen=True):
         datetime.date,
         Meta(title="a date such as 2030-12-31", description="its last day, such as 2030-12-31"),
     ]
-    code: Text = ""
+    code: TextValue = ""
 
     def covers(self, change: Change) -> bool:
         """Return whether the entry allows a change, or the one that it follows from."""

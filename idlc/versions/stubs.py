@@ -80,7 +80,7 @@ def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) 
     shown = folder.rstrip("/")
     changes = write.compare(out, shown, every, {}, report)
     kept = [change for change in changes if change.path != "__init__.py" or change.old is None]
-    if report.had_errors or not write.apply(write.Plan(out, tuple(kept), {}), shown, report):
+    if report.had_errors or not write.apply(write.WritePlan(out, tuple(kept), {}), shown, report):
         return []
     return [f"{shown}/{change.path}" for change in kept if change.path in files]
 

@@ -14,7 +14,9 @@ from idlc.diagnostics.report import Severity
 
 
 def test_constants_are_called_like_their_slugs():
-    named = {name: one for name, one in vars(codes).items() if isinstance(one, codes.Code)}
+    named = {
+        name: one for name, one in vars(codes).items() if isinstance(one, codes.DiagnosticCode)
+    }
     assert [one.slug for one in named.values()] == [
         name.lower().replace("_", "-") for name in named
     ]

@@ -3,7 +3,7 @@
 import pytest
 
 from idlc.compiler.verdicts import IncrementalFindings
-from idlc.editor.workspace import Settings, Workspace
+from idlc.editor.workspace import EditorSettings, Workspace
 
 FILES = {
     "A.msg": "B b\n",
@@ -35,7 +35,7 @@ def folder(tmp_path):
 def test_only_what_depends_on_a_change_is_asked_about_again(
     folder, monkeypatch, changed, text, kept
 ):
-    workspace = Workspace(folder, Settings(), dict)
+    workspace = Workspace(folder, EditorSettings(), dict)
     workspace.snapshot()
     seen = []
 
@@ -49,7 +49,7 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
     workspace.follow(folder / "msg" / changed, text.encode())
     after = workspace.snapshot()
     assert set(seen) == {kept}
-    fresh = Workspace(folder, Settings(), dict)
+    fresh = Workspace(folder, EditorSettings(), dict)
     (folder / "msg" / changed).write_text(text)
     told, expected = (
         [(one.code, one.message, one.where) for one in state.problems]

@@ -11,7 +11,7 @@ import pytest
 from lsprotocol import types as lsp
 
 from idlc.editor.protocol import ADD_DEPENDENCY, RequestError
-from idlc.editor.workspace import Settings, Workspace
+from idlc.editor.workspace import EditorSettings, Workspace
 from tests.editors.scenario import RENAMED, RENAMING, write
 from tests.support.rounds import some
 from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
@@ -506,7 +506,7 @@ class Sequence:
         there = {one.removeprefix("base/") for one in texts if one.startswith("base/msg/")}
         assert named == there, step
         overlaid = {path: text.encode() for path, text in self.client.texts.items()}
-        workspace = Workspace(self.folder, Settings(), lambda: overlaid)
+        workspace = Workspace(self.folder, EditorSettings(), lambda: overlaid)
         snapshot = workspace.snapshot()
         expected = set()
         for one in snapshot.problems:

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 import yaml
 
-from idlc.editor.workspace import Settings
+from idlc.editor.workspace import EditorSettings
 from idlc.model.ir import PRIMITIVES
 from idlc.model.lowering.lower_types import STRINGS
 from idlc.project.find import KINDS
@@ -42,7 +42,7 @@ def test_the_language():
 def test_the_settings_are_those_of_the_server():
     properties = CONTRIBUTED["configuration"]["properties"]
     given = {name.removeprefix("idlc."): value["default"] for name, value in properties.items()}
-    taken = msgspec.to_builtins(Settings())
+    taken = msgspec.to_builtins(EditorSettings())
     assert {name: value for name, value in given.items() if name not in OWN} == {
         name: list(value) if isinstance(value, tuple) else value for name, value in taken.items()
     }

@@ -155,7 +155,7 @@ def test_no_command_of_others_is_printed(command, folder):
 
 def test_a_table_of_its_own_would_be_noticed():
     table = {
-        prefix.text: prefix.place is ci.Place.START
+        prefix.text: prefix.place is ci.LinePart.START
         for every in ci.SYSTEMS.values()
         for prefix in every
     }

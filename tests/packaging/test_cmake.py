@@ -82,7 +82,8 @@ HEAD = (
     '<package format="3">\n  <name>demo</name>\n'
     "  <buildtool_depend>rosidl_default_generators</buildtool_depend>\n"
     "  <exec_depend>rosidl_default_runtime</exec_depend>\n"
-    "  <member_of_group>rosidl_interface_packages</member_of_group>\n{}</package>\n"
+    "  <member_of_group>rosidl_interface_packages</member_of_group>\n{}"
+    "  <export><build_type>ament_cmake</build_type></export>\n</package>\n"
 )
 GEN = "rosidl_generate_interfaces(demo msg/A.msg"
 

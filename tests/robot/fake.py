@@ -1,9 +1,12 @@
 """A robot on the transport alone: endpoints, the type description service, and a service."""
 
+import copy
 import time
+from collections import deque
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Timer
 
 from idlc.api.load import load
 from idlc.diagnostics.report import Report
@@ -25,6 +28,20 @@ FILES = {
     "action/Move.action": "float64 distance\n---\nbool arrived\n---\nfloat64 left\n",
 }
 DESCRIBE = "type_description_interfaces/srv/GetTypeDescription"
+
+
+def damaged(text):
+    """Return a text as rosidl puts it into nodes; a default value has one line."""
+    return "\n".join(repr(line.encode())[2:-1] for line in text.splitlines())[: len(text)]
+
+
+def with_damaged_defaults(description):
+    """Return a description as nodes of ROS 2 send it."""
+    description = copy.deepcopy(description)
+    for part in (description["type_description"], *description["referenced_type_descriptions"]):
+        for field in part["fields"]:
+            field["default_value"] = damaged(field["default_value"])
+    return description
 
 
 def write_files(folder, files=FILES):
@@ -71,6 +88,7 @@ class Robot:
         self.files = files
         self.node = node
         self.requests = []
+        self.like_rosidl = False
         self.node_id = self.session.next_id()
         self.declared = []
         self.announce(Kind.NODE)
@@ -90,7 +108,7 @@ class Robot:
             hash=hash_,
             qos=qos or QoSProfile(depth=10),
         )
-        self.declared.append(self.transport.announce(entity.token))
+        self.declared.append(self.transport.announce(entity))
         if wait:
             self.await_count(kind, name, 1)
         return entity
@@ -105,10 +123,19 @@ class Robot:
 
         assert self.observer.graph.wait_for(seen, 60)
 
-    def describe_types(self, answer=None):
-        """Offer the type description service, with other bytes if `answer` returns some."""
+    def describe_types(self, answer=None, like_rosidl=False):
+        """Offer the type description service, with other bytes if `answer` returns some.
+
+        `like_rosidl`: texts and default values are damaged, and only ten requests wait.
+        """
+        self.like_rosidl = like_rosidl
+        waiting = deque(maxlen=10)
         service = standard(DESCRIBE)
         entity = self.announce(Kind.SERVICE, f"/{self.node}/get_type_description", DESCRIBE)
+
+        def receive(request):
+            waiting.append(request)  # what is dropped for it ends without a reply
+            Timer(0.02, lambda: reply(waiting.popleft()) if waiting else None).start()
 
         def reply(request):
             asked = service.Request.deserialize(request.payload)
@@ -120,7 +147,7 @@ class Robot:
             else:
                 request.drop()
 
-        self.declared.append(self.transport.service(entity.key, reply))
+        self.declared.append(self.transport.service(entity, receive if like_rosidl else reply))
 
     def description(self, service, asked):
         hash_, description, interface = described(asked.type_name, tuple(self.files.items()))
@@ -134,7 +161,10 @@ class Robot:
             # what is derived from other files comes without a text
             encoding, text = ("implicit", "") if text is None else (kind, text)
             if package == "demo_msgs" and kind != "action":
+                text = damaged(text) if self.like_rosidl else text
                 sources.append({"type_name": name, "encoding": encoding, "raw_file_contents": text})
+        if self.like_rosidl:
+            description = with_damaged_defaults(description)
         response = service.Response.from_dict(
             {"successful": True, "type_description": description, "type_sources": sources}
         )
@@ -144,7 +174,7 @@ class Robot:
     def publisher(self, name, type_, qos=None, hash_=None):
         """Return a function that publishes a message or bytes."""
         entity = self.announce(Kind.PUBLISHER, name, type_, hash_, qos)
-        sender = self.transport.publisher(entity.key, entity.qos)
+        sender = self.transport.publisher(entity)
         self.declared.append(sender)
         count = iter(range(1, 1 << 30))
 
@@ -168,7 +198,7 @@ class Robot:
                 data = made if isinstance(made, bytes) else made.serialize()
                 request.reply(data, request.attachment)
 
-        self.declared.append(self.transport.service(entity.key, reply))
+        self.declared.append(self.transport.service(entity, reply))
 
     def action(self, name, type_):
         """Announce the five parts of an action server."""

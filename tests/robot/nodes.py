@@ -2,6 +2,7 @@
 
 import contextlib
 from queue import Empty, SimpleQueue
+from typing import NamedTuple
 
 import idlc
 from idlc.robot import Executor, Node, QoSProfile, open_session
@@ -10,6 +11,13 @@ from tests.support.waiting import wait_for
 
 String = idlc.load("std_msgs/msg/String").String
 SetBool = idlc.load("std_srvs/srv/SetBool").SetBool
+
+
+class Keyed(NamedTuple):
+    """What Zenoh needs of an endpoint."""
+
+    key: str
+    qos: QoSProfile = QoSProfile()
 
 
 @contextlib.contextmanager
@@ -31,8 +39,8 @@ def spin_until(condition, *nodes):
 def pass_on(left, right):
     """Return when the router has passed on all that `left` sent so far."""
     passed = SimpleQueue()
-    right.transport.subscriber("0/last", QoSProfile(depth=1), passed.put)
-    last = left.transport.publisher("0/last", QoSProfile(depth=1))
+    right.transport.subscriber(Keyed("0/last", QoSProfile(depth=1)), passed.put)
+    last = left.transport.publisher(Keyed("0/last", QoSProfile(depth=1)))
 
     def send():
         last.put(b"", attachment=b"")

@@ -22,16 +22,16 @@ class Tokens:
         self.update = None
         self.gone = set()
 
-    def watch(self, pattern, callback):
-        assert pattern == "@ros2_lv/0/**"
+    def watch(self, domain, callback):
+        assert domain == 0
         self.update = callback
         for token in self.initial:
             if token not in self.gone:
                 callback(token, True)
         return self
 
-    def tokens(self, pattern, timeout):
-        assert (pattern, timeout) == ("@ros2_lv/0/**", 9.0)
+    def tokens(self, domain, timeout):
+        assert (domain, timeout) == (0, 9.0)
         tokens, self.initial = self.initial, [t for t in self.initial if t not in self.gone]
         return tokens
 
@@ -107,13 +107,13 @@ class SlowTokens(Tokens):
         self.parts = [*parts]
         self.late = late
 
-    def watch(self, pattern, callback):
-        assert pattern == "@ros2_lv/0/**"
+    def watch(self, domain, callback):
+        assert domain == 0
         self.update = callback
         return self
 
-    def tokens(self, pattern, timeout):
-        assert (pattern, timeout) == ("@ros2_lv/0/**", 9.0)
+    def tokens(self, domain, timeout):
+        assert (domain, timeout) == (0, 9.0)
         if self.update and self.late:
             for token in self.initial:
                 self.update(token, True)

@@ -74,7 +74,7 @@ def test_definitions_with_another_hash_are_refused(router, capsys):
     assert not Path("out/demo_msgs").exists()
     err = capsys.readouterr().err
     assert "idlc skips `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
-    assert "another type hash" in err
+    assert "`/driver` sends an unusable type description" in err
 
 
 @pytest.mark.parametrize("reply", [b"", b"\0", b"\0\1\0\0" + b"\xff" * 50, b"x" * 5_000_000])

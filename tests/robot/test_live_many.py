@@ -34,17 +34,23 @@ class Tokens:
     def __init__(self, tokens):
         self._tokens = tokens
 
-    def tokens(self, _pattern, _timeout):
+    def gid(self, entity):
+        return entity.gid
+
+    def tokens(self, _domain, _timeout):
         return self._tokens
 
-    def watch(self, _pattern, callback):
+    def watch(self, _domain, callback):
         for token in self._tokens:
             callback(token, True)
         return self
 
-    def call(self, _key, _payload, _attachment, callback, *, timeout):
+    def call(self, _entity, _payload, _attachment, callback, *, timeout):
         assert timeout > 0
         callback(None)
+
+    def notes(self):
+        return []
 
     def close(self):
         pass

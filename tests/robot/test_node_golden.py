@@ -17,7 +17,7 @@ from idlc.robot import (
     ReliabilityPolicy,
     open_session,
 )
-from idlc.robot.keys import Kind, all_tokens, pack_attachment, parse_attachment
+from idlc.robot.keys import Kind, pack_attachment, parse_attachment
 from idlc.robot.qos import (
     qos_profile_parameter_events,
     qos_profile_parameters,
@@ -25,7 +25,7 @@ from idlc.robot.qos import (
     qos_profile_services_default,
     qos_profile_system_default,
 )
-from tests.robot.nodes import LONG, String, node_at, spin_until
+from tests.robot.nodes import LONG, Keyed, String, node_at, spin_until
 from tests.robot.test_qos import BEST_AVAILABLE
 from tests.support.paths import ROOT
 
@@ -82,8 +82,8 @@ def test_tokens_and_bytes_are_those_of_rclpy(router, types):
     ):
         (drive_key, drive_attachment, drive, *_), *_ = CAPTURE["samples"]
         ((add_key, _, add_attachment, add),) = CAPTURE["requests"]
-        other.transport.subscriber(drive_key, PROFILES["qos_default10"], samples.put)
-        other.transport.service(add_key, requests.put)
+        other.transport.subscriber(Keyed(drive_key, PROFILES["qos_default10"]), samples.put)
+        other.transport.service(Keyed(add_key), requests.put)
         node = Node("golden", session=session, namespace="/ns/deep", start_parameter_services=False)
         publishers = [
             node.create_publisher(types.msg.Drive, name, profile)
@@ -96,7 +96,7 @@ def test_tokens_and_bytes_are_those_of_rclpy(router, types):
         ActionServer(node, types.action.Countdown, "count", lambda _: None)
         ActionClient(node, types.action.Countdown, "other")
         while tokens != {*TOKENS}:
-            tokens = {*other.transport.tokens(all_tokens(0), LONG)}
+            tokens = {*other.transport.tokens(0, LONG)}
             assert tokens <= {*TOKENS}
 
         message = types.msg.Drive(speed=1.0, who="golden", ranges=[1.0, 2.0])
@@ -123,7 +123,7 @@ def test_replies_are_those_of_rclpy(router, types):
         request = types.srv.Add.Request(a=1, b=2).serialize()
         spin_until(lambda: other.graph.count(Kind.SERVICE, "/ns/deep/add"), node)
         other.transport.call(
-            key, request, pack_attachment(sequence, 0, gid), replies.put, timeout=LONG
+            Keyed(key), request, pack_attachment(sequence, 0, gid), replies.put, timeout=LONG
         )
         spin_until(lambda: not replies.empty(), node)
         reply = replies.get(timeout=LONG)

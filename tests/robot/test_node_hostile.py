@@ -117,7 +117,7 @@ def test_a_service_that_replies_for_ever_is_cut_short(node, router):
             held.append(request)
             request.drop()
 
-        other.transport.service(client.entity.key, reply)
+        other.transport.service(client.entity, reply)
         other.transport.announce(
             Entity(
                 domain=0,
@@ -129,7 +129,7 @@ def test_a_service_that_replies_for_ever_is_cut_short(node, router):
                 name="/set",
                 type=client.interface.name,
                 hash=client.interface.hash,
-            ).token
+            )
         )
         assert client.wait_for_service(timeout_sec=LONG)
         future = client.call_async(SetBool.Request())
@@ -144,11 +144,11 @@ def test_real_sends_without_attachments_are_counted(node, router):
     subscription = node.create_subscription(String, "chatter", lambda _: None, 5)
     service = node.create_service(SetBool, "set", lambda _, response: response)
     with open_session(router, environ={}, timeout=LONG) as other:
-        sender = other.transport.publisher(subscription.entity.key, QoSProfile(depth=1))
+        sender = other.transport.publisher(subscription.entity)
         ended = []
         while not (subscription.ignored and service.ignored):
             sender.put(b"\xff", attachment=b"")
-            other.transport.call(service.entity.key, b"", b"x" * 32, ended.append, timeout=LONG)
+            other.transport.call(service.entity, b"", b"x" * 32, ended.append, timeout=LONG)
             node.executor.spin_once(timeout_sec=0.01)
 
 

@@ -114,7 +114,7 @@ def test_any_thread_may_publish(pair):
     samples = []
     publisher = left.create_publisher(String, "chatter", 10)
     right.create_subscription(String, "chatter", lambda _: None, 10)
-    right.transport.subscriber(publisher.entity.key, QoSProfile(), samples.append)
+    right.transport.subscriber(publisher.entity, samples.append)
     spin_until(publisher.get_subscription_count, left)
 
     def publish():

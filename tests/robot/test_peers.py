@@ -190,7 +190,7 @@ def test_each_counts_its_messages(network, name):
     graph = node.graph
     (publisher,) = graph.entities(Kind.PUBLISHER, name=f"/{name}/seen")
     samples = []
-    receiver = node.transport.subscriber(publisher.key, QoSProfile(depth=1), samples.append)
+    receiver = node.transport.subscriber(publisher, samples.append)
     state = JointState.from_dict(STATE)
     payload = state.serialize()
 

@@ -14,11 +14,11 @@ import pytest
 from idlc.cli.main import main
 from idlc.project.find import is_address
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, Kind, all_tokens, pack_attachment
+from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from idlc.robot.session import open_router, open_session
 from tests.robot.conftest import free_endpoint, start_router
-from tests.robot.nodes import pass_on
+from tests.robot.nodes import Keyed, pass_on
 from tests.support.waiting import LIMIT as LONG
 from tests.support.waiting import read_line, wait_for
 
@@ -54,10 +54,10 @@ def test_nodes_and_endpoints_appear_in_the_other_graph_and_go(sessions):
     left, right = sessions
     node, early, late = entity(left, Kind.NODE), entity(left), entity(left)
     for each in (node, early):
-        left.transport.announce(each.token)
+        left.transport.announce(each)
     assert right.graph.wait_for(lambda graph: len(graph.entities()) == 2, LONG)
     assert {*right.graph.entities()} == {node, early}
-    declaration = left.transport.announce(late.token)
+    declaration = left.transport.announce(late)
     assert right.graph.wait_for(lambda graph: graph.count(Kind.PUBLISHER, "/chatter") == 2, LONG)
     declaration.close()
     declaration.close()
@@ -71,18 +71,18 @@ def test_nodes_and_endpoints_appear_in_the_other_graph_and_go(sessions):
 def test_a_session_that_knows_many_tokens_answers_its_own_question(sessions):
     left, right = sessions
     for _ in range(600):
-        left.transport.announce(entity(left).token)
+        left.transport.announce(entity(left))
     assert right.graph.wait_for(lambda graph: len(graph.entities()) == 600, LONG)
     tokens = {each.token for each in right.graph.entities()}
     # for a moment, Zenoh answers with nothing
-    wait_for(lambda: {*right.transport.tokens(all_tokens(right.domain), LONG)} == tokens)
+    wait_for(lambda: {*right.transport.tokens(right.domain, LONG)} == tokens)
 
 
 @pytest.mark.parametrize("method", ["announce", "close", "watch", "call"])
 def test_ctrl_c_in_a_callback_of_the_main_thread_is_not_lost(sessions, method):
     """Zenoh prints exceptions of callbacks, and goes on."""
     session, _ = sessions
-    transport, pattern = session.transport, all_tokens(session.domain)
+    transport, domain = session.transport, session.domain
     begun, ended = threading.Event(), threading.Event()
 
     def interrupted(*_):
@@ -92,28 +92,28 @@ def test_ctrl_c_in_a_callback_of_the_main_thread_is_not_lost(sessions, method):
             ended.set()
 
     with pytest.raises(KeyboardInterrupt):  # noqa: PT012 - at the end, or where a thread hits it
-        token = transport.announce(entity(session).token)
+        token = transport.announce(entity(session))
         if method == "call":
-            transport.service("0/a", lambda request: (interrupted(), request.drop()))
-            transport.call("0/a", b"", b"", lambda _: None, timeout=LONG)
+            transport.service(Keyed("0/a"), lambda request: (interrupted(), request.drop()))
+            transport.call(Keyed("0/a"), b"", b"", lambda _: None, timeout=LONG)
         elif method == "watch":
-            transport.watch(pattern, interrupted)
+            transport.watch(domain, interrupted)
         else:
             watched = []
-            transport.watch(pattern, lambda *_: watched and interrupted())
+            transport.watch(domain, lambda *_: watched and interrupted())
             watched.append(True)
-            transport.announce(entity(session).token) if method == "announce" else token.close()
+            transport.announce(entity(session)) if method == "announce" else token.close()
         time.sleep(LONG)
     assert ended.wait(LONG)
 
 
 def test_a_session_sees_itself_and_no_other_domain(sessions):
     left, right = sessions
-    left.transport.announce(entity(left, Kind.NODE).token)
+    left.transport.announce(entity(left, Kind.NODE))
     assert left.graph.wait_for(lambda graph: graph.entities(), LONG)
     right.domain = 7
     other = entity(right, Kind.NODE)
-    right.transport.announce(other.token)
+    right.transport.announce(other)
     assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (other,)
 
 
@@ -128,14 +128,14 @@ def test_latched_messages_reach_late_ends(sessions, first, reliability):
     )
     received = queue.SimpleQueue()
     if first == "subscriber":
-        right.transport.subscriber("0/a", profile, received.put)
-    publisher = left.transport.publisher("0/a", profile)
+        right.transport.subscriber(Keyed("0/a", profile), received.put)
+    publisher = left.transport.publisher(Keyed("0/a", profile))
     for number in range(5):
         publisher.put(b"%d" % number, attachment=pack_attachment(number + 1, 2, bytes(16)))
     if first == "publisher":
         # messages that the router passes on are no longer on their way to it
         pass_on(left, right)
-        right.transport.subscriber("0/a", profile, received.put)
+        right.transport.subscriber(Keyed("0/a", profile), received.put)
     payloads = [b""]
     while payloads[-1] != b"4":
         sample = received.get(timeout=LONG)
@@ -149,7 +149,7 @@ def test_latched_messages_reach_late_ends(sessions, first, reliability):
         publisher.put(b"", attachment=b"")
     pass_on(left, right)
     late = queue.SimpleQueue()
-    right.transport.subscriber("0/a", profile, late.put)
+    right.transport.subscriber(Keyed("0/a", profile), late.put)
     pass_on(left, right)
     assert late.empty()  # the cache is gone, too
 
@@ -158,9 +158,9 @@ def test_volatile_messages_reach_those_that_are_there(sessions):
     left, right = sessions
     profile = QoSProfile(depth=1)
     received, local = queue.SimpleQueue(), queue.SimpleQueue()
-    right.transport.subscriber("0/a/*", profile, received.put)
-    left.transport.subscriber("0/a/*", profile, local.put)
-    publisher = left.transport.publisher("0/a/b", profile)
+    right.transport.subscriber(Keyed("0/a/*", profile), received.put)
+    left.transport.subscriber(Keyed("0/a/*", profile), local.put)
+    publisher = left.transport.publisher(Keyed("0/a/b", profile))
     sample = None
     while sample is None:  # the declaration of a subscriber takes a moment to arrive
         publisher.put(b"from left", attachment=b"")
@@ -182,11 +182,11 @@ def test_a_service_answers_at_once_or_later_or_not_at_all(sessions):
         else:
             request.reply(request.payload + b"!", request.attachment)
 
-    service = right.transport.service("0/add", answer)
+    service = right.transport.service(Keyed("0/add"), answer)
 
     def call(payload, key="0/add"):
         replies = queue.SimpleQueue()
-        left.transport.call(key, payload, b"attached", replies.put, timeout=LONG)
+        left.transport.call(Keyed(key), payload, b"attached", replies.put, timeout=LONG)
         if payload == b"later":
             request = held.get(timeout=LONG)
             threading.Thread(target=request.reply, args=(b"done", request.attachment)).start()
@@ -206,9 +206,9 @@ def test_a_service_answers_at_once_or_later_or_not_at_all(sessions):
 def test_a_call_ends_after_its_timeout(sessions):
     left, right = sessions
     requests, replies = queue.SimpleQueue(), queue.SimpleQueue()
-    right.transport.service("0/slow", requests.put)
+    right.transport.service(Keyed("0/slow"), requests.put)
     while requests.empty():
-        left.transport.call("0/slow", b"hi", b"", replies.put, timeout=1)
+        left.transport.call(Keyed("0/slow"), b"hi", b"", replies.put, timeout=1)
         assert replies.get(timeout=LONG) is None
 
 
@@ -218,7 +218,7 @@ def test_peers_need_no_router():
     alone = {"ZENOH_CONFIG_OVERRIDE": override}
     with opened(environ=alone) as left, opened(endpoint) as right:
         node = entity(left, Kind.NODE)
-        left.transport.announce(node.token)
+        left.transport.announce(node)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
 
 
@@ -228,7 +228,7 @@ def test_peers_meet_at_a_router_that_starts_later():
     with open_session(environ=environ) as left, open_session(environ=environ) as right:
         assert left.domain == 3
         node = entity(left, Kind.NODE)
-        left.transport.announce(node.token)
+        left.transport.announce(node)
         with open_router([endpoint], environ={}):
             assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
 
@@ -237,7 +237,7 @@ def test_a_lost_connection_comes_back():
     router, endpoint = start_router()
     with opened(endpoint) as left, opened(endpoint) as right:
         node = entity(left, Kind.NODE)
-        left.transport.announce(node.token)
+        left.transport.announce(node)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG)
         router.close()
         assert right.graph.wait_for(lambda graph: not graph.entities(), LONG)
@@ -251,7 +251,7 @@ def test_a_configuration_file_is_used_and_opens_nothing_more(router, tmp_path):
     environ = {"ZENOH_SESSION_CONFIG_URI": str(file)}
     with opened(f"zenoh:{file}") as left, open_session(environ=environ) as right:
         node = entity(left, Kind.NODE)
-        left.transport.announce(node.token)
+        left.transport.announce(node)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
         assert {address for address in listening() if not address.startswith("127.")} == set()
 

@@ -435,8 +435,8 @@ def test_the_hint_of_a_refusal_works_as_it_stands(name, project, capsys):
 @pytest.mark.parametrize(
     ("new", "shown"),
     [
-        ("packages=choose()", "packages=find_packages(exclude=['test'])"),
-        ("**arguments()", "packages=find_packages(exclude=['test'])"),
+        ("packages=choose()", "packages=find_packages(exclude=['test', 'test.*'])"),
+        ("**arguments()", "packages=find_packages(exclude=['test', 'test.*'])"),
     ],
 )
 def test_a_computed_value_is_named_and_not_run(new, shown, project, capsys):

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from idlc.generate.native.layouts import LAYOUTS, Layout
+from idlc.generate.native.layouts import LAYOUTS, StructLayout
 from idlc.project.prefixes import distribution
 
 SHARE = Path(sys.prefix) / "share"
@@ -14,7 +14,7 @@ SHARE = Path(sys.prefix) / "share"
 Interfaces = dict[str, list[tuple[str, str]]]
 
 
-def installed_layout() -> Layout:
+def installed_layout() -> StructLayout:
     """Return how the installed distribution lays structures out."""
     return LAYOUTS.get(distribution().name, LAYOUTS["jazzy"])
 

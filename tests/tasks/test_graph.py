@@ -32,8 +32,13 @@ def models():
         yield generated.model_of(package, files)
 
 
+def is_untold(default):
+    """Return whether nodes may have damaged a default value, or lost its sign."""
+    return "\\" in default or default == "inf"
+
+
 def test_a_description_means_what_its_files_mean():
-    """Of every structure: fields, types and hash come back."""
+    """Of every structure: fields, types, default values and hash come back."""
     number = 0
     for model in models():
         for name in map(str, model.messages):
@@ -42,7 +47,12 @@ def test_a_description_means_what_its_files_mean():
             assert found.describer.description(name)["type_description"] == {
                 **description["type_description"],
                 "fields": [
-                    {**field, "default_value": ""}
+                    {
+                        **field,
+                        "default_value": ""
+                        if is_untold(field["default_value"])
+                        else field["default_value"],
+                    }
                     for field in description["type_description"]["fields"]
                 ],
             }
@@ -307,7 +317,8 @@ def test_sources_count_if_they_mean_what_is_announced(say):
         "a" * 2**20,
     ):
         _, said = say(RecordedGraph(found, TOLD, {"/old": {TYPE: text}, "/new": new}))
-        assert "constant" not in said
+        assert "constant `" not in said
+        assert "no constants and default values of `demo/msg/Drive`: nodes sent only parts" in said
         assert "field `gear` was added (`/old` → `/new`)" in said
 
 

@@ -35,23 +35,23 @@ class Machine(NamedTuple):
 _WORD = 0xFFFF_FFFF_FFFF_FFFF
 
 
-class Section:
+class ElfSection:
     """Content of one kind. `pointers` are the words of it that will hold an address."""
 
     def __init__(self, data: bytes = b"", align: int = 8) -> None:
         self.align = align
         self.data = bytearray(data)
         self.address = 0
-        self.pointers: list[tuple[int, Place]] = []
+        self.pointers: list[tuple[int, SectionPlace]] = []
 
-    def put(self, data: bytes, align: int = 1) -> Place:
+    def put(self, data: bytes, align: int = 1) -> SectionPlace:
         """Add bytes; return their location."""
         self.data += bytes(-len(self.data) % align)
-        place = Place(self, len(self.data))
+        place = SectionPlace(self, len(self.data))
         self.data += data
         return place
 
-    def words(self, *values: int | Place | None) -> Place:
+    def words(self, *values: int | SectionPlace | None) -> SectionPlace:
         """Add words of 8 bytes: numbers, addresses, NULL; return their location.
 
         C structures are rows of words. Smaller values are in the low bytes of a word, and larger
@@ -60,15 +60,15 @@ class Section:
         numbers = [value & _WORD if isinstance(value, int) else 0 for value in values]
         place = self.put(pack(f"<{len(values)}Q", *numbers), 8)
         for index, value in enumerate(values):
-            if isinstance(value, Place):
+            if isinstance(value, SectionPlace):
                 self.pointers.append((place.offset + 8 * index, value))
         return place
 
 
-class Place(NamedTuple):
+class SectionPlace(NamedTuple):
     """A location in a section."""
 
-    section: Section
+    section: ElfSection
     offset: int
 
     @property
@@ -85,22 +85,22 @@ class Image:
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        self.constants, self.code = Section(), Section(align=16)
-        self.tables, self.data = Section(), Section()
-        self.exports: dict[str, Place] = {}
-        self.imports: dict[str, Place] = {}
+        self.constants, self.code = ElfSection(), ElfSection(align=16)
+        self.tables, self.data = ElfSection(), ElfSection()
+        self.exports: dict[str, SectionPlace] = {}
+        self.imports: dict[str, SectionPlace] = {}
         self.needed: list[str] = []
-        self.holes: list[tuple[int, Place]] = []
-        self._strings: dict[str, Place] = {}
-        self._functions: dict[tuple[object, ...], Place] = {}
+        self.holes: list[tuple[int, SectionPlace]] = []
+        self._strings: dict[str, SectionPlace] = {}
+        self._functions: dict[tuple[object, ...], SectionPlace] = {}
 
-    def string(self, text: str) -> Place:
+    def string(self, text: str) -> SectionPlace:
         """Return the location of `text` as a C string; equal ones are stored once."""
         if text not in self._strings:
             self._strings[text] = self.constants.put(text.encode() + b"\0")
         return self._strings[text]
 
-    def function(self, name: str, **symbols: Place) -> Place:
+    def function(self, name: str, **symbols: SectionPlace) -> SectionPlace:
         """Return a function of the machine's, with these places for the symbols in its text."""
         key = (name, *((symbol, id(at), offset) for symbol, (at, offset) in symbols.items()))
         if key not in self._functions:
@@ -109,7 +109,7 @@ class Image:
             self.holes += [(place.offset + at, symbols[name]) for at, name in holes.items()]
         return self._functions[key]
 
-    def imported(self, symbol: str, library: str) -> Place:
+    def imported(self, symbol: str, library: str) -> SectionPlace:
         """Return the word that will hold the address of another library's function."""
         if library not in self.needed:
             self.needed.append(library)
@@ -125,7 +125,7 @@ FUNCTION = 0x12  # STB_GLOBAL, STT_FUNC
 READ, WRITE, EXECUTE = 4, 2, 1
 
 
-class Kind(NamedTuple):
+class SectionKind(NamedTuple):
     """The kind of a section in its header: type, flags, linked section, size of entries."""
 
     type: int
@@ -137,19 +137,19 @@ class Kind(NamedTuple):
 #: All sections in the file's order, by segment.
 KINDS = {
     READ: {
-        ".note.gnu.property": Kind(7),
-        ".note.gnu.build-id": Kind(7),
-        ".hash": Kind(5, link=".dynsym", entry=4),
-        ".dynsym": Kind(11, link=".dynstr", entry=SYMBOL),
-        ".dynstr": Kind(3),
-        ".rela.dyn": Kind(4, link=".dynsym", entry=RELOCATION),
-        ".rodata": Kind(1),
+        ".note.gnu.property": SectionKind(7),
+        ".note.gnu.build-id": SectionKind(7),
+        ".hash": SectionKind(5, link=".dynsym", entry=4),
+        ".dynsym": SectionKind(11, link=".dynstr", entry=SYMBOL),
+        ".dynstr": SectionKind(3),
+        ".rela.dyn": SectionKind(4, link=".dynsym", entry=RELOCATION),
+        ".rodata": SectionKind(1),
     },
-    READ | EXECUTE: {".text": Kind(1, flags=6)},
+    READ | EXECUTE: {".text": SectionKind(1, flags=6)},
     READ | WRITE: {
-        ".dynamic": Kind(6, flags=3, link=".dynstr", entry=16),
-        ".data.rel.ro": Kind(1, flags=3),
-        ".data": Kind(1, flags=3),
+        ".dynamic": SectionKind(6, flags=3, link=".dynstr", entry=16),
+        ".data.rel.ro": SectionKind(1, flags=3),
+        ".data": SectionKind(1, flags=3),
     },
 }
 #: The dynamic tags of the loader, besides the needed libraries: SONAME, HASH, STRTAB, SYMTAB,
@@ -177,15 +177,15 @@ class _File:
         words = len(image.needed) + len(TAGS)
         relocations = sum(len(s.pointers) for s in self.pointed) + len(image.imports)
         self.sections = {
-            ".note.gnu.property": Section(image.machine.properties),
-            ".note.gnu.build-id": Section(NOTE_OF_CONTENT, 4),
-            ".hash": Section(_hash_table(self.symbols)),
-            ".dynsym": Section(bytes(SYMBOL * (1 + len(self.symbols)))),
-            ".dynstr": Section(text, 1),
-            ".rela.dyn": Section(bytes(RELOCATION * relocations)),
+            ".note.gnu.property": ElfSection(image.machine.properties),
+            ".note.gnu.build-id": ElfSection(NOTE_OF_CONTENT, 4),
+            ".hash": ElfSection(_hash_table(self.symbols)),
+            ".dynsym": ElfSection(bytes(SYMBOL * (1 + len(self.symbols)))),
+            ".dynstr": ElfSection(text, 1),
+            ".rela.dyn": ElfSection(bytes(RELOCATION * relocations)),
             ".rodata": image.constants,
             ".text": image.code,
-            ".dynamic": Section(bytes(16 * words)),
+            ".dynamic": ElfSection(bytes(16 * words)),
             ".data.rel.ro": image.tables,
             ".data": image.data,
         }

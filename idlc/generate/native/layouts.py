@@ -15,7 +15,7 @@ TYPE_IDS = {
 }  # fmt: skip
 
 
-class Layout(NamedTuple):
+class StructLayout(NamedTuple):
     """Sizes and offsets in bytes, each of which can be measured with the headers."""
 
     members: int = 40  #: the offset of `members_` in MessageMembers
@@ -27,7 +27,7 @@ class Layout(NamedTuple):
     string_sequence: int = 24
     message_sequence: int = 24
 
-    def of_cpp(self) -> Layout:
+    def of_cpp(self) -> StructLayout:
         """Return the layout for C++ messages, with fields of libstdc++'s types.
 
         Offsets after a `uint8[]` are others in Lyrical: its own class for it has had another size
@@ -37,12 +37,12 @@ class Layout(NamedTuple):
 
 
 #: Sequences in C, other than of messages, have a flag here: their data are a buffer of Lyrical.
-_LYRICAL = Layout(member=120, bool_sequence=32, primitive_sequence=32, string_sequence=32)
+_LYRICAL = StructLayout(member=120, bool_sequence=32, primitive_sequence=32, string_sequence=32)
 LAYOUTS = {
-    "humble": Layout(members=32, is_array=32),
-    "iron": Layout(members=32, is_array=32),
-    "jazzy": Layout(),
-    "kilted": Layout(),
+    "humble": StructLayout(members=32, is_array=32),
+    "iron": StructLayout(members=32, is_array=32),
+    "jazzy": StructLayout(),
+    "kilted": StructLayout(),
     "lyrical": _LYRICAL,
     "rolling": _LYRICAL,
 }
@@ -59,7 +59,7 @@ class Structure(NamedTuple):
 class Structures:
     """The structures of messages: `add` them with those first that others hold."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: StructLayout) -> None:
         self._layout = layout
         self._structures: dict[ir.TypeName, Structure] = {}
 

@@ -17,14 +17,14 @@ from __future__ import annotations
 from struct import pack
 
 from idlc.generate.native import machines
-from idlc.generate.native.elf import Image, Machine, Place, shared_library
+from idlc.generate.native.elf import Image, Machine, SectionPlace, shared_library
 from idlc.generate.native.layouts import (
     LAYOUTS,
     MESSAGE,
     STRING,
     TYPE_IDS,
     WSTRING,
-    Layout,
+    StructLayout,
     Structures,
 )
 from idlc.model import derive, ir
@@ -32,7 +32,7 @@ from idlc.model.describe import FieldDict, IndividualDict
 from idlc.model.link import Model
 
 #: Words of a structure of C.
-Words = tuple[int | Place | None, ...]
+Words = tuple[int | SectionPlace | None, ...]
 
 
 def hash_bytes(text: str) -> bytes:
@@ -47,9 +47,9 @@ class Descriptions:
         self._model = model
         self._image = image
         self._individuals: dict[str, Words] = {}
-        self._about: dict[str, tuple[Place, ...]] = {}
+        self._about: dict[str, tuple[SectionPlace, ...]] = {}
 
-    def functions(self, name: str) -> tuple[Place, ...]:
+    def functions(self, name: str) -> tuple[SectionPlace, ...]:
         """Return functions that return a type's hash, description and sources."""
         if name not in self._about:
             image, describer = self._image, self._model.describer
@@ -113,7 +113,7 @@ ROOM = 72
 
 
 def libraries(
-    model: Model, machine: Machine, layout: Layout = LAYOUTS["jazzy"]
+    model: Model, machine: Machine, layout: StructLayout = LAYOUTS["jazzy"]
 ) -> dict[str, bytes]:
     """Return the content of each library of a package by the name of its file.
 
@@ -126,7 +126,7 @@ def libraries(
     }
 
 
-def identity_stamp(layout: Layout) -> bytes:
+def identity_stamp(layout: StructLayout) -> bytes:
     """Return the first bytes of a library's constants: its author, and its layout."""
     return AUTHOR + pack(f"<{len(layout)}I", *layout)
 
@@ -136,7 +136,7 @@ def symbol(identifier: str, name: ir.TypeName) -> str:
     return "__".join((identifier, "get_message_type_support_handle", *name))
 
 
-def _library(model: Model, image: Image, layout: Layout, identifier: str) -> bytes:
+def _library(model: Model, image: Image, layout: StructLayout, identifier: str) -> bytes:
     image.constants.put(identity_stamp(layout))
     support = _TypeSupport(model, image, layout, cpp=identifier == FIELDS_CPP)
     for interface in model.own:
@@ -152,18 +152,18 @@ def _library(model: Model, image: Image, layout: Layout, identifier: str) -> byt
 class _TypeSupport:
     """The handles of one library. `fields` are for FIELDS, or with `cpp` for FIELDS_CPP."""
 
-    def __init__(self, model: Model, image: Image, layout: Layout, *, cpp: bool) -> None:
+    def __init__(self, model: Model, image: Image, layout: StructLayout, *, cpp: bool) -> None:
         self.image = image
         self.layout = layout
         self.cpp = cpp
         self.descriptions = Descriptions(model, image)
         self.structures = Structures(layout.of_cpp() if cpp else layout)
         self.refuse = image.function("refuse")
-        self.fields: dict[ir.TypeName, Place] = {}
+        self.fields: dict[ir.TypeName, SectionPlace] = {}
         for message in _reached(model):
             self.fields[message.name] = self._fields(message)
 
-    def resolving_handle(self, name: ir.TypeName, fields: Place) -> Place:
+    def resolving_handle(self, name: ir.TypeName, fields: SectionPlace) -> SectionPlace:
         """Return the handle that answers for all others."""
         image, refuse = self.image, self.refuse
         fastrtps = image.tables.words(
@@ -177,21 +177,23 @@ class _TypeSupport:
         answers = {FASTRTPS: self._single(FASTRTPS, fastrtps, name), FIELDS: fields}
         rows = [word for key, handle in answers.items() for word in (image.string(key), handle)]
         # the table holds the handle itself, which follows: its place is known before
-        handle = Place(image.data, len(image.data.data))
+        handle = SectionPlace(image.data, len(image.data.data))
         table = image.tables.words(*rows, image.string(OWN), handle, None, None)
         return self._handle(OWN, table, image.function("resolve"), name)
 
-    def _handle(self, identifier: str, data: Place, find: Place, name: ir.TypeName) -> Place:
+    def _handle(
+        self, identifier: str, data: SectionPlace, find: SectionPlace, name: ir.TypeName
+    ) -> SectionPlace:
         about = self.descriptions.functions(str(name))
         return self.image.data.words(self.image.string(identifier), data, find, *about)
 
-    def _single(self, identifier: str, data: Place, name: ir.TypeName) -> Place:
+    def _single(self, identifier: str, data: SectionPlace, name: ir.TypeName) -> SectionPlace:
         """Return a handle that knows its own identifier only."""
         image = self.image
         places = {"identifier": image.string(identifier), "function": image.function("same")}
         return self._handle(identifier, data, image.function("knows", **places), name)
 
-    def _fields(self, message: ir.Message) -> Place:
+    def _fields(self, message: ir.Message) -> SectionPlace:
         image, name = self.image, message.name
         offsets, size, _ = self.structures.add(name, message.wire_fields)
         rows = [
@@ -211,7 +213,7 @@ class _TypeSupport:
         )
         return self._single(FIELDS_CPP if self.cpp else FIELDS, data, name)
 
-    def _member(self, field: ir.Field, offset: int) -> tuple[int | Place | None, ...]:
+    def _member(self, field: ir.Field, offset: int) -> tuple[int | SectionPlace | None, ...]:
         kind, bound, nested = _element(ir.element_of(field.type))
         count, bounded, resize = 0, 0, None
         if isinstance(field.type, ir.Array):
@@ -233,7 +235,7 @@ class _TypeSupport:
             *[0] * (self.layout.member // 8 - 14),
         )
 
-    def _memory(self, name: ir.TypeName) -> tuple[Place | None, Place | None]:
+    def _memory(self, name: ir.TypeName) -> tuple[SectionPlace | None, SectionPlace | None]:
         """Return the functions that begin and end a message in memory: C++ cannot have any."""
         if not self.cpp:
             return None, None

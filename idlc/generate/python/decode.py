@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import TypeAlias
 
 from idlc.generate.python.lines import Block, Comprehension, Group, Line, Statement, call
-from idlc.generate.python.positions import Builder, Cursor, Tables, ValueRun
+from idlc.generate.python.positions import Builder, Cursor, NamedExpressions, ValueRun
 from idlc.model import ir
 from idlc.model.names import snake_case
 from idlc.wire import plan
@@ -64,7 +64,7 @@ def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
 
 
 def decode(
-    steps: tuple[plan.Step, ...], tables: Tables, own: str, makers: Names, foreign: Names
+    steps: tuple[plan.Step, ...], tables: NamedExpressions, own: str, makers: Names, foreign: Names
 ) -> tuple[Statement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
@@ -96,7 +96,9 @@ class Decoder(Builder):
     sizes of strings are in `words` and their text in `chars`.
     """
 
-    def __init__(self, tables: Tables, makers: Names, foreign: Names, source: str) -> None:
+    def __init__(
+        self, tables: NamedExpressions, makers: Names, foreign: Names, source: str
+    ) -> None:
         super().__init__(tables, Cursor("", 4, multiple_of(8)))
         self.makers = makers
         self.foreign = foreign

@@ -25,12 +25,12 @@ from idlc.generate.python.lines import (
     call,
     flat,
 )
-from idlc.generate.python.positions import Builder, Cursor, Tables, ValueRun
+from idlc.generate.python.positions import Builder, Cursor, NamedExpressions, ValueRun
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
 
-def encode(steps: tuple[plan.Step, ...], tables: Tables) -> tuple[Statement, ...]:
+def encode(steps: tuple[plan.Step, ...], tables: NamedExpressions) -> tuple[Statement, ...]:
     """Return the statements that write a message; what they use is defined in `tables`."""
     encoder = _Encoder(tables, Alignment(), 8)
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"), "head")
@@ -121,7 +121,7 @@ class _Encoder(Builder):
     Positions matter modulo `widest` only, the widest alignment of this step and those after it.
     """
 
-    def __init__(self, tables: Tables, alignment: Alignment, widest: int) -> None:
+    def __init__(self, tables: NamedExpressions, alignment: Alignment, widest: int) -> None:
         super().__init__(tables, Cursor("", alignment.residue, alignment))
         self.widest = widest
         #: Conditions that hold if another thread changed the length of an uncopied array.

@@ -165,7 +165,7 @@ class NameView(msgspec.Struct, frozen=True):
     value: Code
 
 
-class PackageView(msgspec.Struct, frozen=True):
+class LazyPackageView(msgspec.Struct, frozen=True):
     """A package that imports its modules when a name is asked for."""
 
     title: Text
@@ -202,7 +202,7 @@ def _parts(service: ir.Service, value: str) -> dict[ir.TypeName, str]:
 
 def package(
     model: link.Model, kind: ir.Kind, modules: python_names.Modules, surroundings: Surroundings
-) -> PackageView:
+) -> LazyPackageView:
     """Return the view of one kind's package."""
     names: list[NameView] = []
     imports: list[str] = []
@@ -214,7 +214,7 @@ def package(
         own = [name for name, value in values.items() if not value]
         imports += statements(f".{module}", own, 4)
         names += [NameView(Code(name), Code(module), Code(value)) for name, value in values.items()]
-    return PackageView(
+    return LazyPackageView(
         title=Text(f"{TITLES[kind]} of {model.package}, imported on first use."),
         runtime=Code(surroundings.runtime),
         imports=tuple(map(Code, imports)),

@@ -87,7 +87,7 @@ class ValueRun:
 class Builder:
     """The statements so far, and the position after them; `looping`: they are in a loop."""
 
-    def __init__(self, tables: Tables, position: Cursor) -> None:
+    def __init__(self, tables: NamedExpressions, position: Cursor) -> None:
         self.tables = tables
         self.position = position
         self.body: list[Statement] = []
@@ -130,7 +130,7 @@ class Builder:
         self.position = first
 
 
-class Tables:
+class NamedExpressions:
     """Gives each distinct expression one name, in order of first use.
 
     `has_arrays`: expressions need the module of arrays; `has_texts`: a layout has a text.

@@ -16,7 +16,7 @@ import msgspec
 from idlc.diagnostics.text import did_you_mean
 from idlc.generate.python.decode import UNENDED, Decoder, ReadRun, slice_of
 from idlc.generate.python.lines import Block, Group, Line, call, text_of
-from idlc.generate.python.positions import Cursor, Tables
+from idlc.generate.python.positions import Cursor, NamedExpressions
 from idlc.model import ir
 from idlc.model.python_names import Locals
 from idlc.wire import plan
@@ -183,7 +183,7 @@ def texts_of(body: tuple[plan.Step, ...]) -> int:
 class _Makers(dict[ir.TypeName, str]):
     """The functions that make empty structures, each defined when it is first needed."""
 
-    def __init__(self, tables: Tables) -> None:
+    def __init__(self, tables: NamedExpressions) -> None:
         super().__init__()
         self.tables = tables
 
@@ -196,7 +196,7 @@ class _FieldReader(Decoder):
 
     def __init__(self, messages: Messages, nanoseconds: bool, positions: bool) -> None:
         self.names = Locals()
-        tables = Tables(self.names)
+        tables = NamedExpressions(self.names)
         super().__init__(tables, _Makers(tables), {}, "view")
         self.messages = messages
         self.nanoseconds = nanoseconds

@@ -21,7 +21,7 @@ from idlc.generate.python.encode import encode
 from idlc.generate.python.imports import ALONE, References, Surroundings
 from idlc.generate.python.lines import call, text_of
 from idlc.generate.python.literals import string_literal
-from idlc.generate.python.positions import Tables
+from idlc.generate.python.positions import NamedExpressions
 from idlc.model import derive, ir, link, python_names
 from idlc.model.idl_text import idl_text
 from idlc.model.names import snake_case
@@ -53,7 +53,7 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     """Return the view of a structure's codec."""
     names = python_names.Locals()
     steps = plan.steps(structure, messages, names)
-    tables = Tables(names)
+    tables = NamedExpressions(names)
     writing = text_of(encode(steps, tables), 8)
     # The functions that make empty objects of the message and of those in it. They demand that
     # classes of the package have the fields that the codec was made for.

@@ -84,14 +84,13 @@ def _inside(literal: str) -> str:
         return literal[1:-1]
 
 
-def _default(type_: ir.FieldType, value: _Value) -> ir.Default | Fault:
+def default_of_words(type_: ir.FieldType, words: str, *, is_text: bool) -> ir.Default | Fault:
     """Return the value of `@default` or of a constant, or its fault, which is all of it."""
-    words = value.words
-    if not value.is_text and isinstance(type_, ir.Primitive):
+    if not is_text and isinstance(type_, ir.Primitive):
         return lower_values.default(type_, words)
-    if value.is_text and isinstance(type_, ir.String) and _fits(type_, words):
+    if is_text and isinstance(type_, ir.String) and _fits(type_, words):
         return ir.Default(words, words)
-    if value.is_text and isinstance(type_, (ir.Array, ir.Sequence)):
+    if is_text and isinstance(type_, (ir.Array, ir.Sequence)):
         values = None
         with suppress(ValueError):  # the defaults of arrays travel as the text of a tuple
             values = lower_values.python_tuple(words) if words.count(",") <= MAX_ELEMENTS else None
@@ -306,7 +305,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
             self.foreign(value, "a default for a message")
         if isinstance(element, (ir.Ref, ir.Unknown)):
             return None
-        lowered = _default(type_, value)
+        lowered = default_of_words(type_, value.words, is_text=value.is_text)
         if isinstance(lowered, Fault):
             self._fault(msgspec.structs.replace(lowered, start=value.start, end=value.end))
             return None

@@ -273,10 +273,10 @@ def positive(piece: tree.Piece, subject: str) -> int | Fault:
     return fault_at(codes.BAD_BOUND, piece, message, "write a decimal number above 0")
 
 
-def fault_at(code: codes.Code, piece: tree.Piece, message: str, hint: str) -> Fault:
+def fault_at(code: codes.DiagnosticCode, piece: tree.Piece, message: str, hint: str) -> Fault:
     """Return the fault of a piece of a line."""
     return Fault(code, message, piece.start, piece.end, hint)
 
 
-def _invalid(code: codes.Code, noun: str, name: tree.Piece, hint: str) -> Fault:
+def _invalid(code: codes.DiagnosticCode, noun: str, name: tree.Piece, hint: str) -> Fault:
     return fault_at(code, name, f"`{name.text}` cannot be a {noun} name", hint)

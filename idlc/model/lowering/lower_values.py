@@ -112,11 +112,11 @@ FLOAT32_MAX = 3.402823466e38
 LONG = 1000
 
 
-Number: TypeAlias = bool | int | float
+NumberValue: TypeAlias = bool | int | float
 BACKSLASH_HINT = "write `\\\\\\\\` for each backslash in the value"
 
 
-def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault:
+def scalar(type_: ir.Primitive | ir.String, text: str) -> NumberValue | str | Fault:
     """Return the value that `text` spells for a scalar type."""
     return _text(type_, text) if isinstance(type_, ir.String) else _number(type_.name, text)
 
@@ -135,7 +135,7 @@ def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
     return ir.Default(value, str(value))
 
 
-def _fault(code: codes.Code, text: str, message: str, hint: str) -> Fault:
+def _fault(code: codes.DiagnosticCode, text: str, message: str, hint: str) -> Fault:
     return Fault(code, message, 0, len(text), hint)
 
 
@@ -143,13 +143,13 @@ def _shown(text: str) -> str:
     return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}...`"
 
 
-def _number(type_: str, text: str) -> Number | Fault:
+def _number(type_: str, text: str) -> NumberValue | Fault:
     from idlc.language.definition import pattern  # loads lark
 
     info = ir.PRIMITIVES[type_]
     form, noun, hint = "INTEGER", "an integer", "a number such as `10`, `-3`, `0xff` or `0b101`"
     # as rosidl does: decimal first, leading zeros allowed, then by prefix
-    readers: list[Callable[[str], Number]] = [int, lambda text: int(text, 0)]
+    readers: list[Callable[[str], NumberValue]] = [int, lambda text: int(text, 0)]
     if type_ == "bool":
         form, noun, hint = "BOOLEAN", "a bool", "`true`, `false`, `1` or `0`"
         readers = [lambda text: text.lower() in ("true", "1")]
@@ -224,7 +224,7 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
         return too_many
     if (wrong := wrong_length(type_, len(pieces), text)) is not None:
         return wrong
-    values: list[Number | str] = []
+    values: list[NumberValue | str] = []
     for piece, start in pieces:
         value = (
             _unquote(element, piece) if isinstance(element, ir.String) else scalar(element, piece)
@@ -236,7 +236,7 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
     return _array_value(tuple(values), text)
 
 
-def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fault:
+def _array_value(values: tuple[NumberValue | str, ...], text: str) -> ir.Default | Fault:
     """Take the values through the pipeline, where they travel as the text of a Python tuple."""
     literal = repr(values).replace("\\", "\\\\").replace('"', '\\"')
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -26,8 +27,10 @@ from idlc.robot.transport import Sample
 APPEARING = 1.0
 #: Seconds after which a wait is interrupted, because Windows does not interrupt one for Ctrl-C.
 TICK = 0.5
-#: Requests that wait for replies at a time.
-AT_ONCE = 32
+#: Requests that wait for a service at a time: the queues of services hold ten.
+MOST_OPEN = 8
+#: Seconds after which a request without a reply counts as dropped.
+DROPPED = 1.5
 TOPICS = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
 #: Bytes of samples that wait to be read; more are lost.
 MOST_WAITING = 64 << 20
@@ -49,6 +52,7 @@ def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Se
         return
     with session:
         yield session
+        report.notes += session.transport.notes()
         if session.graph.is_full:
             report.notes.append("the robot announces too many endpoints; some are missing")
         if session.graph.is_incomplete:
@@ -133,22 +137,80 @@ class Inbox:
 
 
 def call(
-    session: Session, requests: Iterable[tuple[Entity, Any]], timeout: float
+    session: Session,
+    requests: Iterable[tuple[Entity, Any]],
+    timeout: float,
+    *,
+    again: bool = False,
 ) -> Iterator[tuple[int, bytes]]:
-    """Send requests to services, some at a time; yield the number of a request with each reply."""
-    inbox, pending, unsent = Inbox(), 0, enumerate(requests)
-    end, following = time.monotonic() + timeout, next(unsent, None)
-    while (following or pending) and (left := end - time.monotonic()) > 0:
-        if following and pending < AT_ONCE:
-            number, (service, request) = following
-            client = own_endpoint(session, service, Kind.CLIENT, QoSProfile(depth=10))
-            attachment = pack_attachment(1, time.time_ns(), client.gid)
-            receive = partial(inbox.put, number)
-            payload = request.serialize()
-            session.transport.call(service.key, payload, attachment, receive, timeout=left)
-            pending, following = pending + 1, next(unsent, None)
-        elif arrival := inbox.get(min(left, TICK)):
+    """Send requests to services, some at a time; yield the number of a request with each reply.
+
+    With `again`, requests are repeated until there is a reply, since services drop requests.
+    """
+    calls = _Calls(session, [*requests], time.monotonic() + timeout)
+    while (left := calls.end - time.monotonic()) > 0 and calls.waiting:
+        calls.send(again=again)
+        if arrival := calls.inbox.get(min(left, TICK)):
+            number = calls.attempts[arrival.number]
             if arrival.sample:
-                yield arrival.number, arrival.sample.payload
+                calls.waiting.discard(number)
+                yield number, arrival.sample.payload
             else:
-                pending -= 1
+                calls.close(arrival.number)
+                if not again:
+                    calls.waiting.discard(number)
+
+
+class _Calls:
+    """Requests, of which `waiting` have no reply; an attempt is open until it ends."""
+
+    def __init__(self, session: Session, requests: list[tuple[Entity, Any]], end: float) -> None:
+        self.inbox = Inbox()
+        self.end = end
+        self.waiting = {*range(len(requests))}
+        #: The number of the request of each attempt.
+        self.attempts: list[int] = []
+        self._session = session
+        self._requests = requests
+        self._unsent: dict[Entity, deque[int]] = {}
+        for number, (service, _) in enumerate(requests):
+            self._unsent.setdefault(service, deque()).append(number)
+        self._open: dict[int, float] = {}
+        self._counts: Counter[Entity] = Counter()
+        #: Ended requests, and the time at which each is sent again.
+        self._ended: deque[tuple[float, int]] = deque()
+
+    def close(self, attempt: int) -> None:
+        """End an attempt; its request may be sent again a little later."""
+        if self._open.pop(attempt, None) is not None:
+            number = self.attempts[attempt]
+            self._counts[self._requests[number][0]] -= 1
+            self._ended.append((time.monotonic() + TICK / 2, number))
+
+    def send(self, *, again: bool) -> None:
+        """Send what the services have room for."""
+        now = time.monotonic()
+        for attempt, since in [*self._open.items()] if again else ():
+            if now - since < DROPPED:
+                break
+            self.close(attempt)
+        while self._ended and self._ended[0][0] <= now:
+            number = self._ended.popleft()[1]
+            if again and number in self.waiting:
+                self._unsent[self._requests[number][0]].append(number)
+        for service, numbers in self._unsent.items():
+            while numbers and self._counts[service] < MOST_OPEN:
+                self._send(service, numbers.popleft())
+
+    def _send(self, service: Entity, number: int) -> None:
+        now = time.monotonic()
+        self._counts[service] += 1
+        self._open[len(self.attempts)] = now
+        receive = partial(self.inbox.put, len(self.attempts))
+        self.attempts.append(number)
+        client = own_endpoint(self._session, service, Kind.CLIENT, QoSProfile(depth=10))
+        transport = self._session.transport
+        attachment = pack_attachment(1, time.time_ns(), transport.gid(client))
+        payload = self._requests[number][1].serialize()
+        left = max(0.1, self.end - now)
+        transport.call(client, payload, attachment, receive, timeout=left)

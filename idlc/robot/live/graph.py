@@ -286,6 +286,13 @@ def _version(version: Version, models: Models, problems: Problems) -> Iterator[s
     yield from activities(version.endpoints) if version.endpoints else ["  no node"]
     if version.key not in models:
         yield f"  idlc has only its hash: {problems.get(version.key, 'it asked no node')}"
+        return
+    messages = models[version.key].messages
+    names = sorted(_with_nested(ir.TypeName.parse(version.type), models[version.key]))
+    sources = {str(name): messages[name].source for name in names if name in messages}
+    if partial := [name for name, own in sources.items() if own and own.is_incomplete]:
+        which = first_few((f"`{name}`" for name in partial), NAMED)
+        yield f"  idlc compares no constants and default values of {which}: nodes sent only parts"
 
 
 def _misreads(sender: Version, reader: Version, models: Models) -> bool:

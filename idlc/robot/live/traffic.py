@@ -39,8 +39,8 @@ def subscribe(
         durability=min(qos.durability for qos in offered),
     )
     own = own_endpoint(session, ends[0], Kind.SUBSCRIPTION, qos)
-    declared.callback(session.transport.subscriber(own.key, qos, partial(inbox.put, number)).close)
-    declared.callback(session.transport.announce(own.token).close)
+    declared.callback(session.transport.subscriber(own, partial(inbox.put, number)).close)
+    declared.callback(session.transport.announce(own).close)
 
 
 def find_version(

@@ -14,9 +14,16 @@ from typing import Any, TypeAlias
 
 from idlc.compiler.compiler import Compiler
 from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.source import INCOMPLETE
 from idlc.model import ir
-from idlc.model.from_description import DescriptionError, model_of_description, model_of_sources
-from idlc.model.lowering.lower import SECTIONS
+from idlc.model.from_description import (
+    DescriptionError,
+    defaults_of,
+    model_of_description,
+    model_of_sources,
+    node_texts,
+)
+from idlc.model.node_sources import Defaults
 from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -73,7 +80,7 @@ def ask(
     offered = [question for question in questions if question.node in services]
     requests = ((services[node], _request(name, hash_)) for node, name, hash_ in offered)
     room = MOST_REPLIES
-    for number, payload in call(session, requests, patience):
+    for number, payload in call(session, requests, patience, again=True):
         room -= len(payload)
         if room >= 0:
             answers[offered[number]] = _answer(payload)
@@ -173,26 +180,23 @@ def _definition(key: Key, answers: Mapping[Question, Answer]) -> tuple[str, str]
     name = ir.TypeName.parse(key[0])
     interface = interface_of(name)
     problems = [f"`{each.node}` {own.problem}" for each, own in answers.items() if own.problem]
-    candidates: list[dict[ir.TypeName, str]] = []
     described: dict[ir.TypeName, ir.Message] = {}
-    for question, (description, _, files) in answers.items():
-        named = ((type_name(own), text) for own, text in files.items())
-        candidates.append({own: text for own, text in named if own and interface_of(own) == own})
+    defaults: Defaults = {}
+    for question, answer in answers.items():
         try:
-            if description:
-                model = model_of_description(description, *question[1:], question.node)
+            if answer.description:
+                model = model_of_description(answer.description, *question[1:], question.node)
                 described = {**model.messages, **described}
+                defaults = {**defaults_of(answer.description), **defaults}
         except DescriptionError as error:
             problems.append(f"`{question.node}` sends an unusable type description: {error}")
-    texts = {own: part.source.text for own, part in described.items() if part.source}
-    sections = [interface._replace(name=interface.name + end) for end in SECTIONS[interface.kind]]
-    if texts.keys() >= {*sections}:
-        messages = {own: text for own, text in texts.items() if own.kind == "msg"}
-        file = "---\n".join(texts[section] for section in sections)
-        candidates.append({**messages, interface: file})
-    for candidate in candidates:
-        if interface in candidate:
-            if linked := model_of_sources(candidate, name, key[1]):
+    names = {own for own in described if own.kind == "msg"} | {interface}
+    candidates = [
+        node_texts(names, answer.sources, described, defaults) for answer in answers.values()
+    ]
+    for texts in sorted(candidates, key=lambda each: str(each.values()).count(INCOMPLETE)):
+        if interface in texts:
+            if linked := model_of_sources(texts, name, key[1]):
                 return mcap(linked.interfaces[interface], linked), ""
             problems.append("a node sends a definition with another type hash")
     return "", first_few(list(dict.fromkeys(problems)) or ["no node has its definition"], ASKED)

@@ -46,8 +46,8 @@ class Context(AbstractContextManager["Context"]):
         """Begin; the result can be used in a `with` statement, which shuts it down.
 
         `args` are those of the program, `sys.argv` by default. `address` is a robot, such as
-        `tcp/robot:7447`; without it, the session is as rmw_zenoh's (see `open_session`). Ctrl-C
-        and SIGTERM shut the default context down. Raises RobotError.
+        `dds/192.168.1.20` or `tcp/robot:7447` (see `open_session`). Ctrl-C and SIGTERM shut the
+        default context down. Raises RobotError.
         """
         if self._is_valid:
             raise RobotError("the context is initialized already", "call `shutdown()` first")

@@ -61,7 +61,7 @@ class Endpoint(Ready):
             qos=self.qos_profile,
         )
         self.ignored = 0
-        self._closeables = [*self.open(), node.transport.announce(self.entity.token)]
+        self._closeables = [*self.open(), node.transport.announce(self.entity)]
         node.add(self)
 
     def open(self) -> tuple[Closeable, ...]:
@@ -167,9 +167,10 @@ class Publisher(Endpoint, Generic[M]):
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the publisher."""
-        sender = self.node.transport.publisher(self.entity.key, self.qos_profile)
+        sender = self.node.transport.publisher(self.entity)
         # looked up once, as each call and attribute is a few per cent of a small message
-        self._put, self._pack, self._gid = sender.put, ATTACHMENT.pack, self.entity.gid
+        self._put, self._pack = sender.put, ATTACHMENT.pack
+        self._gid = self.node.transport.gid(self.entity)
         self._numbers = count(1)
         return (sender,)
 
@@ -204,7 +205,7 @@ class Subscription(Endpoint, Generic[M]):
     def open(self) -> tuple[Closeable, ...]:
         """Declare the subscriber."""
         self._queue: Bounded[bytes] = Bounded(self.qos_profile)
-        return (self.node.transport.subscriber(self.entity.key, self.qos_profile, self._receive),)
+        return (self.node.transport.subscriber(self.entity, self._receive),)
 
     def _receive(self, sample: Sample) -> None:
         if parse_attachment(sample.attachment) is None:

@@ -28,7 +28,7 @@ from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusive
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger
 from idlc.robot.nodes.overrides import overrides_of
-from idlc.robot.nodes.services import Client, Service
+from idlc.robot.nodes.services import Client, DeepService, Service
 from idlc.robot.parameters import HasParameters, Parameter
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 from idlc.robot.session import Session
@@ -83,7 +83,7 @@ class Node(HasParameters):
         self.timers: list[Timer] = []
         self._clock = Clock(clock_type=ClockType.ROS_TIME)
         self._clock_subscription: Subscription[Any] | None = None
-        self._token = self.transport.announce(self.entity.token)
+        self._token = self.transport.announce(self.entity)
         self._logger = Logger(self.entity.node_name.strip("/").replace("/", "."), self._log)
         # in the order of rclpy, so that ids are equal
         log: Any = standard("rcl_interfaces/msg/Log")
@@ -92,7 +92,8 @@ class Node(HasParameters):
         self._parameter_events = self.create_publisher(
             event, "/parameter_events", profiles.qos_profile_parameter_events
         )
-        self.create_service(standard(SERVICE), "~/get_type_description", partial(describe, self))
+        answer, service = partial(describe, self), standard(SERVICE)
+        DeepService[Any, Any](self, "~/get_type_description", service, 10, None, answer)
         overrides = overrides_of(self.arguments, self.get_fully_qualified_name())
         self._begin_parameters(
             {**overrides, **{each.name: each for each in parameter_overrides or ()}},

@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterator
 from concurrent import futures
 from functools import partial
 from itertools import count
-from typing import Any, Generic
+from typing import Any, ClassVar, Generic
+
+from msgspec.structs import replace
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
@@ -31,13 +33,16 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
     """Answers requests: `callback` gets the request and an empty response, and returns it."""
 
     kind = Kind.SERVICE
+    #: The requests that wait, if these are more than the announced depth.
+    depth: ClassVar[int] = 0
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the service."""
-        self._queue: Bounded[tuple[Request, Attachment]] = Bounded(self.qos_profile)
+        profile = replace(self.qos_profile, depth=self.depth or self.qos_profile.depth)
+        self._queue: Bounded[tuple[Request, Attachment]] = Bounded(profile)
         #: The ids of the request objects that wait or are being answered.
         self._open: set[int] = set()
-        return (self.node.transport.service(self.entity.key, self._receive),)
+        return (self.node.transport.service(self.entity, self._receive),)
 
     def _receive(self, request: Request) -> None:
         attachment = parse_attachment(request.attachment)
@@ -86,6 +91,12 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
             self._drop(item[0])
 
 
+class DeepService(Service[RequestT, ResponseT]):
+    """A service that programs ask many questions at once."""
+
+    depth = 1000
+
+
 class Client(Endpoint, Generic[RequestT, ResponseT]):
     """Sends requests, from any thread; a thread of the transport completes their futures."""
 
@@ -93,7 +104,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
     def open(self) -> tuple[Closeable, ...]:
         """Prepare calls."""
-        self._gid = self.entity.gid  # computed once, as it is a hash
+        self._gid = self.node.transport.gid(self.entity)  # computed once, as it can be a hash
         self._numbers = count(1)
         self._pending: dict[int, Future[ResponseT]] = {}
         return ()
@@ -122,7 +133,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         self._pending[number] = future
         future.wake_at_end(partial(self._pending.pop, number, None))
         try:
-            self.node.transport.call(self.entity.key, payload, attachment, receive, timeout=timeout)
+            self.node.transport.call(self.entity, payload, attachment, receive, timeout=timeout)
         except Exception as error:
             future.cancel()
             raise RobotError(f"`{self.srv_name}`: {one_line(str(error))}") from None

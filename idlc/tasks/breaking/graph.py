@@ -27,7 +27,14 @@ from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.robot.keys import Entity as RobotEntity
 from idlc.robot.keys import Kind
-from idlc.robot.live.connect import TOPICS, connected, place_of, robot_entities
+from idlc.robot.live.connect import (
+    DROPPED,
+    MOST_OPEN,
+    TOPICS,
+    connected,
+    place_of,
+    robot_entities,
+)
 from idlc.robot.live.graph import (
     Answer,
     Endpoint,
@@ -169,26 +176,32 @@ class Graph:
             return dict.fromkeys(questions, Answer(None, problem))
         nodes = dict.fromkeys(question.node for question in questions)
         clients = {node: self._client(service, node) for node in nodes}
-        futures: dict[Question, Any] = {}
+        open_: dict[Question, tuple[Any, float]] = {}
+        results: dict[Question, Any] = {}
         try:
             executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
             executor.add_node(self._node)
             end = time.monotonic() + patience
-            while time.monotonic() < end:
+            while (now := time.monotonic()) < end and len(results) < len(questions):
+                for question, (future, since) in [*open_.items()]:
+                    if future.done():
+                        results[question] = future.result()
+                    if future.done() or now - since > DROPPED:
+                        del open_[question]
+                        clients[question.node].remove_pending_request(future)
+                counts = Counter(question.node for question in open_)
                 for question in questions:
-                    client = clients[question.node]
-                    if question not in futures and client is not None and client.service_is_ready():
-                        _, name, hash_ = question
+                    node, name, hash_ = question
+                    is_due = question not in results and question not in open_
+                    if is_due and counts[node] < MOST_OPEN and _is_ready(clients[node]):
                         request = service.Request(
                             type_name=name, type_hash=hash_, include_type_sources=True
                         )
-                        futures[question] = client.call_async(request)
-                if len(futures) == len(questions) and all(each.done() for each in futures.values()):
-                    break
+                        open_[question] = clients[node].call_async(request), now
+                        counts[node] += 1
                 executor.spin_once(timeout_sec=_PAUSE)
             executor.remove_node(self._node)
             executor.shutdown()
-            results = {question: each.result() for question, each in futures.items() if each.done()}
         finally:
             for client in filter(None, clients.values()):
                 self._node.destroy_client(client)
@@ -200,6 +213,10 @@ class Graph:
         with suppress(Exception):  # a name that no rclpy gives itself
             return self._node.create_client(service, f"{node}/get_type_description")
         return None
+
+
+def _is_ready(client: Any) -> bool:
+    return client is not None and bool(client.service_is_ready())
 
 
 class RobotGraph:

@@ -25,7 +25,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.templates import RenderedFile, html, verbatim
 from idlc.project.write import apply, owned_files, plan
-from idlc.tasks.docs.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
+from idlc.tasks.docs.view import KINDS, Home, Pages, Paragraph, blocks, page, prefix, words
 from idlc.tasks.gen import is_name, named_packages
 
 
@@ -38,7 +38,7 @@ class About(NamedTuple):
     licenses: tuple[str, ...] = ()
 
 
-class Entry(NamedTuple):
+class ListingEntry(NamedTuple):
     """An interface in the list of its package, or a package among several."""
 
     page: str
@@ -48,23 +48,23 @@ class Entry(NamedTuple):
     about: str
 
 
-class Listing(NamedTuple):
+class ListingPage(NamedTuple):
     """The page of a package, or of several; `described`: some entry has a description."""
 
     title: str
     root: str
     words: Sequence[str]
-    description: Sequence[Block]
+    description: Sequence[Paragraph]
     facts: str
     described: bool
-    entries: Sequence[Entry]
+    entries: Sequence[ListingEntry]
 
 
 def _package_page(
     name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
-) -> Listing:
+) -> ListingPage:
     entries = [
-        Entry(
+        ListingEntry(
             pages[interface.name],
             words(interface.name.name),
             interface.name.kind,
@@ -79,7 +79,7 @@ def _package_page(
         "licence": ", ".join(about.licenses),
     }
     shown = [f"{label} {fact}" for label, fact in facts.items() if fact]
-    return Listing(
+    return ListingPage(
         title=name,
         root="../" * home.count("/"),
         words=words(name),
@@ -103,7 +103,7 @@ def first_line(interface: ir.Interface) -> str:
 
 
 #: The interfaces by package.
-Packages: TypeAlias = Mapping[str, Sequence[ir.Interface]]
+InterfacesByPackage: TypeAlias = Mapping[str, Sequence[ir.Interface]]
 #: The facts about packages by name.
 Abouts: TypeAlias = Mapping[str, About]
 
@@ -134,7 +134,7 @@ def site(models: Sequence[Model], about: Abouts) -> Iterator[RenderedFile]:
             _package_entry(package, home[package], about.get(package, About()), interfaces)
             for package, interfaces in packages.items()
         ]
-        shown = Listing("Interfaces", "", (), (), "", True, entries)
+        shown = ListingPage("Interfaces", "", (), (), "", True, entries)
         yield RenderedFile("index.html", template.render(page=shown))
     yield RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n")
     for path in ("search.js", "style.css"):
@@ -159,13 +159,15 @@ def _with_sources(models: Sequence[Model]) -> dict[ir.TypeName, tuple[ir.Interfa
 
 def _package_entry(
     package: str, home: str, facts: About, interfaces: Sequence[ir.Interface]
-) -> Entry:
+) -> ListingEntry:
     version = [f"version {facts.version}"] if facts.version else []
     line = " · ".join([*version, kind_counts(interfaces)])
-    return Entry(home, words(package), "", line, facts.description)
+    return ListingEntry(home, words(package), "", line, facts.description)
 
 
-def _index(packages: Packages, home: Mapping[str, str], pages: Pages, about: Abouts) -> str:
+def _index(
+    packages: InterfacesByPackage, home: Mapping[str, str], pages: Pages, about: Abouts
+) -> str:
     """Return the search index: names, pages, descriptions and the items of each, as JSON."""
     entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []
     for package, interfaces in packages.items():

@@ -114,7 +114,7 @@ Pages = Mapping[ir.TypeName, str]
 _DRAWING = re.compile(r"(?m)^[ \t]|[^\s.,;:!?]([ ]{2,}|\t)\S")
 
 
-class Block(NamedTuple):
+class Paragraph(NamedTuple):
     """A paragraph, or a drawing, which `pre` shows unchanged."""
 
     tag: str
@@ -138,11 +138,11 @@ class Row(NamedTuple):
     type: Sequence[str]
     unit: str
     value: str
-    meaning: Sequence[Block]
+    meaning: Sequence[Paragraph]
     is_deprecated: bool
 
 
-class Table(NamedTuple):
+class FieldTable(NamedTuple):
     """Rows, and flags for the columns that have text; `units` is the heading of one."""
 
     rows: Sequence[Row]
@@ -151,13 +151,13 @@ class Table(NamedTuple):
     meanings: bool
 
 
-class Section(NamedTuple):
+class StructureView(NamedTuple):
     """A structure, with a title if it is one of several."""
 
     title: str
-    about: Sequence[Block]
-    constants: Table
-    fields: Table
+    about: Sequence[Paragraph]
+    constants: FieldTable
+    fields: FieldTable
     empty: bool
 
 
@@ -168,7 +168,7 @@ class Home(NamedTuple):
     version: str = ""
 
 
-class Page(NamedTuple):
+class InterfacePage(NamedTuple):
     """The page of an interface; `statement` imports its class in Python."""
 
     title: str
@@ -178,7 +178,7 @@ class Page(NamedTuple):
     kind: str
     what: str
     words: Sequence[str]
-    sections: Sequence[Section]
+    sections: Sequence[StructureView]
     picture: Picture | None
     users: Sequence[Link]
     statement: str
@@ -188,12 +188,12 @@ class Page(NamedTuple):
 
 def page(
     interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pages: Pages, home: Home
-) -> Page:
+) -> InterfacePage:
     """Return the page of an interface; `users` are the interfaces that refer to it."""
     own = interface.name
     titles = _SECTIONS.get(own.kind, ("",))
     parts = zip(titles, derive.sections(interface), strict=True)
-    return Page(
+    return InterfacePage(
         title=str(own),
         root="../",
         package=own.package,
@@ -221,11 +221,11 @@ def prefix(interface: ir.Interface, part: ir.Message) -> str:
     return inner if part.name == interface.name else f"{inner}."
 
 
-def blocks(lines: Sequence[str]) -> list[Block]:
+def blocks(lines: Sequence[str]) -> list[Paragraph]:
     """Return comment lines as paragraphs, and as drawings where they are indented or aligned."""
     texts = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
     return [
-        Block("pre" if "\n" in text and _DRAWING.search(text) else "p", text)
+        Paragraph("pre" if "\n" in text and _DRAWING.search(text) else "p", text)
         for text in texts
         if text.strip()
     ]
@@ -235,16 +235,16 @@ def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
     return Link(pages.get(target, ""), str(target), words(text))
 
 
-def _section(title: str, message: ir.Message, before: str, pages: Pages) -> Section:
+def _section(title: str, message: ir.Message, before: str, pages: Pages) -> StructureView:
     package = message.name.package
     own = (message.constants, message.fields)
     constants, fields = (_table(elements, package, before, pages) for elements in own)
-    return Section(title, blocks(message.comment), constants, fields, not any(own))
+    return StructureView(title, blocks(message.comment), constants, fields, not any(own))
 
 
 def _table(
     elements: Sequence[ir.Field | ir.Constant], package: str, before: str, pages: Pages
-) -> Table:
+) -> FieldTable:
     rows = []
     for element in elements:
         type_ = ir.element_of(element.type)
@@ -262,7 +262,7 @@ def _table(
         name = words(element.name)
         rows.append(Row(anchor, name, link, rest, unit, value, meaning, is_deprecated))
     kinds = {"range" if is_range(row.unit) else "unit" for row in rows if row.unit}
-    return Table(
+    return FieldTable(
         rows,
         " or ".join(sorted(kinds, reverse=True)),
         any(row.value for row in rows),

@@ -16,7 +16,7 @@ from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.project import inputs
 from idlc.project.find import InterfaceFile, find
 from idlc.project.git import GIT, checked_out
-from idlc.project.library import Library, Texts
+from idlc.project.library import InterfaceTexts, Library
 from idlc.project.settings import Scope
 from idlc.versions.distribution import PREFIX, is_distro
 from idlc.wire.layout import oversized
@@ -25,7 +25,9 @@ from idlc.wire.layout import oversized
 class _NewTypes(Library):
     """The types of a target, and of a recording for the packages that the target lacks."""
 
-    def __init__(self, target: Target, recorded: Texts, *place: Any, **options: Any) -> None:
+    def __init__(
+        self, target: Target, recorded: InterfaceTexts, *place: Any, **options: Any
+    ) -> None:
         super().__init__(*place, **options)
         self._target = target
         self._recorded = recorded
@@ -54,7 +56,7 @@ class Target:
     def __init__(
         self,
         scope: Scope,
-        texts: Texts,
+        texts: InterfaceTexts,
         homes: Mapping[str, Path],
         whole: frozenset[str] = frozenset(),
         distro: Distro | None = None,
@@ -73,7 +75,7 @@ class Target:
         """Return whether a package is one of the folder or revision that was named."""
         return any(name.package == package for name in self.texts)
 
-    def compiler(self, recorded: Texts) -> Compiler:
+    def compiler(self, recorded: InterfaceTexts) -> Compiler:
         """Return a compiler that finds the target's types, and recorded ones where it has none."""
         scope = self.scope
         library = _NewTypes(

@@ -1,0 +1,153 @@
+"""Addresses of DDS, the variables of ROS 2 that restrict discovery, and the sockets for them."""
+
+from __future__ import annotations
+
+import re
+import socket
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from typing import NamedTuple
+
+from idlc.diagnostics.text import one_line
+from idlc.robot.dds.reader import Address
+from idlc.robot.errors import RobotError
+
+#: An address: the domain, and a peer.
+_ADDRESS = re.compile(r"dds(?::(\d{1,3}))?(?:/([\w.-]{1,253}))?", re.ASCII)
+MOST_DOMAIN = 232
+#: Participants on one machine, each with a port of its own.
+PARTICIPANTS = 120
+_GROUP = "239.255.0.1"
+_LOOPBACK = "127.0.0.1"
+#: The most bytes of a fragment: on loopback of Linux, on that of others, and to other machines.
+_FRAGMENTS = (60_000, 8_192, 1_344)
+_BUFFER = 4 << 20
+_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT", "NOT_SET", "")
+#: Variables that other implementations of DDS honour, and idlc does not.
+_IGNORED = ("ROS_DISCOVERY_SERVER", "CYCLONEDDS_URI", "FASTRTPS_DEFAULT_PROFILES_FILE")
+_MOST_STATIC = 16
+
+
+class Place(NamedTuple):
+    """Where a participant searches: a domain, hosts, and the subnet or not."""
+
+    domain: int
+    hosts: tuple[str, ...]
+    subnet: bool
+    notes: tuple[str, ...]
+
+    @property
+    def is_local(self) -> bool:
+        """True if nothing leaves this machine."""
+        return not self.subnet and all(host.startswith("127.") for host in self.hosts)
+
+
+def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) -> Place:
+    """Return where to search by an address and ROS 2's variables; raise RobotError.
+
+    Nothing leaves this machine unless the address names a peer or a variable admits it.
+    """
+    match = _ADDRESS.fullmatch(address)
+    if match is None:
+        hint = "write `dds`, `dds:7` for a domain, or `dds/192.168.1.20` for a peer"
+        raise RobotError(f"`{one_line(address)}` is not an address of DDS", hint)
+    text = match[1] or environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if domain is not None:
+        text = str(domain)
+    if not (re.fullmatch("[0-9]{1,3}", text) and int(text) <= MOST_DOMAIN):
+        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0")
+    range_ = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
+    if range_ not in _RANGES:
+        hint = "write SUBNET, LOCALHOST or OFF"
+        raise RobotError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is `{one_line(range_)}`", hint)
+    peers = environ.get("ROS_STATIC_PEERS", "").split(";")
+    if environ.get("ROS_LOCALHOST_ONLY", "").strip() == "1":
+        range_, peers = "LOCALHOST", []
+    hosts = [] if range_ == "OFF" else [_LOOPBACK]
+    names = [*filter(None, map(str.strip, peers))][:_MOST_STATIC]
+    hosts += map(_resolved, [*names, *filter(None, [match[2]])])
+    notes = tuple(f"idlc does not use {name}" for name in _IGNORED if environ.get(name))
+    return Place(int(text), tuple(dict.fromkeys(hosts)), range_ == "SUBNET", notes)
+
+
+def _resolved(name: str) -> str:
+    try:
+        return socket.gethostbyname(name)
+    except (OSError, UnicodeError) as error:
+        hint = "write its IPv4 address, such as `dds/192.168.1.20`"
+        raise RobotError(f"`{one_line(name)}` is not a host: {error}", hint) from None
+
+
+def _base(domain: int) -> int:
+    return 7400 + 250 * domain
+
+
+def searched(place: Place) -> list[Address]:
+    """Return the addresses at which other participants may listen."""
+    first = _base(place.domain) + 10
+    ports = range(first, min(first + 2 * PARTICIPANTS, 2**16), 2)
+    addresses = [(host, port) for host in place.hosts for port in ports]
+    return [*addresses, *([(_GROUP, _base(place.domain))] if place.subnet else ())]
+
+
+def own_hosts(place: Place) -> list[str]:
+    """Return the addresses of this machine that others can reach."""
+    if place.is_local:
+        return [_LOOPBACK]
+    hosts = []
+    for host in (*place.hosts, *([_GROUP] if place.subnet else ())):
+        with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect((host, 9))
+            hosts.append(probe.getsockname()[0])
+    others = [host for host in dict.fromkeys(hosts) if not host.startswith("127.")]
+    return others or [_LOOPBACK]
+
+
+def open_sockets(place: Place) -> list[socket.socket]:
+    """Return the socket of a free participant, and that of the subnet; raise RobotError."""
+    host = _LOOPBACK if place.is_local else "0.0.0.0"  # noqa: S104 - the environment asks for it
+    first = _base(place.domain) + 10
+    for port in range(first, min(first + 2 * PARTICIPANTS, 2**16), 2):
+        own = _socket()
+        try:
+            own.bind((host, port))
+        except OSError:
+            own.close()
+            continue
+        return [own, *(_multicast(place, own_hosts(place)) if place.subnet else ())]
+    problem = f"all ports of {PARTICIPANTS} participants of domain {place.domain} are in use"
+    raise RobotError(problem, "stop some nodes, or use another ROS_DOMAIN_ID")
+
+
+def _socket() -> socket.socket:
+    own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    own.setblocking(False)
+    for option in (socket.SO_RCVBUF, socket.SO_SNDBUF):
+        with suppress(OSError):
+            own.setsockopt(socket.SOL_SOCKET, option, _BUFFER)
+    return own
+
+
+def _multicast(place: Place, hosts: Iterable[str]) -> list[socket.socket]:
+    """Return a socket for announcements on the subnet; none if the system refuses it."""
+    group = _socket()
+    try:
+        group.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if hasattr(socket, "SO_REUSEPORT"):
+            group.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        group.bind(("", _base(place.domain)))
+        for host in hosts:
+            member = socket.inet_aton(_GROUP) + socket.inet_aton(host)
+            group.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+    except OSError:
+        group.close()
+        return []
+    return [group]
+
+
+def fragment_size(host: str) -> int:
+    """Return the most bytes of a fragment to a host."""
+    if not host.startswith("127."):
+        return _FRAGMENTS[2]
+    return _FRAGMENTS[0] if sys.platform == "linux" else _FRAGMENTS[1]

@@ -1,0 +1,108 @@
+"""The bytes of packets and of their parts, always little-endian."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator
+
+from idlc.robot.dds import wire
+
+#: The protocol, its version 2.3, and the vendor.
+_HEAD = b"RTPS\x02\x03" + wire.VENDOR
+#: The encapsulation of a list of parameters.
+LIST = b"\x00\x03\x00\x00"
+
+
+def format_packet(prefix: bytes, parts: Iterable[bytes]) -> bytes:
+    """Return a packet of a participant."""
+    return b"".join((_HEAD, prefix, *parts))
+
+
+def _part(kind: int, flags: int, *content: bytes) -> bytes:
+    size = sum(map(len, content))
+    # 0 means up to the end of the packet
+    head = struct.pack("<BBH", kind, flags | wire.LITTLE, size if size < 2**16 else 0)
+    return b"".join((head, *content))
+
+
+def format_number(number: int) -> bytes:
+    """Return a sequence number."""
+    return struct.pack("<iI", number >> 32, number & 0xFFFFFFFF)
+
+
+def for_participant(prefix: bytes) -> bytes:
+    """Return the part that says for which participant the next ones are."""
+    return _part(wire.DESTINATION, 0, prefix)
+
+
+def at_time(nanoseconds: int) -> bytes:
+    """Return the part that tells when the next samples were sent."""
+    seconds, rest = divmod(nanoseconds, 10**9)
+    return _part(wire.TIMESTAMP, 0, struct.pack("<II", seconds & 0xFFFFFFFF, (rest << 32) // 10**9))
+
+
+def format_data(reader: bytes, writer: bytes, number: int, inline: bytes, payload: bytes) -> bytes:
+    """Return a sample; without a payload it says by its parameters what ended."""
+    flags = (wire.INLINE if inline else 0) | (wire.PAYLOAD if payload else 0)
+    head = b"\0\0\x10\0" + reader + writer + format_number(number)
+    return _part(wire.DATA, flags, head, inline, payload)
+
+
+def format_fragment(
+    reader: bytes, writer: bytes, number: int, inline: bytes, payload: bytes, first: int, size: int
+) -> bytes:
+    """Return one fragment of a sample."""
+    flags = wire.INLINE if inline else 0
+    head = b"\0\0\x1c\0" + reader + writer + format_number(number)
+    head += struct.pack("<IHHI", first, 1, size, len(payload))
+    return _part(wire.FRAGMENT, flags, head, inline, payload[(first - 1) * size : first * size])
+
+
+def format_heartbeat(reader: bytes, writer: bytes, first: int, last: int, count: int) -> bytes:
+    """Return a heartbeat that asks for an answer."""
+    numbers = format_number(first) + format_number(last) + struct.pack("<I", count)
+    return _part(wire.HEARTBEAT, 0, reader, writer, numbers)
+
+
+def _set(base: int, members: Iterable[int], size: int) -> bytes:
+    words = [0] * ((size + 31) // 32)
+    for member in members:
+        words[(member - base) // 32] |= 1 << (31 - (member - base) % 32)
+    return struct.pack(f"<I{len(words)}I", size, *words)
+
+
+def format_acknack(
+    reader: bytes, writer: bytes, base: int, missing: list[int], count: int
+) -> bytes:
+    """Return what a reader lacks, of the next 256 numbers from `base`."""
+    members = _set(base, missing, missing[-1] - base + 1 if missing else 0)
+    flags = 0 if missing else wire.FINAL
+    tail = format_number(base) + members + struct.pack("<I", count)
+    return _part(wire.ACKNACK, flags, reader, writer, tail)
+
+
+def format_gap(reader: bytes, writer: bytes, first: int, after: int) -> bytes:
+    """Return that the numbers from `first` up to `after` never come."""
+    numbers = format_number(first) + format_number(after)
+    return _part(wire.GAP, 0, reader, writer, numbers, _set(after, (), 0))
+
+
+def format_nack_fragment(
+    reader: bytes, writer: bytes, number: int, missing: list[int], count: int
+) -> bytes:
+    """Return the fragments that a reader lacks, of 256 from the first missing one."""
+    base = missing[0]
+    members = _set(base, missing, missing[-1] - base + 1)
+    tail = format_number(number) + struct.pack("<I", base) + members + struct.pack("<I", count)
+    return _part(wire.NACK_FRAGMENT, 0, reader, writer, tail)
+
+
+def parameter(name: int, value: bytes) -> bytes:
+    """Return a parameter, padded to four bytes."""
+    padded = value + bytes(-len(value) % 4)
+    return struct.pack("<HH", name, len(padded)) + padded
+
+
+def parameter_list(parameters: Iterator[tuple[int, bytes]]) -> bytes:
+    """Return parameters and their end."""
+    return b"".join((*(parameter(*each) for each in parameters), parameter(wire.SENTINEL, b"")))

@@ -1,0 +1,130 @@
+"""The names of ROS 2 on DDS: topics and types of its entities, and entities of what others tell.
+
+A topic `/a` is `rt/a`; a service `/a` is two topics, `rq/aRequest` and `rr/aReply`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from idlc.robot.dds import info, wire
+from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.reader import Received
+from idlc.robot.keys import Entity, Kind
+from idlc.robot.names import ros_type
+
+#: The last byte of the id of a writer and of a reader.
+WRITER, READER = b"\x03", b"\x04"
+#: The ends of the names and types of a service's topics.
+HALVES = {"rq": ("Request", "Request_"), "rr": ("Reply", "Response_")}
+#: The node of an endpoint that no node owns, as rcl calls it.
+_UNKNOWN = info.NodeInfo("/", "_NODE_NAME_UNKNOWN_", (), ())
+#: The kinds of endpoints; a service and a client are shown as their readers.
+_KINDS = {
+    ("rt", True): Kind.PUBLISHER,
+    ("rt", False): Kind.SUBSCRIPTION,
+    ("rq", False): Kind.SERVICE,
+    ("rr", False): Kind.CLIENT,
+}
+
+
+def guid_of(prefix: bytes, number: int, kind: bytes) -> bytes:
+    """Return the GUID of an own endpoint."""
+    return prefix + (number & 0xFFFFFF).to_bytes(3, "big") + kind
+
+
+def own_nodes(prefix: bytes, entities: Iterable[Entity]) -> Iterator[info.NodeInfo]:
+    """Yield the own nodes with their endpoints."""
+    nodes: dict[tuple[str, str], tuple[list[bytes], list[bytes]]] = {}
+    for entity in entities:
+        readers, writers = nodes.setdefault((entity.namespace, entity.node), ([], []))
+        if entity.kind in (Kind.SUBSCRIPTION, Kind.SERVICE, Kind.CLIENT):
+            readers.append(guid_of(prefix, entity.id + 1, READER))
+        if entity.kind in (Kind.PUBLISHER, Kind.SERVICE, Kind.CLIENT):
+            writers.append(guid_of(prefix, entity.id + 1, WRITER))
+    for names, (readers, writers) in nodes.items():
+        yield info.NodeInfo(*names, tuple(readers), tuple(writers))
+
+
+class RemoteNodes:
+    """What other participants tell of their nodes."""
+
+    def __init__(self, domain: int) -> None:
+        self._domain = domain
+        self._nodes: dict[bytes, tuple[info.NodeInfo, ...]] = {}
+
+    def learn(self, received: Received) -> bool:
+        """Take a message of `ros_discovery_info`; return whether it is valid."""
+        try:
+            guid, nodes = info.parse_info(received.payload)
+        except wire.WireError:
+            return False
+        # nobody speaks for another participant
+        if guid[: wire.PREFIX] != received.writer[: wire.PREFIX]:
+            return False
+        self._nodes[guid[: wire.PREFIX]] = nodes
+        return True
+
+    def entities(
+        self,
+        prefixes: Iterable[bytes],
+        endpoints: Iterable[Endpoint],
+        hashes: Mapping[tuple[str, str], str],
+    ) -> Iterator[Entity]:
+        """Yield the entities of the participants that exist; forget what others told.
+
+        DDS tells no hash of a service: `hashes` has those of the own ones by name and type.
+        """
+        self._nodes = {each: self._nodes[each] for each in prefixes if each in self._nodes}
+        owners: dict[bytes, tuple[int, info.NodeInfo]] = {}
+        for prefix, nodes in self._nodes.items():
+            for owner in enumerate(nodes):
+                if entity := self._entity(prefix, owner, owner[0], Kind.NODE):
+                    yield entity
+                for guid in (*owner[1].readers, *owner[1].writers):
+                    owners[guid] = owner
+        for end in endpoints:
+            if entity := self._endpoint(end, owners.get(end.guid, (0, _UNKNOWN)), hashes):
+                yield entity
+
+    def _endpoint(
+        self, end: Endpoint, owner: tuple[int, info.NodeInfo], hashes: Mapping[tuple[str, str], str]
+    ) -> Entity | None:
+        """Return what ROS 2 shows of an endpoint; `None` if it shows nothing."""
+        half, _, name = end.topic.partition("/")
+        kind, type_, hash_ = _KINDS.get((half, end.is_writer)), end.type, end.hash
+        if kind is None:
+            return None
+        if half in HALVES:
+            name, type_ = map(str.removesuffix, (name, type_), HALVES[half])
+        names = f"/{name}", ros_type(type_) or ""
+        if half in HALVES and not end.guid.startswith(wire.VENDOR):
+            # others tell the hash of the request or of the response
+            hash_ = hashes.get(names, "")
+        number = int.from_bytes(end.guid[12:15], "big")
+        more = {"name": names[0], "type": names[1], "hash": hash_, "qos": end.qos}
+        return self._entity(end.guid[: wire.PREFIX], owner, number, kind, **more)
+
+    def _entity(
+        self,
+        prefix: bytes,
+        owner: tuple[int, info.NodeInfo],
+        number: int,
+        kind: Kind,
+        **more: Any,
+    ) -> Entity | None:
+        """Return an entity of another participant; `None` if its type has no valid name."""
+        try:
+            return Entity(
+                domain=self._domain,
+                session=prefix.hex(),
+                node_id=owner[0],
+                id=number,
+                kind=kind,
+                namespace=owner[1].namespace,
+                node=owner[1].name,
+                **more,
+            )
+        except ValueError:
+            return None

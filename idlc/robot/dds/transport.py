@@ -1,0 +1,222 @@
+"""The transport over DDS: the entities of ROS 2 as endpoints of a participant."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+from idlc.robot.dds import info
+from idlc.robot.dds.address import Place
+from idlc.robot.dds.connection import Connection
+from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
+from idlc.robot.dds.reader import Received
+from idlc.robot.dds.services import Services
+from idlc.robot.dds.writer import Writer
+from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.names import dds_type
+from idlc.robot.qos import DurabilityPolicy, QoSProfile
+from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
+
+_INFO_ID = 0xFFFFF0
+_INFO_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: Seconds without a change after which the others have told all, and the most of them.
+_SETTLED = 0.3
+_PATIENCE = 3.0
+
+
+class _Closer:
+    """A declaration."""
+
+    def __init__(self, withdraw: Callable[[], None]) -> None:
+        self._withdraw: Callable[[], None] | None = withdraw
+
+    @property
+    def is_closed(self) -> bool:
+        """True after `close`."""
+        return self._withdraw is None
+
+    def close(self) -> None:
+        """Withdraw it."""
+        withdraw, self._withdraw = self._withdraw, None
+        if withdraw is not None:
+            withdraw()
+
+
+class _Sender(_Closer):
+    def __init__(self, connection: Connection, writer: Writer) -> None:
+        super().__init__(lambda: connection.remove(writer.guid))
+        self._connection = connection
+        self._writer = writer
+
+    def put(self, payload: bytes, *, attachment: bytes) -> None:  # noqa: ARG002 - it is Zenoh's
+        """Send a message."""
+        if self.is_closed:
+            raise RuntimeError("the publisher is closed")
+        self._connection.write(self._writer, payload)
+
+
+class DdsTransport:
+    """The declarations of one participant."""
+
+    def __init__(self, place: Place) -> None:
+        self.place = place
+        self._own: dict[str, Entity] = {}
+        self._remote = RemoteNodes(place.domain)
+        self._watchers: list[Callable[[str, bool], None]] = []
+        self._shown: dict[str, None] = {}
+        self._refreshed = 0.0
+        self._is_stale = True
+        self._connection = Connection(place, self._tick)
+        self._services = Services(self._connection)
+        self._started = time.monotonic()
+        self.id = self._connection.prefix.hex()
+        writer, reader = (
+            Endpoint(self._guid(_INFO_ID, kind), info.TOPIC, info.TYPE, _INFO_QOS)
+            for kind in (WRITER, READER)
+        )
+        self._info = self._connection.add_writer(writer)
+        self._connection.add_reader(reader, self._learn)
+        self._connection.start()
+
+    def _guid(self, number: int, kind: bytes) -> bytes:
+        return guid_of(self._connection.prefix, number, kind)
+
+    def gid(self, entity: Entity) -> bytes:
+        """Return the GUID of the writer, or of the reader of a subscription."""
+        is_reader = entity.kind is Kind.SUBSCRIPTION
+        return self._guid(entity.id + 1, READER if is_reader else WRITER)
+
+    # endpoints
+
+    def _topic(self, entity: Entity) -> Endpoint:
+        names = f"rt{entity.name}", dds_type(entity.type)
+        return Endpoint(self.gid(entity), *names, entity.qos, entity.hash)
+
+    def publisher(self, entity: Entity) -> Sender:
+        """Declare a writer."""
+        return _Sender(self._connection, self._connection.add_writer(self._topic(entity)))
+
+    def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
+        """Declare a reader."""
+
+        def deliver(received: Received) -> None:
+            if not received.is_key:
+                sent = received.time or time.time_ns()
+                attachment = pack_attachment(received.number, sent, received.writer)
+                callback(Sample(received.payload, attachment))
+
+        reader = self._connection.add_reader(self._topic(entity), deliver)
+        return _Closer(lambda: self._connection.remove(reader.guid))
+
+    def service(self, entity: Entity, callback: Callable[[Request], None]) -> Closeable:
+        """Declare the ends of a service."""
+        pair = self._services.serve(entity, callback)
+        return _Closer(lambda: self._services.withdraw(pair))
+
+    def call(
+        self,
+        entity: Entity,
+        payload: bytes,
+        attachment: bytes,
+        callback: OnReply,
+        *,
+        timeout: float,
+    ) -> None:
+        """Send a request as soon as a service is there; only the first reply counts."""
+        with self._connection.lock:
+            client = self._services.client(entity, is_announced=entity.token in self._own)
+            self._services.call(client, payload, attachment, callback, timeout)
+
+    def _tick(self) -> None:
+        """Do what is due."""
+        self._services.tick(time.monotonic())
+        if self._is_stale or self._connection.changed_at > self._refreshed:
+            self._refresh()
+
+    # the graph
+
+    def announce(self, entity: Entity) -> Closeable:
+        """Tell the others about a node, or that an endpoint is of its node."""
+        with self._connection.lock:
+            self._own[entity.token] = entity
+            if entity.kind is Kind.CLIENT:
+                self._services.client(entity, is_announced=True)
+            self._publish()
+        return _Closer(lambda: self._conceal(entity))
+
+    def _conceal(self, entity: Entity) -> None:
+        with self._connection.lock:
+            del self._own[entity.token]
+            if entity.kind is Kind.CLIENT:
+                self._services.withdraw_client(entity)
+            self._publish()
+
+    def _publish(self) -> None:
+        """Send the own nodes and their endpoints."""
+        prefix = self._connection.prefix
+        payload = info.format_info(prefix, own_nodes(prefix, self._own.values()))
+        self._connection.write(self._info, payload)
+        self._is_stale = True
+
+    def _learn(self, received: Received) -> None:
+        self._is_stale |= self._remote.learn(received)
+
+    def _entities(self) -> dict[str, None]:
+        """Return the tokens of all nodes and endpoints."""
+        participant = self._connection.participant
+        hashes = {(own.name, own.type): own.hash for own in self._own.values()}
+        remote = self._remote.entities([*participant.peers], participant.remote_endpoints(), hashes)
+        return dict.fromkeys((*self._own, *(entity.token for entity in remote)))
+
+    def _refresh(self) -> None:
+        """Tell the watchers what changed in the graph."""
+        self._refreshed, self._is_stale = time.monotonic(), False
+        shown, self._shown = self._shown, self._entities()
+        for watcher in self._watchers:
+            for token in shown.keys() - self._shown.keys():
+                watcher(token, False)
+            for token in self._shown:
+                if token not in shown:
+                    watcher(token, True)
+
+    def watch(
+        self,
+        domain: int,  # noqa: ARG002 - a participant knows one domain
+        callback: Callable[[str, bool], None],
+    ) -> Closeable:
+        """Call back with tokens."""
+        with self._connection.lock:
+            self._refresh()
+            self._watchers.append(callback)
+            for token in self._shown:
+                callback(token, True)
+        return _Closer(lambda: self._watchers.remove(callback))
+
+    def tokens(self, domain: int, timeout: float) -> Iterator[str]:  # noqa: ARG002
+        """Yield the tokens that exist, as soon as the others have told all of theirs."""
+        end = self._started + min(timeout, _PATIENCE)
+        while (now := time.monotonic()) < end:
+            with self._connection.lock:
+                is_told = self._connection.participant.is_told
+            if is_told and now - max(self._started, self._connection.changed_at) > _SETTLED:
+                break
+            time.sleep(0.02)
+        with self._connection.lock:
+            yield from self._entities()
+
+    def notes(self) -> list[str]:
+        """Return the variables that idlc does not use, and where it did not find anybody."""
+        participant = self._connection.participant
+        notes = [*self.place.notes]
+        if not participant.peers and self.place.is_local:
+            notes.append("idlc searched this machine only; `dds/HOST` also searches another one")
+        if participant.without_udp:
+            notes.append("some participants offer no UDP over IPv4; idlc does not see them")
+        if participant.refused:
+            notes.append("there are too many participants or endpoints; some are missing")
+        return notes
+
+    def close(self) -> None:
+        """Leave; all declarations end."""
+        self._connection.close()

@@ -1,0 +1,166 @@
+"""Packets from anybody: they are read or ignored, end in time, and take up bounded memory."""
+
+import random
+import struct
+import time
+
+import pytest
+
+from idlc.robot.dds import formats, info, wire
+from idlc.robot.dds.participant import MOST_PEERS
+from tests.robot.test_dds_network import ALL, LATCHED, Network, text
+from tests.support.rounds import SEED, rounds
+
+#: A head, from a participant that a test makes known.
+SOURCE = wire.VENDOR + b"\2" * 10
+HEAD = b"RTPS\2\3" + SOURCE[:2] + SOURCE
+
+
+def conversation():
+    """Return a network after some exchange, and the packets to its first participant."""
+    network = Network(SEED, 0.1, fragment=1_344)
+    left, right = network.add(1), network.add(2)
+    writers = [(own, network.writer(own, LATCHED)) for own in (left, right)]
+    for own in (left, right):
+        network.reader(own, LATCHED)
+        network.reader(own, ALL, 3)
+    network.run(3)
+    for number in range(20):
+        for own, writer in writers:
+            network.write(own, writer, text(number, 8 if number % 4 else 20_000))
+        network.run(0.2)
+    return network, [packet for _, target, packet in network.sent if target[0] == "10.0.0.1"]
+
+
+def mutated(rng, packet, others):
+    data = bytearray(packet)
+    for _ in range(rng.randrange(1, 5)):
+        at = rng.randrange(20, len(data)) if len(data) > 20 else 0
+        kind = rng.randrange(6)
+        if kind == 0:
+            data[at] = rng.choice([0, 1, 0x7F, 0x80, 0xFF, rng.randrange(256)])
+        elif kind == 1:
+            data[at : at + 4] = struct.pack("<I", rng.choice([0, 1, 2**31 - 1, 2**32 - 1, 256]))
+        elif kind == 2:
+            del data[at : at + rng.randrange(1, 9)]
+        elif kind == 3:
+            other = rng.choice(others)
+            data[at:] = other[at:]
+        elif kind == 4:
+            data[at:at] = data[20 : 20 + rng.randrange(1, 80)]
+        else:
+            data[at + 1 : at + 2] = bytes([rng.randrange(256)])
+    return bytes(data)
+
+
+def memory(participant):
+    """Return the number of things that a participant keeps."""
+    readers = participant._readers.values()
+    writers = [writer for reader in readers for writer in reader.writers.values()]
+    waiting = sum(len(each.early) + len(each.partial) for each in writers)
+    ends = sum(len(peer.endpoints) for peer in participant.peers.values())
+    return len(participant.peers) + len(writers) + waiting + ends
+
+
+@pytest.mark.rounds
+def test_mutated_packets_raise_nothing_and_leave_little():
+    rng = random.Random(SEED)
+    network, packets = conversation()
+    own = network.hosts["10.0.0.1"]
+    begun, slowest = time.process_time(), 0.0
+    for number in range(rounds(20_000)):
+        packet = mutated(rng, rng.choice(packets), packets)
+        before = time.process_time()
+        answers = own.receive(packet, ("10.0.0.2", 7410), network.now)
+        slowest = max(slowest, time.process_time() - before)
+        assert {answer.address[0] for answer in answers} <= {"10.0.0.2"}
+        if number % 100 == 0:
+            own.tick(network.now)
+            network.now += 0.1
+    assert time.process_time() > begun
+    assert slowest < 5
+    assert memory(own) < 3000
+
+
+def part(kind, body, flags=1):
+    return struct.pack("<BBH", kind, flags, len(body)) + body
+
+
+BIG = struct.pack("<iI", 2**31 - 1, 2**32 - 1)
+ONE = struct.pack("<iI", 0, 1)
+IDS = b"\0\0\2\4\0\0\1\3"
+DATA, FRAGMENT = b"\0\0\x10\0" + IDS + ONE, b"\0\0\x1c\0" + IDS + ONE
+MOST = 2**32 - 1
+
+
+def words(*numbers):
+    return struct.pack(f"<{len(numbers)}I", *numbers)
+
+
+EXTREMES = {
+    "many bits": part(6, IDS + ONE + words(MOST)),
+    "bits beyond the end": part(6, IDS + ONE + words(256)),
+    "a question for everything": part(6, IDS + BIG + words(256, *[MOST] * 9)),
+    "a heartbeat of all numbers": part(7, IDS + ONE + BIG + words(1)),
+    "a heartbeat backwards": part(7, IDS + BIG + ONE + words(2)),
+    "a gap over all": part(8, IDS + ONE + BIG + words(0)),
+    "a large sample": part(0x16, FRAGMENT + struct.pack("<IHHI", 1, 1, 4, MOST) + b"abcd"),
+    "fragments of nothing": part(0x16, FRAGMENT + struct.pack("<IHHI", 1, 1, 0, 0)),
+    "fragments beyond the end": part(0x16, FRAGMENT + struct.pack("<IHHI", MOST, 9, 4, 8)),
+    "missing fragments": part(0x12, IDS + ONE + words(MOST, MOST)),
+    "parameters without an end": part(0x15, DATA + b"\2\0\0\0" * 2000, 7),
+    "a parameter beyond the end": part(0x15, DATA + b"\2\0\xff\xff", 7),
+    "an offset beyond the end": part(0x15, b"\0\0\xff\xff" + IDS + ONE, 5),
+    "no content": part(0x15, b"", 5),
+    "a length beyond the end": b"\x15\x05\xff\xff",
+    "no length": b"\x15\x05\0\0",
+    "a source": part(0x0C, bytes(20)) + part(7, IDS + ONE + ONE + ONE),
+}
+
+
+@pytest.mark.parametrize("order", ["alone", "after a destination"])
+@pytest.mark.parametrize("case", EXTREMES)
+def test_extremes_are_refused_at_once(case, order):
+    network = Network()
+    own, _ = network.add(1), network.add(2)
+    network.writer(own, LATCHED)
+    network.reader(own, ALL)
+    network.run(2)
+    before = memory(own)
+    head = formats.for_participant(own.prefix) if order != "alone" else b""
+    begun = time.process_time()
+    for _ in range(50):
+        answers = own.receive(HEAD + head + EXTREMES[case], ("10.0.0.2", 7410), network.now)
+        assert sum(len(each) for answer in answers for each in answer.parts) < 1000
+    assert time.process_time() - begun < 5
+    assert memory(own) <= before + MOST_PEERS
+
+
+def test_other_packets_than_rtps_are_counted():
+    own = Network().add(1)
+    for packet in (b"", b"RTPS", b"x" * 100, b"RTPS\1\0" + bytes(14), HEAD[:19]):
+        assert own.receive(packet, ("10.0.0.2", 1), 1.0) == []
+    assert own.malformed == 5
+
+
+NODES = [info.NodeInfo("/ns", "talker", (b"r" * 16,), (b"w" * 16, b"x" * 16))]
+
+
+def test_nodes_are_read_as_they_were_written_and_cut_off_ones_are_refused():
+    payload = info.format_info(b"p" * 12, NODES)
+    assert info.parse_info(payload) == (b"p" * 12 + b"\0\0\1\xc1", tuple(NODES))
+    for end in range(len(payload) - 4):
+        with pytest.raises(wire.WireError):
+            info.parse_info(payload[:end])
+    with pytest.raises(wire.WireError):
+        info.parse_info(payload[:20] + b"\xff\xff\xff\xff" + payload[24:])
+
+
+def test_the_ids_of_humble_have_24_bytes():
+    def gid(letter):
+        return letter * 16 + bytes(8)
+
+    payload = b"\0\1\0\0" + gid(b"p") + struct.pack("<I", 1) + struct.pack("<I", 4) + b"/ns\0"
+    payload += struct.pack("<I", 7) + b"talker\0\0" + struct.pack("<I", 1) + gid(b"r")
+    payload += struct.pack("<I", 2) + gid(b"w") + gid(b"x")
+    assert info.parse_info(payload) == (b"p" * 16, tuple(NODES))

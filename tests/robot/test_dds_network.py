@@ -1,0 +1,220 @@
+"""Participants of DDS on a simulated network: no sockets, no clock, and packets that get lost."""
+
+import heapq
+import itertools
+import random
+
+import pytest
+
+from idlc.robot.dds import formats, wire
+from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.graph import READER, WRITER, guid_of
+from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS, Participant
+from idlc.robot.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from tests.support.rounds import SEED, rounds
+
+PORT = 7410
+ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+TYPE = "std_msgs::msg::dds_::String_"
+
+
+class Network:
+    """Hosts with one participant each; `loss` is the part of the packets that never arrive."""
+
+    def __init__(self, seed=0, loss=0.0, fragment=60_000):
+        self.random = random.Random(seed)
+        self.loss = loss
+        self.fragment = fragment
+        self.now = 1.0
+        self.hosts = {}
+        self.isolated = set()
+        self.sent = []
+        self._order = itertools.count()
+        self._flying = []
+
+    def add(self, number):
+        host = f"10.0.0.{number}"
+        others = [(f"10.0.0.{other}", PORT) for other in range(1, 9) if other != number]
+        prefix = wire.VENDOR + bytes([number]) * 10
+        own = Participant(prefix, [(host, PORT)], others, lambda _: self.fragment)
+        self.hosts[host] = own
+        return own
+
+    def send(self, participant, packets):
+        source = next(host for host, own in self.hosts.items() if own is participant)
+        for target, prefix, parts in packets:
+            head = (formats.for_participant(prefix),) if any(prefix) else ()
+            packet = formats.format_packet(participant.prefix, (*head, *parts))
+            self.sent.append((source, target, packet))
+            copies = 0 if self.random.random() < self.loss else 1
+            copies += self.loss > 0 and self.random.random() < 0.05
+            for _ in range(copies):
+                late = self.random.random() * 0.05 if self.loss else 0.001
+                flight = (self.now + late, next(self._order), source, target[0], packet)
+                heapq.heappush(self._flying, flight)
+
+    def run(self, seconds):
+        end = self.now + seconds
+        while True:
+            due = min(own.deadline for own in self.hosts.values())
+            arrives = self._flying[0][0] if self._flying else end
+            if min(due, arrives) >= end:
+                self.now = end
+                return
+            self.now = max(self.now, min(due, arrives))
+            if arrives <= due:
+                _, _, source, target, packet = heapq.heappop(self._flying)
+                if target in self.hosts and not {source, target} & self.isolated:
+                    own = self.hosts[target]
+                    self.send(own, own.receive(packet, (source, PORT), self.now))
+            else:
+                for own in [*self.hosts.values()]:
+                    if own.deadline <= due:
+                        self.send(own, own.tick(self.now))
+
+    def writer(self, participant, qos, number=1, topic="rt/chatter"):
+        end = Endpoint(guid_of(participant.prefix, number, WRITER), topic, TYPE, qos)
+        writer, packets = participant.add_writer(end, self.now)
+        self.send(participant, packets)
+        return writer
+
+    def reader(self, participant, qos, number=2, topic="rt/chatter"):
+        received = []
+        end = Endpoint(guid_of(participant.prefix, number, READER), topic, TYPE, qos)
+        reader, packets = participant.add_reader(
+            end, lambda sample: received.append(sample.payload), self.now
+        )
+        self.send(participant, packets)
+        return reader, received
+
+    def write(self, participant, writer, payload):
+        self.send(participant, writer.write(payload, b"", 0, self.now))
+
+
+def text(number, size=8):
+    return b"\0\1\0\0" + number.to_bytes(4, "little") * (size // 4)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.05, 0.2, 0.3])
+@pytest.mark.parametrize("size", [8, 40_000])
+def test_reliable_samples_arrive_in_order_and_complete(loss, size):
+    for seed in range(rounds(4)):
+        network = Network(SEED + seed, loss, fragment=1_344)
+        left, right = network.add(1), network.add(2)
+        writer = network.writer(left, ALL)
+        reader, received = network.reader(right, ALL)
+        network.run(20)
+        assert writer.readers
+        assert reader.writers
+        count = 40 if size == 8 else 5
+        for number in range(count):
+            network.write(left, writer, text(number, size))
+            network.run(0.01)
+        network.run(60)
+        assert received == [text(number, size) for number in range(count)]
+        # nothing waits for anything
+        assert writer.deadline is None
+        assert [(each.early, each.partial, each.bytes) for each in reader.writers.values()] == [
+            ({}, {}, 0)
+        ]
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+def test_late_readers_get_what_is_kept(loss):
+    network = Network(SEED, loss)
+    left = network.add(1)
+    writer = network.writer(left, LATCHED)
+    for number in range(10):
+        network.write(left, writer, text(number))
+    _, local = network.reader(left, LATCHED, 3)
+    right = network.add(2)
+    _, latched = network.reader(right, LATCHED)
+    _, volatile = network.reader(right, QoSProfile(), 4)
+    network.run(20)
+    network.write(left, writer, text(10))
+    network.run(5)
+    assert latched == local == [text(number) for number in (7, 8, 9, 10)]
+    assert volatile == [text(10)]
+
+
+def test_ends_that_do_not_fit_are_not_connected():
+    network = Network()
+    left, right = network.add(1), network.add(2)
+    writer = network.writer(left, BEST_EFFORT)
+    _, reliable = network.reader(right, QoSProfile(), 2)
+    _, best_effort = network.reader(right, BEST_EFFORT, 3)
+    _, elsewhere = network.reader(right, BEST_EFFORT, 4, "rt/other")
+    network.run(2)
+    for number in range(3):
+        network.write(left, writer, text(number))
+    network.run(1)
+    assert (reliable, elsewhere) == ([], [])
+    assert best_effort == [text(number) for number in range(3)]
+
+
+def test_participants_go_by_themselves_or_after_their_lease_and_return():
+    network = Network()
+    left, right = network.add(1), network.add(2)
+    network.writer(right, LATCHED)
+    _, received = network.reader(left, LATCHED)
+    network.run(2)
+    assert len([*left.remote_endpoints()]) == 1
+    network.isolated.add("10.0.0.2")
+    network.run(30)
+    assert (left.peers, [*left.remote_endpoints()]) == ({}, [])
+    network.isolated.clear()
+    network.run(10)
+    assert len([*left.remote_endpoints()]) == 1
+    network.write(right, right._writers[WRITER.join([b"\0\0\1", b""])], text(1))
+    network.run(1)
+    assert received == [text(1)]
+    network.send(right, right.leave())
+    del network.hosts["10.0.0.2"]
+    network.run(1)
+    assert left.peers == {}
+
+
+def test_endpoints_that_come_and_go_leave_nothing():
+    network = Network(SEED, 0.1)
+    left, right = network.add(1), network.add(2)
+    _, received = network.reader(right, ALL)
+    for number in range(3, 400):
+        writer = network.writer(left, ALL, number)
+        network.run(0.02)
+        network.send(left, left.remove(writer.guid, network.now))
+    network.run(30)
+    assert [*right.remote_endpoints()] == []
+    assert all(reader.writers == {} for reader in right._readers.values() if reader.qos is ALL)
+    assert sum(len(writer.history) for writer in left._writers.values()) <= 300
+    assert received == []
+
+
+def announcement(prefix, host="10.0.0.2"):
+    """Return a packet by which a participant announces itself."""
+    network = Network()
+    own = Participant(prefix, [(host, PORT)], [("10.0.0.1", PORT)], lambda _: 1000)
+    (packet,) = own.tick(1.0)
+    network.hosts["10.0.0.9"] = own
+    network.send(own, [packet])
+    return network.sent[0][2]
+
+
+def test_strangers_get_three_announcements_where_their_packets_come_from():
+    network = Network()
+    own = network.add(1)
+    network.writer(own, LATCHED)
+    own.tick(0.5)
+    packet = announcement(wire.VENDOR + b"x" * 10, "203.0.113.7")
+    answers = [own.receive(packet, ("10.0.0.2", 5), 1.0 + n) for n in range(50)]
+    packets = [packet for each in answers for packet in each]
+    assert [packet.address for packet in packets] == [("10.0.0.2", PORT)] * MOST_ANNOUNCEMENTS
+    # many names are many strangers, but not for ever
+    drawn = 0
+    for number in range(3000):
+        stranger = announcement(wire.VENDOR + number.to_bytes(10, "big"))
+        drawn += len(own.receive(stranger, ("10.0.0.2", 5), 2.0))
+    assert drawn <= MOST_PEERS
+    assert len(own.peers) <= MOST_PEERS
+    assert not any(peer.endpoints for peer in own.peers.values())

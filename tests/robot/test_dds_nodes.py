@@ -1,0 +1,106 @@
+"""Nodes of idlc.robot on DDS, over sockets on loopback, in participants of their own."""
+
+import random
+import subprocess
+import sys
+
+import pytest
+
+import idlc
+from idlc.robot import ActionClient, ActionServer, DurabilityPolicy, QoSProfile
+from idlc.robot.errors import RobotError
+from idlc.robot.keys import Kind
+from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
+from tests.support.waiting import wait_for
+
+LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+Fibonacci = idlc.load("test_msgs/action/Fibonacci")["test_msgs/action/Fibonacci"]
+
+
+@pytest.fixture
+def pair():
+    # the domains of the tests with rclpy are below
+    address = f"dds:{random.SystemRandom().randrange(102, 230)}"
+    with node_at(address, "left") as left, node_at(address, "right") as right:
+        yield left, right
+
+
+def serve(request, response):
+    response.success, response.message = request.data, "done"
+    return response
+
+
+def execute(goal):
+    goal.succeed()
+    return Fibonacci.Result(sequence=[0, 1, 1][: goal.request.order])
+
+
+def test_nodes_talk_and_leave(pair, monkeypatch):
+    left, right = pair
+    words, late, own = [], [], []
+    publisher = left.create_publisher(String, "words", 100)
+    kept = left.create_publisher(String, "kept", LATCHED)
+    for number in range(4):
+        kept.publish(String(data=str(number)))
+    right.create_subscription(String, "words", lambda message: words.append(message.data), 100)
+    right.create_subscription(String, "kept", lambda message: late.append(message.data), LATCHED)
+    left.create_subscription(String, "words", lambda message: own.append(message.data), 100)
+    right.create_service(SetBool, "set", serve)
+    client, nobody = left.create_client(SetBool, "set"), left.create_client(SetBool, "nobody")
+    ActionServer(right, Fibonacci, "count", execute)
+    action = ActionClient(left, Fibonacci, "count")
+
+    spin_until(lambda: publisher.get_subscription_count() == 2, left, right)
+    for number in range(50):
+        publisher.publish(String(data=str(number)))
+    spin_until(lambda: len(words) == len(own) == 50 and len(late) == 2, left, right)
+    assert words == own == [str(number) for number in range(50)]
+    assert late == ["2", "3"]
+
+    assert client.wait_for_service(LONG)
+    reply = client.call_async(SetBool.Request(data=True))
+    spin_until(reply.done, left, right)
+    assert (reply.result().success, reply.result().message) == (True, "done")
+    assert action.wait_for_server(LONG)
+    goal = action.send_goal_async(Fibonacci.Goal(order=2))
+    spin_until(goal.done, left, right)
+    result = goal.result().get_result_async()
+    spin_until(result.done, left, right)
+    assert [*result.result().result.sequence] == [0, 1]
+    monkeypatch.setattr("idlc.robot.dds.services._APPEARING", 0.01)
+    with pytest.raises(RobotError, match="no service answered `/nobody`"):
+        nobody.call(SetBool.Request(), LONG)
+
+    assert {*left.get_node_names()} == {"left", "right"}
+    (end,) = left.graph.entities(Kind.SERVICE, "/set")
+    assert (end.node_name, end.hash) == ("/right", client.entity.hash)
+    right.session.close()
+    wait_for(lambda: left.get_node_names() == ["left"])
+    left.destroy_publisher(publisher)
+    with pytest.raises(RobotError, match="is closed"):
+        publisher.publish(String())
+
+
+BARE = """
+import sys
+sys.modules.update(dict.fromkeys(("zenoh", "xxhash", "numpy")))
+import idlc
+from idlc.robot import Node, init, spin_once
+String = idlc.load("std_msgs/msg/String").String
+received = []
+with init(address=sys.argv[1]):
+    node = Node("bare")
+    node.create_subscription(String, "bare", received.append, 10)
+    publisher = node.create_publisher(String, "bare", 10)
+    publisher.publish(String(data="hello"))
+    while not received:
+        spin_once(node, timeout_sec=0.1)
+print(received[0].data)
+"""
+
+
+def test_a_first_message_needs_no_other_package():
+    domain = random.SystemRandom().randrange(102, 230)
+    command = [sys.executable, "-c", BARE, f"dds:{domain}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=True)
+    assert done.stdout == "hello\n"
