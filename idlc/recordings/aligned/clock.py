@@ -51,7 +51,7 @@ def grid(first: int, last: int, period: Fraction, messages: int) -> Any:
     """
     count = int((last - first) / period) + 1
     if count > max(TICKS, TICKS_PER_MESSAGE * messages):
-        span = f"{Fraction(last - first, SECOND):,.0f} s"
+        span = f"{(last - first) // SECOND:,} s"
         what = f"{count:,} rows for {messages:,} messages, whose times span {span}"
         hint = "choose another clock (`log` or `header`), or give `start` and `end`"
         raise RecordingError(f"the table would have {what}", hint)

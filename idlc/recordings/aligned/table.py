@@ -195,8 +195,8 @@ class Aligned:
                 if source is self._on
             )
             ticks = (next(known, None) or _scan(*self._on)).times
-            first = 0 if start is None else np.searchsorted(ticks, start)
-            return ticks[first : None if end is None else np.searchsorted(ticks, end)]
+            limits = (None if time is None else np.searchsorted(ticks, time) for time in self._span)
+            return ticks[slice(*limits)]
         assert self._period is not None
         ends = [int(each.times[at]) for each in self._times if len(each.times) for at in (0, -1)]
         first = min(ends, default=None) if start is None else start
@@ -307,7 +307,8 @@ def aligned(
 
     def source(name: str, fields: Any) -> Source:
         limit = _for(name, tolerance, None)
-        way = "on" if name == on else _choice("how", _for(name, how, "last"), WAYS)
+        way = _choice("how", _for(name, how, "last"), WAYS)
+        way = "on" if name == on else way
         by = _choice("clock", _for(name, clock, "log"), CLOCKS)
         fields = None if fields in (None, ...) else fields
         fields = (fields,) if isinstance(fields, str) else fields
@@ -453,7 +454,7 @@ def _assembled(
     return pa.Table.from_arrays(columns, schema=schema)
 
 
-def _taken(table: pa.Table, index: Any, gap: Any) -> list[pa.Array]:
+def _taken(table: pa.Table, index: Any, gap: Any) -> list[Any]:
     """Return the values of messages at indexes, without a copy if these are all messages."""
     columns = [column.combine_chunks() for column in table.columns]
     if len(index) == len(table) and (index == np.arange(len(index))).all():
@@ -461,12 +462,12 @@ def _taken(table: pa.Table, index: Any, gap: Any) -> list[pa.Array]:
     return [column.take(arrow().array(index, mask=gap)) for column in columns]
 
 
-def _between(track: Track, table: pa.Table, each: Match) -> list[pa.Array]:
+def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
     """Return the values between messages; those of gaps mean nothing."""
     pa, rows = arrow(), np.zeros(len(each.first), bool)
     first, second = (_taken(table, np.maximum(at, 0), rows) for at in (each.first, each.second))
     names = table.column_names
-    arrays: dict[str, pa.Array] = {}
+    arrays: dict[str, Any] = {}
     for paths in track.quaternions:
         if paths[0] in names:
             starts, ends = (
