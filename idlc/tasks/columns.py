@@ -10,13 +10,14 @@ import sys
 import warnings
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import msgspec
+import numpy as np
 
 from idlc.api.conditions import Condition
 from idlc.api.recording import RecordedTopic, Recording, UnknownTopicError
@@ -33,13 +34,23 @@ if TYPE_CHECKING:
 
 
 def converted(batch: pa.RecordBatch, convert: Callable[[pa.Array], pa.Array]) -> pa.RecordBatch:
-    """Return a batch with each column converted."""
+    """Return a batch with each column converted; what is null stays null."""
     import pyarrow as pa
 
-    columns = list(map(convert, batch.columns))
+    columns = [_apart_from_nulls(column, convert) for column in batch.columns]
     pairs = zip(batch.schema, columns, strict=True)
     schema = pa.schema([field.with_type(column.type) for field, column in pairs])
     return pa.RecordBatch.from_arrays(columns, schema=schema.with_metadata(batch.schema.metadata))
+
+
+def _apart_from_nulls(column: pa.Array, convert: Callable[[pa.Array], pa.Array]) -> pa.Array:
+    import pyarrow as pa
+
+    if not column.null_count:
+        return convert(column)
+    mask = column.is_null().to_numpy(zero_copy_only=False)
+    places = np.maximum(np.cumsum(~mask) - 1, 0)
+    return convert(column.drop_null()).take(pa.array(places, mask=mask))
 
 
 def filled(column: pa.Array) -> pa.Array:
@@ -182,6 +193,8 @@ TEXT = "text"
 
 #: Called with a topic, the number of messages done, and of all.
 Progress = Callable[[str, int, int], None]
+#: Writes files from an open recording.
+Work = Callable[["Recording", "ColumnsOptions", Report, Progress], Iterable["WrittenFile"]]
 
 
 class ColumnsOptions(msgspec.Struct, frozen=True):
@@ -220,10 +233,12 @@ class Job(NamedTuple):
     style: str
 
 
-def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list[WrittenFile]:
+def columns(
+    options: ColumnsOptions, report: Report, progress: Progress, work: Work | None = None
+) -> list[WrittenFile]:
     """Write the columns of topics, each file whole or not at all; return what was written.
 
-    A topic that cannot be read does not keep others from being written.
+    By default, the work is a file for each topic.
     """
     done: list[WrittenFile] = []
     missing: dict[str, list[str]] = {}
@@ -240,9 +255,7 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
         report.notes += recording.notes
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            for job in _jobs(recording, options, report):
-                with _problems(options, report):
-                    done += _written(job, options, report, progress)
+            done += (work or _each_topic)(recording, options, report, progress)
         for message in (warning.message for warning in caught):
             if isinstance(message, OtherDefinitionWarning):
                 report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
@@ -252,6 +265,15 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
             text = f"{first_few(topics, NAMED)}: {problem}"
             report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
     return done
+
+
+def _each_topic(
+    recording: Recording, options: ColumnsOptions, report: Report, progress: Progress
+) -> Iterator[WrittenFile]:
+    """Write each topic; one that cannot be read does not keep others from being written."""
+    for job in _jobs(recording, options, report):
+        with _problems(options, report):
+            yield from _written(job, options, report, progress)
 
 
 @contextmanager
@@ -274,7 +296,11 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
         # a topic that was not selected by name does not keep others from being written
         with nullcontext() if options.topics else _problems(options, report):
             topics.append(recording[name].between(options.start, options.end))
-    jobs = [_job(topic, options, len(names) > 1) for topic in topics]
+    return checked([_job(topic, options, len(names) > 1) for topic in topics], options, report)
+
+
+def checked(jobs: Sequence[Job], options: ColumnsOptions, report: Report) -> Sequence[Job]:
+    """Return jobs that can be done together, or report why they cannot, and return none."""
     if problem := _problem(jobs, options):
         message, hint = problem
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
