@@ -37,7 +37,8 @@ def command(path: str, service: str | None, yes: bool) -> int:
     """Set up ROS 2 interfaces in a package, library or workspace.
 
     PATH is a ROS 2 package (ament_python or ament_cmake), a Python library with any build backend,
-    a workspace of packages, or an empty folder. In an empty folder, idlc creates a package.
+    a workspace of packages, or an empty folder. In an empty folder, idlc creates the
+    package that `idlc scaffold package` creates, with an example.
 
     idlc shows every change first. On a terminal, it asks before it writes; elsewhere, it writes
     only with --yes. It then compiles the interfaces, installs a copy of the package into a

@@ -134,35 +134,47 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
         sys.stdout.write(f"similar names: {sent} has no receiver, and {received} no sender\n")
 
 
-@click.command("show", epilog=options.example("idlc show geometry_msgs/msg/PoseStamped"))
+@click.command(
+    "show",
+    epilog=options.example(
+        "idlc show geometry_msgs/msg/PoseStamped", "idlc show std_msgs/msg/Header --format hash"
+    ),
+)
 @click.argument(
     "subject", metavar="TYPE|PATH|REC", type=click.Path(), shell_complete=completion.types_and_paths
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @options.output_style(
-    ("text", "json", "ros2idl", "jsonschema", "mcap"),
-    "Output format: text, JSON facts, IDL, JSON Schema or an MCAP schema.",
+    ("text", "json", "hash", "type-description", "ros2idl", "jsonschema", "mcap"),
+    "Output format: text, JSON facts, type hashes (RIHS01), the type description that ROS 2 "
+    "installs as JSON, IDL, JSON Schema or an MCAP schema.",
 )
-@options.scoped(options.package, options.include, options.distro)
+@options.scoped(options.package, options.include, options.exclude, options.distro)
 def command(
     subject: str, topics: tuple[str, ...], style: str, scope: Scope, report: Report
 ) -> None:
     """Show an interface with its nested messages and all comments.
 
-    REC is a recording: an .mcap or .db3 file, or a bag folder. For a recording, idlc lists each
-    topic with its type, message count and type hash, and shows whether your local type matches.
-    With TOPIC, it shows the recorded definitions of these topics.
+    For a recording, idlc lists each topic with its type, message count and type hash, and shows
+    whether your local type matches. With TOPIC, it shows the recorded definitions of these topics.
 
     REC can also be the address of a robot, such as `dds` or tcp/robot:7447. idlc lists the robot's
     topics, services and actions, and the nodes that use them. It also reports incompatible
     endpoints.
+
+    With --format hash, idlc prints the hashes of all TYPE, PATH and REC arguments, and for a
+    service or action those of the messages that ROS 2 derives from it.
     """
     from idlc.cli import output
     from idlc.project.find import is_address
     from idlc.recordings.find import is_recording
     from idlc.tasks import show
 
-    if not is_recording(subject, scope.root):
+    if style == "hash" and not (topics and is_recording(subject, scope.root)):
+        paint = output.painter(sys.stdout)
+        for value, name in show.hashes((subject, *topics), scope, report):
+            sys.stdout.write(f"{paint('value', value)}  {name}\n")
+    elif not is_recording(subject, scope.root):
         if topics:
             raise click.UsageError(
                 f"`{subject}` is not a recording; TOPIC selects from an .mcap or .db3 file or a bag"

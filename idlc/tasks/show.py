@@ -45,7 +45,7 @@ def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | N
     (model, names) = models[0]
     tops = [str(own.name) for own in model.own if str(own.name) in names] or names
     if len(models) > 1 or len(tops) > 1:
-        hint = f"choose one, for example with `idlc describe {tops[0]}`"
+        hint = f"choose one, for example with `idlc show {tops[0]} --format type-description`"
         message = f"`{target}` contains several interfaces"
         report.add(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
         return None
@@ -169,6 +169,10 @@ def definitions(
     from idlc.api.sources import read_source
     from idlc.recordings.types import LocalTypes, recorded_types, topics_of, versions
 
+    if style in ("hash", "type-description"):
+        scope = _with_hashes(scope, report)
+        if not scope.distro.has_hashes:
+            return
     recorded = topics_of(read_source, [path], selected, scope.root, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
@@ -226,6 +230,9 @@ def _rows(message: ir.Message, model: Model, margin: str) -> Iterator[tuple[str,
 
 def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
     """Return the interfaces of a type name or path, each as text in a format."""
+    if style == "type-description":
+        description = describe(target, scope, report)
+        return [_description(description)] if description else []
     texts = []
     wholes: list[ir.TypeName] = []
     for model, names in list(requested_models((target,), scope, report)):
@@ -241,15 +248,25 @@ def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
     return texts
 
 
+def _description(content: dict[str, object]) -> str:
+    return json.dumps(content, indent=2) + "\n"
+
+
 def shown(interface: ir.Interface, model: Model, style: str) -> str:
     """Return an interface in a format."""
     from idlc.generate import schemas
     from idlc.model import idl_text
     from idlc.recordings import definition_text
 
+    name = str(interface.name)
     match style:
         case "json":
             return json.dumps(schemas.facts(interface, model)) + "\n"
+        case "hash":
+            names = derived_names(interface)
+            return "".join(f"{model.describer.hash(each)}  {each}\n" for each in names)
+        case "type-description":
+            return _description(model.describer.installed(name))
         case "ros2idl":
             return idl_text.idl(interface)
         case "jsonschema":
@@ -257,6 +274,6 @@ def shown(interface: ir.Interface, model: Model, style: str) -> str:
         case "mcap":
             return definition_text.mcap(interface, model)
     has_hashes = model.distro.has_hashes
-    head = [f"# {model.describer.hash(str(interface.name))}"] if has_hashes else []
-    lines = (f"# {interface.name}", *head, "", *outline(interface, model))
+    head = [f"# {model.describer.hash(name)}"] if has_hashes else []
+    lines = (f"# {name}", *head, "", *outline(interface, model))
     return "".join(f"{line}\n" for line in lines)

@@ -276,7 +276,7 @@ def test_a_db3_has_the_definition_of_a_service_by_the_service(tmp_path, capsys):
             """
         )
     db.close()
-    assert main(["hash", str(path)]) == 0
+    assert main(["show", str(path), "--format", "hash"]) == 0
     assert "a_srvs/srv/Ask_Event" in capsys.readouterr().out
 
 

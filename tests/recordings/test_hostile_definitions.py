@@ -132,7 +132,7 @@ def test_types_that_nobody_can_use_are_refused(code, text, tmp_path, capsys):
         said = capsys.readouterr()
         assert f"error[{code}]" in said.out + said.err
     main(["breaking", "--against", path])
-    main(["hash", path])
+    main(["show", path, "--format", "hash"])
     main(["show", path])
     assert "Traceback" not in "".join(capsys.readouterr())
     assert not Path(tmp_path / "out").exists()
