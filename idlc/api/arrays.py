@@ -78,7 +78,7 @@ def _view(data: Any, shape: tuple[int, ...], dtype: Any, strides: tuple[int, ...
 def _pixel(encoding: str) -> tuple[str, int]:
     """Return the type and the number of the channels of an encoding."""
     if match := _NAMED.fullmatch(encoding):
-        channels = 1 if match[1] else 4 if match[3] else 3
+        channels = 1 if match[1] else len(match[2] + match[3])
         return f"u{int(match[4]) // 8}", channels
     if match := _GENERIC.fullmatch(encoding):
         size = int(match[1]) // 8

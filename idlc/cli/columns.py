@@ -13,6 +13,7 @@ from idlc.cli import completion, options
 
 if TYPE_CHECKING:
     from idlc.recordings.aligned.table import Summary
+    from idlc.tasks.columns import Work
 
 
 @click.command(
@@ -133,11 +134,11 @@ def command(
     from idlc.recordings.find import expand, split_recordings
     from idlc.tasks.columns import ColumnsOptions, columns
 
-    others = fields is not None or conditions or arguments["nested"] or not arguments["datetimes"]
-    if grid is not None and others:
-        hint = "it has the fields after a colon: `/imu:orientation`"
-        raise click.UsageError(f"--grid allows no --fields, --where, --nested: {hint}")
-    if grid is None and (how or tolerance or clock):
+    work = None
+    if grid is not None:
+        has_others = fields is not None or conditions or arguments["nested"]
+        work = _table_of(grid, (how, tolerance, clock), bool(has_others), arguments)
+    elif how or tolerance or clock:
         raise click.UsageError("--how, --tolerance and --clock need --grid")
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
@@ -150,12 +151,6 @@ def command(
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
     form = Form.EXACT if request.style == "csv" else Form.TEXT
     with output.progress_bar(sys.stderr) as update, written_as(form, sys.stdout):
-        work = None
-        if grid is not None:
-            from idlc.tasks.aligned import Grid, write_aligned
-
-            shown = partial(_show_fit, request.style == "text" or sys.stdout.isatty())
-            work = partial(write_aligned, Grid(grid, how, tolerance, clock), shown)
         written = columns(request, report, update, work)
     width = shutil.get_terminal_size((100, 24)).columns
     previews = [file.preview.text(width) for file in written if file.preview]
@@ -167,6 +162,19 @@ def command(
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     return output.status(report)
+
+
+def _table_of(
+    grid: str, ways: tuple[tuple[str, ...], ...], has_others: bool, arguments: dict[str, Any]
+) -> Work:
+    """Return what writes the table of --grid, or report options that it does not have."""
+    from idlc.tasks.aligned import Grid, write_aligned
+
+    if has_others or not arguments["datetimes"]:
+        hint = "select fields after a colon: `/imu:orientation`"
+        raise click.UsageError(f"--grid has no --fields, --where, --nested, --no-datetimes; {hint}")
+    to_stdout = arguments["style"] == "text" or (arguments["out"] == "-" and sys.stdout.isatty())
+    return partial(write_aligned, Grid(grid, *ways), partial(_show_fit, to_stdout))
 
 
 def _show_fit(is_output: bool, summaries: list[Summary]) -> None:

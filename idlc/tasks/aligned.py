@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +22,8 @@ from idlc.tasks.columns import (
     Progress,
     WrittenFile,
     checked,
-    whole_file,
+    opened,
+    stdout_style,
     write,
 )
 
@@ -87,19 +86,16 @@ def write_aligned(
             progress(rows, done, len(table))
             yield batch
 
-    stdout = nullcontext(sys.stdout.buffer)
-    with stdout if job.path == STDOUT else whole_file(job.path) as file:
+    with opened(job.path) as file:
         write(counted(), table.schema, file, style)
     yield WrittenFile(", ".join(topics), job.path, len(table))
 
 
 def _style(options: ColumnsOptions) -> str:
     """Return the format of the file; a terminal sees only the summary."""
-    if options.style:
-        return options.style
     if options.out == STDOUT:
-        return TEXT if sys.stdout.isatty() else "arrow"
-    return STYLES.get(Path(options.out).suffix.lower(), "")
+        return stdout_style(options)
+    return options.style or STYLES.get(Path(options.out).suffix.lower(), "")
 
 
 def _topic(word: str, recording: Recording) -> tuple[str, list[str] | None]:

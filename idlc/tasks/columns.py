@@ -11,7 +11,7 @@ import warnings
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
@@ -314,6 +314,16 @@ def checked(jobs: Sequence[Job], options: ColumnsOptions, report: Report) -> Seq
     return () if taken else jobs
 
 
+def stdout_style(options: ColumnsOptions) -> str:
+    """Return the format of what goes to standard output."""
+    return options.style or (TEXT if sys.stdout.isatty() else "arrow")
+
+
+def opened(path: str) -> AbstractContextManager[BinaryIO]:
+    """Give the file of a path, or standard output."""
+    return nullcontext(sys.stdout.buffer) if path == STDOUT else whole_file(path)
+
+
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     """Return where a topic goes: to a file in a folder if there are several, or OUT is one."""
     out, dotted = options.out, topic.topic.name.replace("/", ".").lstrip(".")
@@ -321,7 +331,7 @@ def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     name = re.sub(r"[^\w.-]", "_", dotted, flags=re.ASCII) or "_"
     suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
-        return Job(topic, out, options.style or (TEXT if sys.stdout.isatty() else "arrow"))
+        return Job(topic, out, stdout_style(options))
     if MARK in out:
         return Job(topic, out.replace(MARK, name), options.style or suffix or "")
     if out.endswith("/") or Path(out).is_dir() or (many and not suffix):
@@ -383,7 +393,6 @@ def _written(
             preview.add(batch, plain)
         yield WrittenFile(name, job.path, rows, preview)
         return
-    stdout = nullcontext(sys.stdout.buffer)
-    with stdout if job.path == STDOUT else whole_file(job.path) as file:
+    with opened(job.path) as file:
         write(counted(), reader.schema, file, job.style)
     yield WrittenFile(name, job.path, rows)

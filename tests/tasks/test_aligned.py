@@ -54,7 +54,7 @@ def test_what_cannot_be_done_is_said(here, capfd):
     made.by_mcap(here / "rec.mcap", made.messages(9))
     cases = {
         ("--how", "last"): "--how, --tolerance and --clock need --grid",
-        ("--grid", "/imu", "--fields", "x"): "--grid allows no --fields",
+        ("--grid", "/imu", "--fields", "x"): "--grid has no --fields",
         ("--grid", "/im"): "has no topic `/im`",
         ("--grid", "fast"): "'fast' is not a length of time",
         ("--grid", "1s", "/imu:orientatio"): "has no field 'orientatio'",

@@ -456,17 +456,20 @@ def _assembled(
 
 def _taken(table: pa.Table, index: Any, gap: Any) -> list[Any]:
     """Return the values of messages at indexes, without a copy if these are all messages."""
-    columns = [column.combine_chunks() for column in table.columns]
     if len(index) == len(table) and (index == np.arange(len(index))).all():
-        return columns
-    return [column.take(arrow().array(index, mask=gap)) for column in columns]
+        return list(table.columns)
+    rows = arrow().array(index, mask=gap)
+    return [column.combine_chunks().take(rows) for column in table.columns]
 
 
 def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
     """Return the values between messages; those of gaps mean nothing."""
-    pa, rows = arrow(), np.zeros(len(each.first), bool)
-    first, second = (_taken(table, np.maximum(at, 0), rows) for at in (each.first, each.second))
-    names = table.column_names
+    pa, names = arrow(), table.column_names
+    columns = [column.combine_chunks() for column in table.columns]
+    first, second = (
+        [column.take(pa.array(np.maximum(places, 0))) for column in columns]
+        for places in (each.first, each.second)
+    )
     arrays: dict[str, Any] = {}
     for paths in track.quaternions:
         if paths[0] in names:
