@@ -12,7 +12,7 @@ from operator import attrgetter
 from typing import Any, TypeAlias, overload
 
 from idlc import runtime
-from idlc.generate.python.reader import Part, Path, PathError, is_time, paths_of, reader_source
+from idlc.generate.python.reader import Path, PathError, PathStep, is_time, paths_of, reader_source
 from idlc.model import ir
 from idlc.model.from_description import message_of
 from idlc.runtime.cdr import NATIVE
@@ -204,7 +204,7 @@ class _TooShort(Exception):  # noqa: N818 - an answer, too
     """A list has only so many elements."""
 
 
-def _value_at(value: Any, parts: tuple[Part, ...], finish: Callable[[Any], Any]) -> Any:
+def _value_at(value: Any, parts: tuple[PathStep, ...], finish: Callable[[Any], Any]) -> Any:
     """Return what is at a path of a message."""
     for place, (name, index) in enumerate(parts, 1):
         value = getattr(value, slot_name(name))

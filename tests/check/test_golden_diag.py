@@ -121,11 +121,9 @@ def test_every_code_is_explained(code, capsys):
     ]
 
 
-def test_the_rulebook_is_current(capsys):
-    """`idlc explain --all > docs/rules.md` makes it so."""
+def test_the_rulebook_has_every_code(capsys):
     assert main(["explain", "--all"]) == 0
     text = capsys.readouterr().out
-    assert (FOLDER.parents[1] / "docs/rules.md").read_text(encoding="utf-8") == text
     assert re.findall(r"(?m)^### (IDL\d+) ", text) == sorted(CODES)
 
 

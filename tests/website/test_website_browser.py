@@ -169,4 +169,4 @@ def test_the_search_works_on_a_folder(site, tmp_path):
     page = copy / "index.html"
     text = page.read_text(encoding="utf-8")
     page.write_text(text.replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
-    assert "record.html" in browser.dumped(page)
+    assert "ros-tools.html" in browser.dumped(page)

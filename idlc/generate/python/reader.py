@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from idlc.diagnostics.text import did_you_mean
 from idlc.generate.python.decode import UNENDED, Decoder, slice_of
-from idlc.generate.python.lines import Block, Group, Line, call, text_of
+from idlc.generate.python.lines import CompoundStatement, Group, PlainStatement, call, text_of
 from idlc.generate.python.positions import Cursor, NamedExpressions
 from idlc.model import ir
 from idlc.model.python_names import Locals
@@ -31,7 +31,7 @@ class PathError(ValueError):
     """Paths that a structure does not have; the text has a line for each."""
 
 
-class Part(NamedTuple):
+class PathStep(NamedTuple):
     """A field, and the index of the element in it that a path leads to, or `*`."""
 
     name: str
@@ -42,7 +42,7 @@ class Path(NamedTuple):
     """The way to a value of a type, or with a `*` to many; `next` is that to the next field."""
 
     text: str
-    parts: tuple[Part, ...]
+    parts: tuple[PathStep, ...]
     type: ir.FieldType
     next: str
 
@@ -84,7 +84,7 @@ def _path(text: str, message: ir.Message, messages: Messages) -> Path:
         if name not in fields:
             hint = did_you_mean(name, fields) or f"it has {', '.join(fields) or 'none'}"
             raise PathError(f"`{text}`: {type_.target} has no field `{name}`; {hint}")
-        part = Part(name, int(index) if index not in (None, "*") else index)
+        part = PathStep(name, int(index) if index not in (None, "*") else index)
         type_ = fields[name] if index is None else _element(text, part, fields[name])
         parts.append(part)
     following = [*fields, "", ""][[*fields].index(name) + 1]
@@ -92,7 +92,7 @@ def _path(text: str, message: ir.Message, messages: Messages) -> Path:
     return Path(text, tuple(parts), type_, f"{before}{following}" if index is None else "")
 
 
-def _element(text: str, part: Part, type_: ir.FieldType) -> ir.FieldType:
+def _element(text: str, part: PathStep, type_: ir.FieldType) -> ir.FieldType:
     if not isinstance(type_, (ir.Array, ir.Sequence)):
         raise PathError(f"`{text}`: `{part.name}` is not a list, so it has no index")
     most = type_.size if isinstance(type_, ir.Array) else type_.bound
@@ -125,17 +125,18 @@ def make(order, mark, other, slow):
 
     return read
 """
-_CHECK_ORDER = Block("if head != mark:", (Line("return other(data)"),))
+_CHECK_ORDER = CompoundStatement("if head != mark:", (PlainStatement("return other(data)"),))
 #: What slices of a buffer need: Structs alone take any.
 _SLICED = (
-    Block(
-        "if type(data) is not bytes:", (Line('memoryview(data).cast("B").toreadonly()', "data"),)
+    CompoundStatement(
+        "if type(data) is not bytes:",
+        (PlainStatement('memoryview(data).cast("B").toreadonly()', "data"),),
     ),
-    Line("data", "view"),
-    Line("len(data)", "limit"),
+    PlainStatement("data", "view"),
+    PlainStatement("len(data)", "limit"),
 )
 _SLICES = re.compile(r"\b(data|view)\[|\b(words|frombuffer|limit)\b")
-_WORDS = Line("words_of(data, limit, order)", "words")
+_WORDS = PlainStatement("words_of(data, limit, order)", "words")
 
 
 def is_time(type_: ir.FieldType, messages: Messages) -> bool:
@@ -173,7 +174,7 @@ def reader_source(
     reader.line(f"return {result}")
     if not reader.headed:
         head = reader.tables.struct("read", "head", ["H"], 0, "unpack_from")
-        reader.body[:0] = [Line(call(head, "data"), "(head,)"), _CHECK_ORDER]
+        reader.body[:0] = [PlainStatement(call(head, "data"), "(head,)"), _CHECK_ORDER]
     body = "\n".join(text_of(tuple(reader.body), 12))
     first = _SLICED if _SLICES.search(body) else ()
     words = (_WORDS,) if "words" in body else ()
@@ -185,18 +186,18 @@ def reader_source(
 def _texts_of(body: tuple[plan.Step, ...]) -> int:
     """Return how many strings an element consists of, or 0 if there is anything else in it."""
     parts = [step for step in body if not isinstance(step, plan.Enter)]
-    are_texts = all(isinstance(step, plan.Text) and not step.wide for step in parts)
+    are_texts = all(isinstance(step, plan.StringStep) and not step.wide for step in parts)
     return len(parts) if are_texts else 0
 
 
 def _repeated(step: plan.Step) -> plan.Fixed | None:
     """Return how the elements of a list repeat, or None if that depends on their values."""
     match step:
-        case plan.Numbers() | plan.Block():
+        case plan.NumbersStep() | plan.NumberBlock():
             return plan.Fixed(step.unit, step.unit, step.unit)
         case plan.Bytes():
             return plan.Fixed(1, 1, 1)
-        case plan.Items():
+        case plan.StructuresStep():
             return plan.fixed(step.body)
     return None
 
@@ -253,7 +254,9 @@ class _FieldReader(Decoder):
 
     # Values at paths.
 
-    def value(self, type_: ir.FieldType, parts: tuple[Part, ...], way: tuple[object, ...]) -> str:
+    def value(
+        self, type_: ir.FieldType, parts: tuple[PathStep, ...], way: tuple[object, ...]
+    ) -> str:
         """Read the value at the rest of a path, `way` leads here; return its expression.
 
         In the elements of a list, go to the end of what the path is in.
@@ -281,7 +284,7 @@ class _FieldReader(Decoder):
         self,
         type_: ir.Array | ir.Sequence,
         index: int | str,
-        parts: tuple[Part, ...],
+        parts: tuple[PathStep, ...],
         way: tuple[object, ...],
     ) -> str:
         """Read the value at the rest of a path from one element of a list, or from each."""
@@ -312,7 +315,7 @@ class _FieldReader(Decoder):
     def steps(self, type_: ir.FieldType) -> tuple[plan.Step, ...]:
         """Return the steps of a value in a new variable."""
         local = self.names.new("value")
-        place = plan.Place("", "", local, local, ir.TypeName("", "msg", ""))
+        place = plan.Slot("", "", local, local, ir.TypeName("", "msg", ""))
         if not isinstance(type_, ir.Ref):
             return (plan.step_of(type_, place, self.messages, self.names),)
         nested = self.messages[type_.target]
@@ -330,18 +333,18 @@ class _FieldReader(Decoder):
         local = first.place.local
         if self.positions:
             self.passed_step(first)
-            assert isinstance(first, (plan.Number, plan.Block))
+            assert isinstance(first, (plan.Number, plan.NumberBlock))
             self.line(self.position.text(-first.size), local)
         elif self.is_nanoseconds(type_):
             assert isinstance(type_, ir.Ref)
             fields = self.messages[type_.target].fields
             seconds, nanoseconds = (self.read(field.type) for field in fields)
             return f"{seconds} * 1000000000 + {nanoseconds}"
-        elif isinstance(first, plan.Numbers):
+        elif isinstance(first, plan.NumbersStep):
             count = self.count(first.bound, first.place.path)
             start = self.pass_elements(count, first.unit, first.unit)
             self.view(local, first.info.dtype, count, start)
-        elif isinstance(first, plan.Block) and first.primitive not in plan.LIST_PRIMITIVES:
+        elif isinstance(first, plan.NumberBlock) and first.primitive not in plan.LIST_PRIMITIVES:
             self.passed_step(first)
             dtype = ir.PRIMITIVES[first.primitive].dtype
             self.view(local, dtype, str(first.count), self.position.text(-first.size))
@@ -358,30 +361,30 @@ class _FieldReader(Decoder):
         kind = self.tables.define(dtype, call("dtype", "order", f'"{dtype}"'))
         self.line(call("frombuffer", "data", kind, count, start), local)
 
-    def make_nested(self, place: plan.Place, type_: ir.TypeName) -> tuple[Line, ...]:
+    def make_nested(self, place: plan.Slot, type_: ir.TypeName) -> tuple[PlainStatement, ...]:
         """Return the statements that make a nested object."""
-        made = Line(call(self.makers[type_]), place.local)
-        return (made, Line(place.local, place.text)) if place.owner else (made,)
+        made = PlainStatement(call(self.makers[type_]), place.local)
+        return (made, PlainStatement(place.local, place.text)) if place.owner else (made,)
 
-    def texts(self, step: plan.Texts) -> None:
+    def texts(self, step: plan.StringsStep) -> None:
         """Read strings one by one: the codec's own function remembers those of the last message."""
         count = self.begin(step)
         self.line("[]", step.place.text)
 
         def element() -> None:
             local = self.names.new("text")
-            place = plan.Place("", "", local, local, step.place.type)
-            self.step(plan.Text(place, step.wide))
+            place = plan.Slot("", "", local, local, step.place.type)
+            self.step(plan.StringStep(place, step.wide))
             self.line(call(f"{step.place.text}.append", local))
 
         self.repeat(count, element)
 
-    def text(self, place: plan.Place) -> str:
+    def text(self, place: plan.Slot) -> str:
         """Read the size of a string; return the expression that reads the string."""
         self.number("size", place.path)
         start = self.start()
         self.line(f"{self.position.text(-1)} + size", "end")
-        self.body.append(Block("if data[end]:", UNENDED))
+        self.body.append(CompoundStatement("if data[end]:", UNENDED))
         self.position = Cursor("end", 1, multiple_of(1))
         return f'str(data{slice_of(start)}, "utf-8")'
 
@@ -398,7 +401,9 @@ class _FieldReader(Decoder):
             place = str(index)
             least = index if index >= 0 else -index - 1
             absent = call("absent", str(self.number_of_path), "count", self.position.text(-4))
-            self.body.append(Block(f"if count <= {least}:", (Line(f"raise {absent}"),)))
+            self.body.append(
+                CompoundStatement(f"if count <= {least}:", (PlainStatement(f"raise {absent}"),))
+            )
             if index < 0:
                 place = self.tables.local("index")
                 self.line(f"count - {-index}", place)
@@ -407,11 +412,11 @@ class _FieldReader(Decoder):
         self.pass_elements_of(step, place, followed=True)
 
     def each(
-        self, type_: ir.Array | ir.Sequence, parts: tuple[Part, ...], way: tuple[object, ...]
+        self, type_: ir.Array | ir.Sequence, parts: tuple[PathStep, ...], way: tuple[object, ...]
     ) -> str:
         """Read the value at a path of each structure of a list, into a list."""
         (step,) = self.steps(type_)
-        assert isinstance(step, plan.Items)
+        assert isinstance(step, plan.StructuresStep)
         count, values = self.begin(step), self.tables.local("values")
         self.line("[]", values)
 
@@ -433,16 +438,16 @@ class _FieldReader(Decoder):
     def passed_step(self, step: plan.Step) -> None:
         """Go over one value, which is not judged."""
         match step:
-            case plan.Number() | plan.Dummy() | plan.Block():
+            case plan.Number() | plan.Dummy() | plan.NumberBlock():
                 self.flush()
                 self.align(step.unit)
                 self.position = self.position.skip(step.size)
-            case plan.Text(_, wide):
+            case plan.StringStep(_, wide):
                 self.pass_text(wide)
-            case plan.Texts(size=int(size)) | plan.Items(size=int(size)):
+            case plan.StringsStep(size=int(size)) | plan.StructuresStep(size=int(size)):
                 self.flush()
                 self.pass_elements_of(step, str(size))
-            case plan.Numbers() | plan.Bytes() | plan.Texts() | plan.Items():
+            case plan.NumbersStep() | plan.Bytes() | plan.StringsStep() | plan.StructuresStep():
                 self.pass_elements_of(step, self.count(None, "count"))
 
     def pass_elements_of(self, step: plan.Step, count: str, *, followed: bool = False) -> None:
@@ -454,12 +459,12 @@ class _FieldReader(Decoder):
                 self.position = self.position.skip(repeat.stride * int(count))
             else:
                 self.pass_elements(count, repeat.align, repeat.stride)
-        elif isinstance(step, plan.Items):
+        elif isinstance(step, plan.StructuresStep):
             if texts := _texts_of(step.body):
                 self.pass_texts(count if texts == 1 else f"{texts} * {count}")
             else:
                 self.repeat(count, partial(self.pass_steps, step.body), plan.smallest(step.body))
-        elif isinstance(step, plan.Texts) and step.wide:
+        elif isinstance(step, plan.StringsStep) and step.wide:
             self.repeat(count, partial(self.pass_text, True))
         else:
             self.pass_texts(count)
