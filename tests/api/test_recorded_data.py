@@ -55,7 +55,7 @@ def test_commands_and_programs_do_what_the_page_says(folder):
     assert counted.startswith("[(200, 0.")
     assert loaded.endswith("True\n")
     assert re.fullmatch(r"/imu 3\.33\d* 0\.0\n/joints 3\.33\d* 0\.2\n", aligned)
-    assert pictured == "uint8 3 34\n"
+    assert pictured == "uint8 3 33\n"
     assert averaged.startswith("{'angular_velocity.z': [0.")
 
 
