@@ -40,7 +40,7 @@ def to_numpy(
     """
     name = type(message).__name__ if kind is None else kind
     if name not in _KINDS:
-        raise ValueError(f"{name} is none of {', '.join(_KINDS)}: name one of them as `kind`")
+        raise ValueError(f"{name} is not one of {', '.join(_KINDS)}: name one of them as `kind`")
     if isinstance(message, Columns):
         rows = [_row(message, prefix, row) for row in range(len(message))]
         return [_KINDS[name](read, pixels) for read in rows]

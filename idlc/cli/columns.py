@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         "idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv",
         "idlc columns rec.mcap /imu --where 'linear_acceleration.z > 12'",
         "idlc columns rec.mcap -o columns/",
-        "idlc columns rec.mcap /camera /imu:orientation --grid /camera -o train.parquet",
+        "idlc columns rec.mcap /imu /joints:position --grid /imu -o train.parquet",
     ),
 )
 @click.argument("subject", metavar="REC", type=click.Path())

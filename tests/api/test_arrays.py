@@ -66,7 +66,7 @@ def test_what_no_image_is_is_refused():
     ):
         with pytest.raises(ValueError, match=text):
             idlc.to_numpy(message, "Image")
-    with pytest.raises(ValueError, match="SimpleNamespace is none of Image"):
+    with pytest.raises(ValueError, match="SimpleNamespace is not one of Image"):
         idlc.to_numpy(image("mono8", 0, 0, 0, b""))
     assert idlc.to_numpy(image("rgb8", 0, 0, 0, b""), "Image").shape == (0, 0, 3)
 

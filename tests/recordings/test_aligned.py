@@ -5,7 +5,6 @@ import pickle
 import random
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pytest
 
@@ -47,6 +46,8 @@ def times_of(recording, topic, clock):
 
 def rows_of(times, ticks, how, tolerance):
     """Return the row of each tick by pandas, -1 if there is none."""
+    import pandas as pd
+
     left = pd.DataFrame({"time": ticks})
     right = pd.DataFrame({"time": times, "row": np.arange(len(times))})
     direction = {"last": "backward", "nearest": "nearest"}[how]
@@ -145,8 +146,8 @@ REFUSED = {
     "neither": ({}, "either `on` a topic or `every`"),
     "unknown clock": ({"on": "/nothing"}, "has no topic `/nothing`"),
     "unknown in a mapping": ({"on": "/imu", "how": {"/im": "last"}}, "has no topic `/im`"),
-    "no such way": ({"on": "/imu", "how": "cubic"}, "how='cubic' is none of last"),
-    "no such time": ({"on": "/imu", "clock": "publish"}, "clock='publish' is none of log"),
+    "no such way": ({"on": "/imu", "how": "cubic"}, "how='cubic' is not one of last"),
+    "no such time": ({"on": "/imu", "clock": "publish"}, "clock='publish' is not one of log"),
     "a length without a unit": ({"every": "100"}, "'100' is not a length of time"),
     "no length": ({"every": "0ms"}, "'0ms' is not a length of time"),
     "less than a nanosecond": ({"every": "3GHz"}, "'3GHz' is not a length of time"),

@@ -109,7 +109,8 @@ def test_a_recording_is_read_by_other_libraries_and_by_idlc(robot, router, capsy
     assert [message.sequence_count for message in own] == [1, 2, 3]
     assert all(message.publish_time_ns <= message.log_time_ns for message in own)
     assert main(["show", "drive.mcap", "--format", "json"]) == 0
-    (facts,) = map(json.loads, capsys.readouterr().out.splitlines())
+    documents = map(json.loads, capsys.readouterr().out.splitlines())
+    (facts,) = (document for document in documents if document["type"] == "topic")
     assert (facts["name"], facts["messages"]) == ("/drive", 3)
     assert facts["hash"].startswith("RIHS01_")
     assert main(["columns", "drive.mcap", "/drive", "--fields", "gear", "-o", "drive.csv"]) == 0

@@ -174,7 +174,10 @@ def test_hostile_recordings_end_in_an_error(tmp_path, monkeypatch, capsys):
         assert "IDL901" not in output.err
         assert source.read_bytes() == before
         left = [path.name for path in out.rglob("*")] if out.exists() else []
-        assert left == (["hostile"] if status == 0 else []), output.err
+        if status == 1 and "IDL656" in output.err:  # the intact part, if there is one
+            assert left in ([], ["hostile"]), output.err
+        else:
+            assert left == (["hostile"] if status == 0 else []), output.err
         if status == 0:
             (out / "hostile").unlink()
             out.rmdir()

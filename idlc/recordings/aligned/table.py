@@ -350,7 +350,7 @@ def _for(name: str, option: Any, default: Any) -> Any:
 
 def _choice(option: str, value: Any, choices: tuple[str, ...]) -> str:
     if value not in choices:
-        raise RecordingError(f"{option}={value!r} is none of {', '.join(choices)}")
+        raise RecordingError(f"{option}={value!r} is not one of {', '.join(choices)}")
     return str(value)
 
 
