@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -178,8 +179,6 @@ def test_hostile_recordings_end_in_an_error(tmp_path, monkeypatch, capsys):
             assert left in ([], ["hostile"]), output.err
         else:
             assert left == (["hostile"] if status == 0 else []), output.err
-        if status == 0:
-            (out / "hostile").unlink()
-            out.rmdir()
+        shutil.rmtree(out, ignore_errors=True)
         statuses.add(status)
     assert {0, 1} <= statuses
