@@ -77,6 +77,8 @@ class RemoteWriter:
         self.reliable = reliable
         #: The number of the next sample to deliver; `None` until the writer has told.
         self.next: int | None = None
+        #: The number of the newest sample that it has told of.
+        self.last = 0
         #: True if the first heartbeat tells which sample is the first one wanted. Writers of idlc
         #: tell each reader what it has not missed.
         self.waits = is_latched or guid.startswith(wire.VENDOR)
@@ -97,6 +99,15 @@ class Reader:
         self.writers: dict[bytes, RemoteWriter] = {}
         #: Samples that were not delivered, because they were too large or too many.
         self.lost = 0
+
+    @property
+    def is_complete(self) -> bool:
+        """True if each writer has told what it has, and nothing of that is missing."""
+        return all(
+            writer.next is not None and writer.next > writer.last
+            for writer in self.writers.values()
+            if writer.reliable
+        )
 
     def match(self, guid: bytes, address: Address, qos: QoSProfile) -> None:
         """Receive from a writer."""
@@ -230,6 +241,7 @@ class Reader:
         writer = self.writers.get(guid)
         if writer is None or not writer.reliable:
             return []
+        writer.last = part.last
         if writer.next is None:
             writer.next = part.first if writer.waits else part.last + 1
         if writer.next < part.first:
