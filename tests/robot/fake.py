@@ -80,12 +80,12 @@ def standard(name):
 class Robot:
     """A node `/driver` in a session of its own; `close` ends it."""
 
-    def __init__(self, address, node="driver", files=FILES):
+    def __init__(self, address, node="driver", files=FILES, domain=None):
         self.address = address
-        self.session = open_session(address, environ={})
+        self.session = open_session(address, domain=domain, environ={})
         self.transport = self.session.transport
         # another session, so that a test begins when the router knows what the robot announced
-        self.observer = open_session(address, environ={})
+        self.observer = open_session(address, domain=domain, environ={})
         self.files = files
         self.node = node
         self.requests = []

@@ -1,4 +1,4 @@
-"""docs/contributing/add-a-role.md holds: what it lists is all that a new role takes."""
+"""docs/contributing/add.md holds for roles: what it lists is all that a new role takes."""
 
 import os
 import re

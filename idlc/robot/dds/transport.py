@@ -206,7 +206,7 @@ class DdsTransport:
                 callback(token, True)
         return _Closer(lambda: self._watchers.remove(callback))
 
-    def tokens(self, domain: int, timeout: float) -> Iterator[str]:  # noqa: ARG002
+    def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:  # noqa: ARG002
         """Yield the tokens that exist, as soon as the others have told all of theirs."""
         end, is_told, is_over = time.monotonic() + timeout, False, False
         while not is_over and time.monotonic() < end:
