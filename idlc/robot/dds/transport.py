@@ -214,7 +214,9 @@ class DdsTransport:
             with self._connection.lock:
                 participant = self._connection.participant
                 is_told = participant.is_told and self._infos.is_complete
-                patience = _PATIENCE if not is_told else _SETTLED if participant.peers else _ALONE
+                patience = _SETTLED if participant.peers else _ALONE
+            if not is_told:
+                patience = _PATIENCE
             quiet = time.monotonic() - max(self._started, self._connection.changed_at)
             is_over = quiet > patience
         with self._connection.lock:
