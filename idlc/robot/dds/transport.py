@@ -215,7 +215,8 @@ class DdsTransport:
                 participant = self._connection.participant
                 is_told = participant.is_told and self._infos.is_complete
                 patience = _SETTLED if participant.peers else _ALONE
-                patience = patience if is_told else _PATIENCE
+            if not is_told:
+                patience = _PATIENCE
             quiet = time.monotonic() - max(self._started, self._connection.changed_at)
             is_over = quiet > patience
         with self._connection.lock:
