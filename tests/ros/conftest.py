@@ -26,7 +26,7 @@ def pytest_collection_modifyitems(items):
 
 
 @contextmanager
-def _domain_of_its_own() -> Iterator[dict[str, str]]:
+def domain_of_its_own() -> Iterator[dict[str, str]]:
     """Yield an environment in which DDS stays on this machine and meets no other run."""
     with held_domain() as domain:
         yield {
@@ -40,14 +40,14 @@ def _domain_of_its_own() -> Iterator[dict[str, str]]:
 @pytest.fixture(scope="session")
 def ros_environment() -> Iterator[dict[str, str]]:
     """Yield the environment that tests share."""
-    with _domain_of_its_own() as environment:
+    with domain_of_its_own() as environment:
         yield environment
 
 
 @pytest.fixture
 def lonely_environment() -> Iterator[dict[str, str]]:
     """Yield an environment for one test, which sees no nodes of others, dead ones included."""
-    with _domain_of_its_own() as environment:
+    with domain_of_its_own() as environment:
         yield environment
 
 

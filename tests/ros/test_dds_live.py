@@ -1,8 +1,15 @@
-"""Nodes of idlc.robot among nodes of the real rclpy on Fast DDS, over sockets on loopback."""
+"""Each kind of communication of a node of idlc.robot on DDS, both ways, with each kind of peer.
 
-import select
+The peers are one program: with the real rclpy on Fast DDS, and with idlc in the place of rclpy.
+`make test-kilted` runs these tests with the rclpy of Kilted, and docs/robot.md has their table.
+"""
+
+import json
+import queue
+import re
 import subprocess
 import sys
+import threading
 from contextlib import suppress
 
 import pytest
@@ -10,6 +17,7 @@ import pytest
 import idlc
 from idlc.robot import (
     ActionClient,
+    ActionServer,
     DurabilityPolicy,
     Executor,
     ExternalShutdownException,
@@ -18,27 +26,92 @@ from idlc.robot import (
     open_session,
 )
 from idlc.robot.keys import Kind
-from tests.support.paths import PROGRAMS
-from tests.support.waiting import LIMIT, read_line, wait_for
+from tests.ros.conftest import domain_of_its_own
+from tests.support.paths import PROGRAMS, ROOT
+from tests.support.waiting import LIMIT, wait_for
 
 LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+PARAMETERS = "rcl_interfaces/srv/"
+TYPES = "type_description_interfaces/srv/GetTypeDescription"
 KINDS = ("sensor_msgs/msg/Image", "std_msgs/msg/String", "std_srvs/srv/SetBool")
 Image, String, SetBool = (idlc.load(name)[name] for name in KINDS)
 Fibonacci = idlc.load("test_msgs/action/Fibonacci")["test_msgs/action/Fibonacci"]
+#: Puts idlc into the place of rclpy, which is installed here.
+WITHOUT_RCLPY = """
+import runpy
+import sys
+
+import idlc.model.catalog
+import idlc.recordings.load
+from idlc.robot.offer import Importer
+
+sys.meta_path.insert(0, Importer())
+runpy.run_path(sys.argv[1], run_name="__main__")
+"""
+PEERS = {"Fast DDS": [], "idlc": ["-c", WITHOUT_RCLPY]}
 
 
-@pytest.fixture
-def node(lonely_environment):
-    """A node of idlc's, in a domain that a node of rclpy shares."""
-    command = [sys.executable, PROGRAMS / "dds_peer.py"]
+class Pair:
+    """A node of idlc, and a peer in another process."""
+
+    def __init__(self, kind, node, peer):
+        self.kind = kind
+        self.node = node
+        self.graph = node.graph
+        self._peer = peer
+        self._reports = {}
+        self._lines = queue.SimpleQueue()
+        reader = threading.Thread(target=self._read, args=[peer.stdout], daemon=True)
+        reader.start()
+
+    def _read(self, stream):
+        for line in stream:
+            self._lines.put(line)
+
+    def until(self, condition):
+        def spin():
+            assert self._peer.poll() is None
+            self.node.executor.spin_once(timeout_sec=0.01)
+
+        return wait_for(condition, between=spin)
+
+    def result(self, future):
+        self.until(future.done)
+        return future.result()
+
+    def ask(self, kind, name, request):
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(LIMIT)
+        return self.result(client.call_async(request))
+
+    def report(self, name):
+        """Return what the peer printed under a name."""
+
+        def has_come():
+            with suppress(queue.Empty):
+                while True:
+                    key, value = json.loads(self._lines.get_nowait())
+                    self._reports[key] = value
+            return name in self._reports
+
+        self.until(has_come)
+        return self._reports[name]
+
+
+@pytest.fixture(scope="module", params=PEERS)
+def pair(request):
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    peer = subprocess.Popen(command, env=lonely_environment, **pipes)
-    with peer, open_session("dds", environ=lonely_environment) as session:
+    command = [sys.executable, *PEERS[request.param], PROGRAMS / "dds_peer.py"]
+    with (
+        domain_of_its_own() as environment,
+        subprocess.Popen(command, env=environment, **pipes) as peer,
+        open_session("dds", environ=environment) as session,
+    ):
         node = Node("ours", session=session)
-        node.peer = peer
         with Executor(context=node.context) as executor, suppress(ExternalShutdownException):
             executor.add_node(node)
-            yield node
+            offer(node)
+            yield Pair(request.param, node, peer)
         peer.stdin.close()
         try:
             assert peer.wait(LIMIT) == 0
@@ -46,62 +119,135 @@ def node(lonely_environment):
             peer.kill()
 
 
-def spin_until(condition, node):
-    wait_for(condition, between=lambda: node.executor.spin_once(timeout_sec=0.01))
-
-
-def test_everything_works_both_ways_with_rclpy_on_fast_dds(node):
-    words, images, latched = [], [], []
-    node.create_subscription(String, "back", lambda message: words.append(message.data), 1000)
-    node.create_subscription(Image, "images_back", images.append, 5)
-    node.create_subscription(
-        String, "latched", lambda message: latched.append(message.data), LATCHED
-    )
-    publisher = node.create_publisher(String, "words", 1000)
-    pictures = node.create_publisher(Image, "images", 5)
+def offer(node):
+    """Give a node what the peer uses."""
 
     def serve(request, response):
-        response.success, response.message = request.data, "idlc"
+        response.success, response.message = request.data, "ours"
         return response
 
+    def execute(goal):
+        goal.publish_feedback(Fibonacci.Feedback(sequence=[0, 1]))
+        goal.succeed()
+        return Fibonacci.Result(sequence=[0, 1, 1, 2][: goal.request.order])
+
+    node.declare_parameter("rate", 1.5)
     node.create_service(SetBool, "ours", serve)
-    client = node.create_client(SetBool, "theirs")
-    action = ActionClient(node, Fibonacci, "count")
+    node.words = node.create_publisher(String, "words", 1000)
+    node.action_server = ActionServer(node, Fibonacci, "our_count", execute)
 
-    # the graph
-    graph = node.graph
-    spin_until(lambda: {"peer", "ours"} <= {*node.get_node_names()}, node)
-    spin_until(lambda: all(graph.count(Kind.PUBLISHER, n) for n in ("/back", "/images_back")), node)
-    (theirs,) = graph.entities(Kind.PUBLISHER, "/back")
-    assert (theirs.node_name, theirs.hash) == ("/peer", publisher.entity.hash)
-    spin_until(
-        lambda: publisher.get_subscription_count() and pictures.get_subscription_count(), node
-    )
 
-    # topics, reliable and late
-    # the other side may know this node later than this node knows it
-    spin_until(lambda: words or publisher.publish(String(data="early")), node)
+# what each cell of the table means
+
+
+def topics_of_both(pair):
+    """Messages to the peer and back, in order and complete, and one of many fragments."""
+    words, images = [], []
+    node, publisher = pair.node, pair.node.words
+    node.create_subscription(String, "back", lambda message: words.append(message.data), 1000)
+    node.create_subscription(Image, "images_back", images.append, 5)
+    pictures = node.create_publisher(Image, "images", 5)
+    # either side may know the other one later
+    pair.until(lambda: words or publisher.publish(String(data="early")))
     for number in range(200):
         publisher.publish(String(data=str(number)))
-    spin_until(lambda: words[-1] == "199", node)
+    pair.until(lambda: words[-1] == "199")
     assert [word for word in words if word != "early"] == [str(number) for number in range(200)]
-    spin_until(lambda: latched[-1:] == ["4"], node)
-    # all five, if the subscription was there before the first one
-    assert latched[-3:] == ["2", "3", "4"]
     picture = Image(height=300, width=1000, step=3000, data=bytes(range(250)) * 3600)
-    spin_until(lambda: images or pictures.publish(picture), node)
+    pair.until(lambda: images or pictures.publish(picture))
     assert images[0] == picture
 
-    # services and an action
-    spin_until(lambda: select.select([node.peer.stdout], [], [], 0)[0], node)
-    assert read_line(node.peer.stdout) == "idlc\n"
-    assert client.wait_for_service(LIMIT)
-    future = client.call_async(SetBool.Request(data=True))
-    spin_until(future.done, node)
-    assert (future.result().success, future.result().message) == (True, "rclpy")
-    assert action.wait_for_server(LIMIT)
-    accepted = action.send_goal_async(Fibonacci.Goal(order=3))
-    spin_until(accepted.done, node)
-    result = accepted.result().get_result_async()
-    spin_until(result.done, node)
-    assert [*result.result().result.sequence] == [0, 1, 1]
+
+def topics_that_are_latched(pair):
+    words = []
+    pair.node.create_subscription(
+        String, "latched", lambda message: words.append(message.data), LATCHED
+    )
+    pair.until(lambda: words[-1:] == ["4"])
+    # all five, if the subscription was there before the first one
+    assert words[-3:] == ["2", "3", "4"]
+
+
+def services_of_ours(pair):
+    assert pair.report("service") == "ours"
+
+
+def services_of_theirs(pair):
+    response = pair.ask(SetBool, "theirs", SetBool.Request(data=True))
+    assert (response.success, response.message) == (True, "theirs")
+
+
+def actions_of_ours(pair):
+    result, steps = pair.report("action")
+    assert result == [0, 1, 1]
+    assert steps in ([[0, 1]], [])  # feedback may come before the answer to the goal
+
+
+def actions_of_theirs(pair):
+    client = ActionClient(pair.node, Fibonacci, "count")
+    assert client.wait_for_server(LIMIT)
+    accepted = pair.result(client.send_goal_async(Fibonacci.Goal(order=3)))
+    result = pair.result(accepted.get_result_async())
+    assert [*result.result.sequence] == [0, 1, 1]
+
+
+def parameters_of_ours(pair):
+    assert pair.report("parameters") == [True, 2.5]
+
+
+def parameters_of_theirs(pair):
+    get = idlc.load(PARAMETERS + "GetParameters").GetParameters
+    response = pair.ask(get, "peer/get_parameters", get.Request(names=["rate"]))
+    assert [value.double_value for value in response.values] in ([1.5], [2.5])
+
+
+def graph_of_ours(pair):
+    nodes, topics, services = pair.report("graph")
+    assert {"ours", "peer"} <= {*nodes}
+    assert topics["/words"] == ["std_msgs/msg/String"]
+    assert services["/ours"] == ["std_srvs/srv/SetBool"]
+    if pair.kind != "idlc":
+        name, hash_, _ = pair.report("publisher")
+        assert (name, hash_) == ("ours", pair.node.words.entity.hash)
+
+
+def graph_of_theirs(pair):
+    pair.until(lambda: {"peer", "ours"} <= {*pair.node.get_node_names()})
+    pair.until(lambda: pair.graph.count(Kind.SERVICE, "/theirs"))
+    (back,) = pair.until(lambda: pair.graph.entities(Kind.PUBLISHER, "/back"))
+    assert (back.node_name, back.type) == ("/peer", "std_msgs/msg/String")
+    assert back.hash == pair.node.words.entity.hash
+
+
+def types_of_ours(pair):
+    assert pair.report("types") == [True, ["data"]]
+
+
+def types_of_theirs(pair):
+    kind = idlc.load(TYPES)[TYPES]
+    request = kind.Request(type_name="std_msgs/msg/String", include_type_sources=True)
+    request.type_hash = pair.node.words.entity.hash
+    response = pair.ask(kind, "peer/get_type_description", request)
+    assert response.successful
+    assert "string data" in response.type_sources[0].raw_file_contents
+
+
+CELLS = {
+    cell.__name__: cell
+    for cell in (
+        *(topics_of_both, topics_that_are_latched, services_of_ours, services_of_theirs),
+        *(actions_of_ours, actions_of_theirs, parameters_of_ours, parameters_of_theirs),
+        *(graph_of_ours, graph_of_theirs, types_of_ours, types_of_theirs),
+    )
+}
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_it_works_both_ways(pair, cell):
+    CELLS[cell](pair)
+
+
+def test_the_table_of_the_page_is_this_one():
+    page = (ROOT / "docs/robot.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+)[\w ]* \| yes \|", page, re.MULTILINE)
+    assert {*rows} == {cell.partition("_")[0] for cell in CELLS}

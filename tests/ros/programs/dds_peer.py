@@ -1,21 +1,26 @@
-"""A node of rclpy that echoes, serves and calls; it ends when its input does."""
+"""A node of rclpy that echoes, serves and calls, and prints what it saw; it ends with its input."""
 
+import json
 import sys
 import threading
 
 import rclpy
-from rclpy.action import ActionServer
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.action import ActionClient, ActionServer
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
+from type_description_interfaces.srv import GetTypeDescription
 
 LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LIMIT = 60
 
 
 def serve(request, response):
-    response.success, response.message = request.data, "rclpy"
+    response.success, response.message = request.data, "theirs"
     return response
 
 
@@ -27,6 +32,7 @@ def execute(goal):
 
 rclpy.init()
 node = rclpy.create_node("peer")
+node.declare_parameter("rate", 1.5)
 back = node.create_publisher(String, "back", 1000)
 node.create_subscription(String, "words", back.publish, 1000)
 images = node.create_publisher(Image, "images_back", 5)
@@ -35,16 +41,59 @@ latched = node.create_publisher(String, "latched", LATCHED)
 for number in range(5):
     latched.publish(String(data=str(number)))
 node.create_service(SetBool, "theirs", serve)
+server = ActionServer(node, Fibonacci, "count", execute)
+
 client = node.create_client(SetBool, "ours")
-ActionServer(node, Fibonacci, "count", execute)
+parameters = {
+    kind: node.create_client(kind, f"ours/{name}_parameters")
+    for name, kind in (("get", GetParameters), ("set", SetParameters))
+}
+types = node.create_client(GetTypeDescription, "ours/get_type_description")
+action = ActionClient(node, Fibonacci, "our_count")
 
 
-def call():
-    client.wait_for_service()
-    future = client.call_async(SetBool.Request(data=True))
-    future.add_done_callback(lambda done: print(done.result().message, flush=True))
+def done(future):
+    ended = threading.Event()
+    future.add_done_callback(lambda _: ended.set())
+    assert ended.wait(LIMIT)
+    return future.result()
 
 
-threading.Thread(target=call, daemon=True).start()
+def ask(client, request):
+    assert client.wait_for_service(LIMIT)
+    return done(client.call_async(request))
+
+
+def report(name, value):
+    print(json.dumps([name, value]), flush=True)
+
+
+def work():
+    report("service", ask(client, SetBool.Request(data=True)).message)
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=2.5)
+    rate = [Parameter(name="rate", value=value)]
+    (result,) = ask(parameters[SetParameters], SetParameters.Request(parameters=rate)).results
+    (value,) = ask(parameters[GetParameters], GetParameters.Request(names=["rate"])).values
+    report("parameters", [result.successful, value.double_value])
+    described = ask(types, GetTypeDescription.Request(type_name="std_msgs/msg/String"))
+    fields = described.type_description.type_description.fields
+    report("types", [described.successful, [field.name for field in fields]])
+    assert action.wait_for_server(LIMIT)
+    steps = []
+    goal = done(
+        action.send_goal_async(
+            Fibonacci.Goal(order=3), lambda message: steps.append([*message.feedback.sequence])
+        )
+    )
+    result = done(goal.get_result_async()).result
+    report("action", [[*result.sequence], steps])
+    topics, services = node.get_topic_names_and_types(), node.get_service_names_and_types()
+    report("graph", [node.get_node_names(), dict(topics), dict(services)])
+    if hasattr(node, "get_publishers_info_by_topic"):
+        (info,) = node.get_publishers_info_by_topic("words")
+        report("publisher", [info.node_name, str(info.topic_type_hash), info.qos_profile.depth])
+
+
+threading.Thread(target=work, daemon=True).start()
 threading.Thread(target=lambda: (sys.stdin.read(), rclpy.try_shutdown()), daemon=True).start()
 rclpy.spin(node)
