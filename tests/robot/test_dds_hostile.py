@@ -8,6 +8,7 @@ import pytest
 
 from idlc.robot.dds import formats, info, wire
 from idlc.robot.dds.participant import MOST_PEERS
+from idlc.robot.dds.reader import Reader
 from tests.robot.test_dds_network import ALL, LATCHED, Network, text
 from tests.support.rounds import SEED, rounds
 
@@ -55,7 +56,7 @@ def mutated(rng, packet, others):
 
 def memory(participant):
     """Return the number of things that a participant keeps."""
-    readers = participant._readers.values()
+    readers = [end for end in participant._ends.values() if isinstance(end, Reader)]
     writers = [writer for reader in readers for writer in reader.writers.values()]
     waiting = sum(len(each.early) + len(each.partial) for each in writers)
     ends = sum(len(peer.endpoints) for peer in participant.peers.values())

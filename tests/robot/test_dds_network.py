@@ -76,21 +76,32 @@ class Network:
 
     def writer(self, participant, qos, number=1, topic="rt/chatter"):
         end = Endpoint(guid_of(participant.prefix, number, WRITER), topic, TYPE, qos)
-        writer, packets = participant.add_writer(end, self.now)
-        self.send(participant, packets)
+        participant.shared.now = self.now
+        writer = participant.add_writer(end)
+        self.send(participant, participant.shared.collect())
         return writer
 
     def reader(self, participant, qos, number=2, topic="rt/chatter"):
         received = []
         end = Endpoint(guid_of(participant.prefix, number, READER), topic, TYPE, qos)
-        reader, packets = participant.add_reader(
-            end, lambda sample: received.append(sample.payload), self.now
-        )
-        self.send(participant, packets)
+        participant.shared.now = self.now
+        reader = participant.add_reader(end, lambda sample: received.append(sample.payload))
+        self.send(participant, participant.shared.collect())
         return reader, received
 
     def write(self, participant, writer, payload):
-        self.send(participant, writer.write(payload, b"", 0, self.now))
+        participant.shared.now = self.now
+        writer.write(payload)
+        self.send(participant, participant.shared.collect())
+
+    def remove(self, participant, end):
+        participant.shared.now = self.now
+        participant.remove(end.guid)
+        self.send(participant, participant.shared.collect())
+
+    def leave(self, participant):
+        participant.leave()
+        self.send(participant, participant.shared.collect())
 
 
 def text(number, size=8):
@@ -167,10 +178,10 @@ def test_participants_go_by_themselves_or_after_their_lease_and_return():
     network.isolated.clear()
     network.run(10)
     assert len([*left.remote_endpoints()]) == 1
-    network.write(right, right._writers[WRITER.join([b"\0\0\1", b""])], text(1))
+    network.write(right, right._ends[b"\0\0\1" + WRITER], text(1))
     network.run(1)
     assert received == [text(1)]
-    network.send(right, right.leave())
+    network.leave(right)
     del network.hosts["10.0.0.2"]
     network.run(1)
     assert left.peers == {}
@@ -183,11 +194,11 @@ def test_endpoints_that_come_and_go_leave_nothing():
     for number in range(3, 400):
         writer = network.writer(left, ALL, number)
         network.run(0.02)
-        network.send(left, left.remove(writer.guid, network.now))
+        network.remove(left, writer)
     network.run(30)
     assert [*right.remote_endpoints()] == []
-    assert all(reader.writers == {} for reader in right._readers.values() if reader.qos is ALL)
-    assert sum(len(writer.history) for writer in left._writers.values()) <= 300
+    assert all(end.writers == {} for end in right._ends.values() if end.qos is ALL)
+    assert sum(len(writer.history) for writer in left._announcers.values()) <= 300
     assert received == []
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import socket
+import struct
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ _ADDRESS = re.compile(r"dds(?::(\d{1,3}))?(?:/([\w.-]{1,253}))?", re.ASCII)
 MOST_DOMAIN = 232
 #: Participants on one machine, each with a port of its own.
 PARTICIPANTS = 120
-_GROUP = "239.255.0.1"
+GROUP = "239.255.0.1"
 _LOOPBACK = "127.0.0.1"
 #: The most bytes of a fragment: on loopback of Linux, on that of others, and to other machines.
 _FRAGMENTS = (60_000, 8_192, 1_344)
@@ -27,6 +28,8 @@ _RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT", "NOT_SET", "")
 #: Variables that other implementations of DDS honour, and idlc does not.
 _IGNORED = ("ROS_DISCOVERY_SERVER", "CYCLONEDDS_URI", "FASTRTPS_DEFAULT_PROFILES_FILE")
 _MOST_STATIC = 16
+#: Linux's question for the address of a network interface.
+_SIOCGIFADDR = 0x8915
 
 
 class Place(NamedTuple):
@@ -88,20 +91,35 @@ def searched(place: Place) -> list[Address]:
     first = _base(place.domain) + 10
     ports = range(first, min(first + 2 * PARTICIPANTS, 2**16), 2)
     addresses = [(host, port) for host in place.hosts for port in ports]
-    return [*addresses, *([(_GROUP, _base(place.domain))] if place.subnet else ())]
+    return [*addresses, *([(GROUP, _base(place.domain))] if place.subnet else ())]
 
 
 def own_hosts(place: Place) -> list[str]:
     """Return the addresses of this machine that others can reach."""
     if place.is_local:
         return [_LOOPBACK]
-    hosts = []
-    for host in (*place.hosts, *([_GROUP] if place.subnet else ())):
+    hosts = [*_interfaces()] if place.subnet else []
+    for host in place.hosts:
         with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.connect((host, 9))
             hosts.append(probe.getsockname()[0])
     others = [host for host in dict.fromkeys(hosts) if not host.startswith("127.")]
     return others or [_LOOPBACK]
+
+
+def _interfaces() -> Iterator[str]:
+    """Yield the addresses of the network interfaces."""
+    if sys.platform != "linux":
+        with suppress(OSError):
+            yield from socket.gethostbyname_ex(socket.gethostname())[2]
+        return
+    import fcntl  # which Windows does not have
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            with suppress(OSError):  # it has no address
+                answer = fcntl.ioctl(probe, _SIOCGIFADDR, struct.pack("256s", name.encode()))
+                yield socket.inet_ntoa(answer[20:24])
 
 
 def open_sockets(place: Place) -> list[socket.socket]:
@@ -115,7 +133,7 @@ def open_sockets(place: Place) -> list[socket.socket]:
         except OSError:
             own.close()
             continue
-        return [own, *(_multicast(place, own_hosts(place)) if place.subnet else ())]
+        return [own, *(_multicast(place) if place.subnet else ())]
     problem = f"all ports of {PARTICIPANTS} participants of domain {place.domain} are in use"
     raise RobotError(problem, "stop some nodes, or use another ROS_DOMAIN_ID")
 
@@ -129,7 +147,7 @@ def _socket() -> socket.socket:
     return own
 
 
-def _multicast(place: Place, hosts: Iterable[str]) -> list[socket.socket]:
+def _multicast(place: Place) -> list[socket.socket]:
     """Return a socket for announcements on the subnet; none if the system refuses it."""
     group = _socket()
     try:
@@ -137,13 +155,26 @@ def _multicast(place: Place, hosts: Iterable[str]) -> list[socket.socket]:
         if hasattr(socket, "SO_REUSEPORT"):
             group.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         group.bind(("", _base(place.domain)))
-        for host in hosts:
-            member = socket.inet_aton(_GROUP) + socket.inet_aton(host)
-            group.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
     except OSError:
         group.close()
         return []
     return [group]
+
+
+def join(group: socket.socket, hosts: Iterable[str]) -> None:
+    """Receive the announcements to the subnets of own addresses."""
+    for host in hosts:
+        with suppress(OSError):  # it has joined
+            member = socket.inet_aton(GROUP) + socket.inet_aton(host)
+            group.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+
+
+def send_to_group(own: socket.socket, packet: bytes, target: Address, hosts: Iterable[str]) -> None:
+    """Send an announcement to the subnets of own addresses."""
+    for host in hosts:
+        with suppress(OSError):
+            own.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(host))
+            own.sendto(packet, target)
 
 
 def fragment_size(host: str) -> int:

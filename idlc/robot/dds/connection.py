@@ -7,17 +7,18 @@ import selectors
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 
 from idlc.robot.dds import address, formats, wire
-from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.participant import Participant
-from idlc.robot.dds.reader import Outgoing, Reader, Received
+from idlc.robot.dds.reader import Outgoing
 from idlc.robot.dds.writer import Writer
 
 #: The longest sleep of the thread, in which another thread may make something due.
 _TICK = 0.05
+#: Seconds between two looks at the own addresses, which change with the network.
+_LOOK = 3.0
 #: Packets that are read before what is due is sent.
 _AT_ONCE = 64
 _MOST_PACKET = 65_536
@@ -34,16 +35,17 @@ class Connection:
         self._selector = selectors.DefaultSelector()
         for each in self._sockets:
             self._selector.register(each, selectors.EVENT_READ, each)
-        port = self._sockets[0].getsockname()[1]
+        self._place, self._looked = place, 0.0
+        self._port = port = self._sockets[0].getsockname()[1]
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
-        own = [(host, port) for host in address.own_hosts(place)]
         others = [each for each in address.searched(place) if each != ("127.0.0.1", port)]
         #: When the endpoints of others changed last.
         self.changed_at = time.monotonic()
         self.participant = Participant(
-            self.prefix, own, others, address.fragment_size, self._note_change
+            self.prefix, (), others, address.fragment_size, self._note_change
         )
-        self._tick = tick
+        self._look(time.monotonic())
+        self._tick_above = tick
         self._is_open = True
         self._thread = threading.Thread(target=self._run, name="idlc.dds", daemon=True)
 
@@ -54,6 +56,19 @@ class Connection:
     def _note_change(self) -> None:
         self.changed_at = time.monotonic()
 
+    def _look(self, now: float) -> None:
+        """Announce the own addresses if they are others than before."""
+        self._looked, self._hosts = now, address.own_hosts(self._place)
+        if self.participant.move([(host, self._port) for host in self._hosts]):
+            for group in self._sockets[1:]:
+                address.join(group, self._hosts)
+
+    def _tick(self) -> None:
+        if (now := time.monotonic()) > self._looked + _LOOK:
+            self._look(now)
+        self.send(self.participant.tick(now))
+        self._tick_above()
+
     def _run(self) -> None:
         while self._is_open:
             with self.lock:
@@ -62,7 +77,6 @@ class Connection:
                 self._receive(key.data)
             with self.lock:
                 if self._is_open:
-                    self.send(self.participant.tick(time.monotonic()))
                     self._tick()
 
     def _receive(self, each: socket.socket) -> None:
@@ -83,41 +97,37 @@ class Connection:
         for target, prefix, parts in packets:
             head = (formats.for_participant(prefix),) if any(prefix) else ()
             data = formats.format_packet(self.participant.prefix, (*head, *parts))
+            if target[0] == address.GROUP:
+                address.send_to_group(self._sockets[0], data, target, self._hosts)
+                continue
             with suppress(OSError):
                 self._send(data, target)
 
-    def add_writer(self, end: Endpoint) -> Writer:
-        """Announce a writer."""
+    @contextmanager
+    def acting(self) -> Iterator[Participant]:
+        """Do something with the participant now, then send its packets."""
         with self.lock:
-            writer, packets = self.participant.add_writer(end, time.monotonic())
-            self.send(packets)
-            return writer
+            self.participant.shared.now = time.monotonic()
+            yield self.participant
+            self.send(self.participant.shared.collect())
 
-    def add_reader(self, end: Endpoint, deliver: Callable[[Received], None]) -> Reader:
-        """Announce a reader."""
-        with self.lock:
-            reader, packets = self.participant.add_reader(end, deliver, time.monotonic())
-            self.send(packets)
-            return reader
+    def write(self, writer: Writer, payload: bytes, inline: bytes = b"") -> None:
+        """Send a sample."""
+        with self.acting():
+            writer.write(payload, inline, time.time_ns())
 
-    def remove(self, guid: bytes) -> None:
-        """Withdraw an endpoint; a second time does nothing."""
-        with self.lock:
-            if self._is_open:
-                self.send(self.participant.remove(guid, time.monotonic()))
-
-    def write(self, writer: Writer, payload: bytes, inline: bytes = b"") -> int:
-        """Send a sample; return its number."""
-        with self.lock:
-            self.send(writer.write(payload, inline, time.time_ns(), time.monotonic()))
-            return writer.last
+    def remove(self, *guids: bytes) -> None:
+        """Withdraw endpoints; a second time does nothing."""
+        with self.acting() as participant:
+            for guid in guids if self._is_open else ():
+                participant.remove(guid)
 
     def close(self) -> None:
         """Tell the others, and end the thread."""
-        with self.lock:
+        with self.acting() as participant:
             was_open, self._is_open = self._is_open, False
             if was_open:
-                self.send(self.participant.leave())
+                participant.leave()
         if was_open and threading.current_thread() is not self._thread:
             self._thread.join()
         if was_open:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.reader import Address
+from idlc.robot.dds.reader import Address, Received
 from idlc.robot.qos import (
     INFINITE,
     MOST_DEPTH,
@@ -77,11 +77,17 @@ class Endpoint(NamedTuple):
         """True for a writer."""
         return self.guid[-1] & 0x0F in (2, 3)
 
+    @property
+    def id(self) -> bytes:
+        """Its id within its participant."""
+        return self.guid[wire.PREFIX :]
+
 
 class Peer:
     """Another participant; `is_known` after it has named this one."""
 
     def __init__(self, about: Participant, host: str, now: float) -> None:
+        self.prefix = about.prefix
         self.about = about
         self.host = host
         self.seen = now
@@ -99,9 +105,10 @@ class Peer:
         return self.host, end.port or self.about.default_port
 
 
-def fits(writer: Endpoint, reader: Endpoint) -> bool:
-    """Return whether a writer and a reader are connected."""
-    if (writer.topic, writer.type) != (reader.topic, reader.type):
+def fits(end: Endpoint, other: Endpoint) -> bool:
+    """Return whether two endpoints are connected."""
+    writer, reader = (end, other) if end.is_writer else (other, end)
+    if writer.is_writer == reader.is_writer or writer[1:3] != reader[1:3]:
         return False
     return not incompatible_policies(writer.qos, reader.qos)
 
@@ -200,7 +207,7 @@ def parse_endpoint(payload: bytes) -> Endpoint:
     )
 
 
-def ended(part: wire.Data) -> bytes | None:
+def ended(part: wire.Data | Received) -> bytes | None:
     """Return the GUID of what a sample says is gone; `None` if it says something else."""
     status = _first(part.parameters, STATUS, 4)
     if status is None or not status[3] & 3:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from idlc.robot.dds import wire
 
@@ -64,7 +64,9 @@ def format_heartbeat(reader: bytes, writer: bytes, first: int, last: int, count:
     return _part(wire.HEARTBEAT, 0, reader, writer, numbers)
 
 
-def _set(base: int, members: Iterable[int], size: int) -> bytes:
+def _set(base: int, members: Sequence[int]) -> bytes:
+    """Return a set of ascending numbers, of 256 from `base`."""
+    size = members[-1] - base + 1 if members else 0
     words = [0] * ((size + 31) // 32)
     for member in members:
         words[(member - base) // 32] |= 1 << (31 - (member - base) % 32)
@@ -72,19 +74,19 @@ def _set(base: int, members: Iterable[int], size: int) -> bytes:
 
 
 def format_acknack(
-    reader: bytes, writer: bytes, base: int, missing: list[int], count: int
+    reader: bytes, writer: bytes, base: int, missing: list[int], count: int, *, is_final: bool
 ) -> bytes:
-    """Return what a reader lacks, of the next 256 numbers from `base`."""
-    members = _set(base, missing, missing[-1] - base + 1 if missing else 0)
-    flags = 0 if missing else wire.FINAL
+    """Return what a reader lacks, of the next 256 numbers from `base`; a final one ends a talk."""
+    members = _set(base, missing)
     tail = format_number(base) + members + struct.pack("<I", count)
-    return _part(wire.ACKNACK, flags, reader, writer, tail)
+    return _part(wire.ACKNACK, wire.FINAL if is_final else 0, reader, writer, tail)
 
 
-def format_gap(reader: bytes, writer: bytes, first: int, after: int) -> bytes:
-    """Return that the numbers from `first` up to `after` never come."""
-    numbers = format_number(first) + format_number(after)
-    return _part(wire.GAP, 0, reader, writer, numbers, _set(after, (), 0))
+def format_gap(reader: bytes, writer: bytes, numbers: list[int]) -> bytes:
+    """Return that these numbers, of 256 from the first one, never come."""
+    base, others = numbers[0] + 1, numbers[1:]
+    ends = format_number(numbers[0]) + format_number(base)
+    return _part(wire.GAP, 0, reader, writer, ends, _set(base, others))
 
 
 def format_nack_fragment(
@@ -92,7 +94,7 @@ def format_nack_fragment(
 ) -> bytes:
     """Return the fragments that a reader lacks, of 256 from the first missing one."""
     base = missing[0]
-    members = _set(base, missing, missing[-1] - base + 1)
+    members = _set(base, missing)
     tail = format_number(number) + struct.pack("<I", base) + members + struct.pack("<I", count)
     return _part(wire.NACK_FRAGMENT, 0, reader, writer, tail)
 

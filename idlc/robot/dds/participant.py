@@ -13,28 +13,30 @@ from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.discovery import Endpoint, Peer, fits
-from idlc.robot.dds.reader import Address, Outgoing, Reader, Received
+from idlc.robot.dds.reader import Address, Outgoing, Reader, Received, Remote, Shared
 from idlc.robot.dds.writer import Writer
-from idlc.robot.qos import QoSProfile
 
-#: Participants, the announcements that a stranger gets, and the endpoints of one participant.
+#: Participants, the announcements that a stranger gets, and the endpoints of one and of all.
 MOST_PEERS = 256
 MOST_ANNOUNCEMENTS = 3
 #: Announcements to strangers between two of the periodic ones, whatever names they use.
 MOST_GREETINGS = 256
-MOST_ENDPOINTS = 4096
+MOST_ENDPOINTS, MOST_OF_ALL = 4096, 2**15
 #: Ends of own endpoints that late participants are still told of.
 _ENDS = 256
 #: Seconds between announcements: the first ones come fast.
 _PERIODS = (0.1, 0.2, 0.4, 0.8, 1.6)
 _PERIOD = 3.0
+#: Seconds of silence after which a peer may go on at another IP address.
+_SILENCE = 10.0
 
 
 class Participant:
     """The endpoints of this program, and what it knows of others.
 
     `searched` are the addresses where others may listen. `fragment` returns the most bytes of a
-    fragment for a host. `changed` is called after each change of the remote endpoints.
+    fragment for a host. `changed` is called after each change of the remote endpoints. Methods add
+    packets to those that `shared.collect` returns, and begin at the time `shared.now`.
     """
 
     def __init__(
@@ -46,298 +48,286 @@ class Participant:
         changed: Callable[[], None] = lambda: None,
     ) -> None:
         self.prefix = prefix
+        self.shared = Shared(fragment)
         self.peers: dict[bytes, Peer] = {}
         #: Strangers beyond the limit, participants that offer no UDP, and malformed packets.
         self.refused = self.without_udp = self.malformed = 0
-        self._announcement = discovery.format_participant(prefix, addresses)
+        self._addresses: list[Address] = []
+        #: The announcement, and its number, as others ignore one that they know.
+        self._announcement, self._edition = b"", 0
         self._searched = [*searched]
-        self._fragment = fragment
         self._changed = changed
-        self._writers: dict[bytes, Writer] = {}
-        self._readers: dict[bytes, Reader] = {}
+        #: The own ends by their ids, and what was announced of them by their GUIDs.
+        self._ends: dict[bytes, Writer | Reader] = {}
         self._local: dict[bytes, Endpoint] = {}
         self._numbers: dict[bytes, int] = {}
-        self._ends: deque[tuple[bool, int]] = deque()
+        self._removed: deque[tuple[Writer, int]] = deque()
         self._periods = iter(_PERIODS)
         self._announce_at = 0.0
         self._greetings = 0
-        #: The answers to the packet that is being read, and its time.
-        self._out: list[Outgoing] = []
-        self._now = 0.0
-        for writer, reader in discovery.SEDP.values():
-            self._writers[writer] = Writer(prefix + writer, discovery.SEDP_QOS)
-            self._readers[reader] = Reader(prefix + reader, discovery.SEDP_QOS, self._learn)
+        self._announcers: dict[bool, Writer] = {}
+        self._learners: dict[bool, Reader] = {}
+        for is_writer, ids in discovery.SEDP.items():
+            guids = [prefix + each for each in ids]
+            announcer = Writer(guids[0], discovery.SEDP_QOS, self.shared)
+            learner = Reader(guids[1], discovery.SEDP_QOS, self._learn, self.shared)
+            self._ends |= {announcer.id: announcer, learner.id: learner}
+            self._announcers[is_writer], self._learners[is_writer] = announcer, learner
+        self.move([*addresses])
 
     # own endpoints
 
-    def add_writer(self, end: Endpoint, now: float) -> tuple[Writer, list[Outgoing]]:
+    def add_writer(self, end: Endpoint) -> Writer:
         """Announce a writer."""
-        writer = self._writers[end.guid[wire.PREFIX :]] = Writer(end.guid, end.qos)
-        return writer, self._add(end, now)
+        writer = Writer(end.guid, end.qos, self.shared)
+        self._add(end, writer)
+        return writer
 
-    def add_reader(
-        self, end: Endpoint, deliver: Callable[[Received], None], now: float
-    ) -> tuple[Reader, list[Outgoing]]:
+    def add_reader(self, end: Endpoint, deliver: Callable[[Received], None]) -> Reader:
         """Announce a reader."""
-        reader = self._readers[end.guid[wire.PREFIX :]] = Reader(end.guid, end.qos, deliver)
-        return reader, self._add(end, now)
+        reader = Reader(end.guid, end.qos, deliver, self.shared)
+        self._add(end, reader)
+        return reader
 
-    def _add(self, end: Endpoint, now: float) -> list[Outgoing]:
-        announcer = self._writers[discovery.SEDP[end.is_writer][0]]
-        out = announcer.write(discovery.format_endpoint(end), b"", 0, now)
+    def _add(self, end: Endpoint, own: Writer | Reader) -> None:
+        self._ends[own.id] = own
+        announcer = self._announcers[end.is_writer]
+        announcer.write(discovery.format_endpoint(end))
         self._numbers[end.guid] = announcer.last
         for other in self._local.values():
-            writer, reader = (end, other) if end.is_writer else (other, end)
-            if other.is_writer != end.is_writer and fits(writer, reader):
-                near = self._readers[reader.guid[wire.PREFIX :]]
-                self._writers[writer.guid[wire.PREFIX :]].match_local(near)
+            near = self._ends[other.id]
+            writer, reader = (own, near) if end.is_writer else (near, own)
+            if fits(end, other) and isinstance(writer, Writer) and isinstance(reader, Reader):
+                writer.match_local(reader)
         self._local[end.guid] = end
         for peer in self.peers.values():
             for other in peer.endpoints.values():
-                out += self._match(end, other, peer, now)
-        return out
+                self._match(end, other, peer)
 
-    def remove(self, guid: bytes, now: float) -> list[Outgoing]:
-        """Withdraw an endpoint."""
+    def remove(self, guid: bytes) -> None:
+        """Withdraw an endpoint; a second time does nothing."""
         end = self._local.pop(guid, None)
         if end is None:
-            return []
-        self._writers.pop(guid[wire.PREFIX :], None)
-        reader = self._readers.pop(guid[wire.PREFIX :], None)
-        for writer in self._writers.values():
-            writer.local = [local for local in writer.local if local is not reader]
-        announcer = self._writers[discovery.SEDP[end.is_writer][0]]
+            return
+        own = self._ends.pop(end.id)
+        own.close()
+        for writer in self._ends.values():
+            if isinstance(writer, Writer):
+                writer.local = [reader for reader in writer.local if reader is not own]
+        announcer = self._announcers[end.is_writer]
         announcer.forget(self._numbers.pop(guid))
-        out = announcer.write(b"", discovery.format_end(guid), 0, now)
-        self._ends.append((end.is_writer, announcer.last))
-        if len(self._ends) > _ENDS:
-            is_writer, number = self._ends.popleft()
-            self._writers[discovery.SEDP[is_writer][0]].forget(number)
-        return out
+        announcer.write(b"", discovery.format_end(guid))
+        self._removed.append((announcer, announcer.last))
+        if len(self._removed) > _ENDS:
+            announcer, number = self._removed.popleft()
+            announcer.forget(number)
 
-    def leave(self) -> list[Outgoing]:
-        """Return what tells all that this participant ends."""
+    def leave(self) -> None:
+        """Tell all that this participant ends."""
         end = discovery.format_end(self.prefix + discovery.PARTICIPANT_ID)
-        part = formats.format_data(discovery.SPDP_READER, discovery.SPDP_WRITER, 2, end, b"")
-        return [Outgoing(peer.meta, bytes(wire.PREFIX), (part,)) for peer in self.peers.values()]
+        for peer in self.peers.values():
+            self._send(peer.meta, bytes(wire.PREFIX), self._edition + 1, end, b"")
 
-    def _match(self, own: Endpoint, other: Endpoint, peer: Peer, now: float) -> list[Outgoing]:
+    def move(self, addresses: list[Address]) -> bool:
+        """Announce these addresses of this participant from now on; return whether they are new."""
+        if addresses == self._addresses:
+            return False
+        self._addresses, self._announce_at = addresses, 0.0
+        self._announcement = discovery.format_participant(self.prefix, addresses)
+        self._edition += 1
+        return True
+
+    def _match(self, own: Endpoint, other: Endpoint, peer: Peer) -> None:
         """Connect two ends if they fit."""
-        writer, reader = (own, other) if own.is_writer else (other, own)
-        if own.is_writer == other.is_writer or not fits(writer, reader):
-            return []
-        name, address = own.guid[wire.PREFIX :], peer.address(other)
-        return self._connect(own.is_writer, name, other.guid, address, other.qos, now)
-
-    def _connect(
-        self,
-        is_writer: bool,
-        name: bytes,
-        guid: bytes,
-        address: Address,
-        qos: QoSProfile,
-        now: float,
-    ) -> list[Outgoing]:
-        if is_writer:
-            size = self._fragment(address[0])
-            return self._writers[name].match(guid, address, qos, size, now)
-        self._readers[name].match(guid, address, qos)
-        question = self._readers[name].ask(guid)
-        return [question] if question else []
+        if fits(own, other):
+            self._ends[own.id].match(other.guid, peer.address(other), other.qos)
 
     def _learn(self, sample: Received) -> None:
         """Take an announcement of an endpoint."""
         peer = self.peers.get(sample.writer[: wire.PREFIX])
         if peer is None:
             return
-        if (guid := discovery.ended(wire.Data(b"", b"", *sample[1:]))) is not None:
+        if (guid := discovery.ended(sample)) is not None:
             if peer.endpoints.pop(guid, None):
                 self._unmatch(guid)
                 self._changed()
             return
         try:
             end = discovery.parse_endpoint(sample.payload)
-        except (wire.WireError, ValueError):
+        except ValueError:
             self.malformed += 1
             return
-        is_new = end.guid in peer.endpoints or len(peer.endpoints) < MOST_ENDPOINTS
-        if end.guid[: wire.PREFIX] != peer.about.prefix or not is_new:
+        has_room = end.guid in peer.endpoints or (
+            len(peer.endpoints) < MOST_ENDPOINTS
+            and sum(len(each.endpoints) for each in self.peers.values()) < MOST_OF_ALL
+        )
+        if end.guid[: wire.PREFIX] != peer.prefix or not has_room:
             self.refused += 1
             return
         peer.endpoints[end.guid] = end
         for own in [*self._local.values()]:
-            self._out += self._match(own, end, peer, self._now)
+            self._match(own, end, peer)
         self._changed()
 
     def _unmatch(self, guid: bytes) -> None:
-        for writer in self._writers.values():
-            writer.unmatch(guid)
-        for reader in self._readers.values():
-            reader.unmatch(guid)
+        for end in self._ends.values():
+            end.unmatch(guid)
 
     # others
 
-    def _meet(self, part: wire.Data, host: str, now: float) -> list[Outgoing]:
+    def _meet(self, part: wire.Data, host: str) -> None:
         """Take an announcement of a participant."""
         if (guid := discovery.ended(part)) is not None:
             peer = self.peers.get(guid[: wire.PREFIX])
             if peer is not None and peer.host == host:
                 self._lose(peer)
-            return []
+            return
         try:
             about = discovery.parse_participant(part.payload)
         except wire.WireError:
             self.malformed += 1
-            return []
+            return
         if about.prefix == self.prefix:
-            return []
+            return
         if not about.meta_port:
             self.without_udp += 1
-            return []
-        peer = self.peers.get(about.prefix)
+            return
+        now, peer = self.shared.now, self.peers.get(about.prefix)
+        if peer is not None and peer.host != host and now - peer.seen > _SILENCE:
+            self._lose(peer)
+            peer = None
         if peer is None:
             if len(self.peers) >= MOST_PEERS and not self._make_room():
                 self.refused += 1
-                return []
+                return
             peer = self.peers[about.prefix] = Peer(about, host, now)
-        if peer.host != host:
-            return []
-        peer.about = about._replace(meta_port=peer.about.meta_port) if peer.is_known else about
-        peer.seen = now
-        return self._greet(peer)
+        if peer.host == host:
+            peer.about = about._replace(meta_port=peer.about.meta_port) if peer.is_known else about
+            peer.seen = now
+            self._greet(peer)
 
     def _make_room(self) -> bool:
         """Forget the oldest stranger."""
         for peer in self.peers.values():
             if not peer.is_known:
-                del self.peers[peer.about.prefix]
+                del self.peers[peer.prefix]
                 return True
         return False
 
-    def _greet(self, peer: Peer) -> list[Outgoing]:
+    def _greet(self, peer: Peer) -> None:
         """Announce this participant to one that does not know it yet, not for ever."""
         is_over = peer.announced >= MOST_ANNOUNCEMENTS or self._greetings >= MOST_GREETINGS
-        if peer.is_known or is_over:
-            return []
-        peer.announced += 1
-        self._greetings += 1
-        return [self._announce_to(peer.meta, peer.about.prefix)]
+        if not (peer.is_known or is_over):
+            peer.announced += 1
+            self._greetings += 1
+            self._announce(peer.meta, peer.prefix)
 
-    def _announce_to(self, address: Address, prefix: bytes) -> Outgoing:
-        part = formats.format_data(
-            discovery.SPDP_READER, discovery.SPDP_WRITER, 1, b"", self._announcement
-        )
-        return Outgoing(address, prefix, (part,))
+    def _announce(self, address: Address, prefix: bytes = bytes(wire.PREFIX)) -> None:
+        self._send(address, prefix, self._edition, b"", self._announcement)
 
-    def _know(self, peer: Peer, now: float) -> list[Outgoing]:
+    def _send(
+        self, address: Address, prefix: bytes, number: int, inline: bytes, payload: bytes
+    ) -> None:
+        """Send a sample about this participant."""
+        ids = discovery.SPDP_READER, discovery.SPDP_WRITER
+        part = formats.format_data(*ids, number, inline, payload)
+        self.shared.send(Remote(prefix + ids[0], address, False), part)
+
+    def _know(self, peer: Peer) -> None:
         """Exchange endpoints with a peer that has named this participant."""
         peer.is_known = True
-        out = []
         for writer, reader in discovery.SEDP.values():
-            prefix = peer.about.prefix
-            out += self._connect(True, writer, prefix + reader, peer.meta, discovery.SEDP_QOS, now)
-            out += self._connect(False, reader, prefix + writer, peer.meta, discovery.SEDP_QOS, now)
-        return out
+            self._ends[writer].match(peer.prefix + reader, peer.meta, discovery.SEDP_QOS)
+            self._ends[reader].match(peer.prefix + writer, peer.meta, discovery.SEDP_QOS)
 
     def _lose(self, peer: Peer) -> None:
         """Forget a peer and all of it."""
-        del self.peers[peer.about.prefix]
-        for guid in [*peer.endpoints]:
+        del self.peers[peer.prefix]
+        ids = (each for pair in discovery.SEDP.values() for each in pair)
+        for guid in (*peer.endpoints, *(peer.prefix + each for each in ids)):
             self._unmatch(guid)
-        for writer, reader in discovery.SEDP.values():
-            self._writers[writer].unmatch(peer.about.prefix + reader)
-            self._readers[reader].unmatch(peer.about.prefix + writer)
         if peer.endpoints:
             self._changed()
 
     # packets and time
 
     def receive(self, packet: bytes, source: Address, now: float) -> list[Outgoing]:
-        """Take a packet; return the answers."""
+        """Take a packet; return the packets to send."""
+        self.shared.now = now
         try:
             prefix, _vendor, parts = wire.parse_packet(packet)
         except wire.WireError:
             self.malformed += 1
             return []
-        if prefix == self.prefix:
-            return []
-        self._out, self._now = [], now
         peer = self.peers.get(prefix)
         for destination, part in parts:
-            if destination not in (self.prefix, bytes(wire.PREFIX)):
+            is_for_all = destination == bytes(wire.PREFIX)
+            if prefix == self.prefix or not (is_for_all or destination == self.prefix):
                 continue
             if isinstance(part, wire.Data) and part.writer == discovery.SPDP_WRITER:
-                self._out += self._meet(part, source[0], now)
+                self._meet(part, source[0])
                 peer = self.peers.get(prefix)
             if peer is None:
                 continue
+            is_same_host = peer.host == source[0]
             if not peer.is_known:
-                if destination != self.prefix or peer.host != source[0]:
+                if is_for_all or not is_same_host:
                     continue
-                self._out += self._know(peer, now)
-            peer.seen = now
-            if part.writer != discovery.SPDP_WRITER:
-                self._pass(prefix, part, now)
-        out, self._out = self._out, []
-        return out
+                self._know(peer)
+            peer.seen = now if is_same_host else peer.seen
+            self._pass(prefix, part)
+        return self.shared.collect()
 
-    def _pass(self, prefix: bytes, part: wire.Part, now: float) -> None:
-        """Pass a part on to the endpoint that it is for."""
+    def _pass(self, prefix: bytes, part: wire.Part) -> None:
+        """Pass a part on to the end that it is for; without a reader, to all of its writer."""
         if isinstance(part, (wire.AckNack, wire.NackFragment)):
-            writer = self._writers.get(part.writer)
-            if writer is None:
-                return
-            guid = prefix + part.reader
-            if isinstance(part, wire.AckNack):
-                self._out += writer.acknack(guid, part, now)
-            else:
-                self._out += writer.nack_fragment(guid, part)
+            writer, guid = self._ends.get(part.writer), prefix + part.reader
+            if isinstance(writer, Writer) and isinstance(part, wire.AckNack):
+                writer.acknack(guid, part)
+            elif isinstance(writer, Writer) and isinstance(part, wire.NackFragment):
+                writer.nack_fragment(guid, part)
             return
         guid = prefix + part.writer
-        for reader in self._readers_for(part.reader, guid):
+        ends = [self._ends.get(part.reader)] if any(part.reader) else [*self._ends.values()]
+        for reader in ends:
+            if not isinstance(reader, Reader) or guid not in reader.writers:
+                continue
             if isinstance(part, wire.Data):
                 reader.data(guid, part)
             elif isinstance(part, wire.Fragment):
                 reader.fragment(guid, part)
             elif isinstance(part, wire.Heartbeat):
-                self._out += reader.heartbeat(guid, part)
+                reader.heartbeat(guid, part)
             else:
                 reader.gap(guid, part)
-
-    def _readers_for(self, name: bytes, writer: bytes) -> Iterable[Reader]:
-        if name != bytes(4):
-            return filter(None, [self._readers.get(name)])
-        return [reader for reader in self._readers.values() if writer in reader.writers]
 
     @property
     def deadline(self) -> float:
         """When `tick` has something to do."""
-        times = [writer.deadline for writer in self._writers.values()]
+        times = [end.deadline for end in self._ends.values() if isinstance(end, Writer)]
         return min([self._announce_at, *(time for time in times if time is not None)])
 
     def tick(self, now: float) -> list[Outgoing]:
-        """Do what is due."""
-        out: list[Outgoing] = []
-        for writer in self._writers.values():
-            out += writer.tick(now)
+        """Do what is due; return the packets to send."""
+        self.shared.now = now
+        for end in self._ends.values():
+            if isinstance(end, Writer):
+                end.tick()
         if now >= self._announce_at:
             self._announce_at = now + next(self._periods, _PERIOD)
             self._greetings = 0
             for peer in [*self.peers.values()]:
                 if now - peer.seen > peer.about.lease:
                     self._lose(peer)
-            out += self._announcements()
-        return out
-
-    def _announcements(self) -> Iterator[Outgoing]:
-        known = {peer.meta: peer for peer in self.peers.values() if peer.is_known}
-        for address in dict.fromkeys((*self._searched, *known)):
-            yield self._announce_to(address, bytes(wire.PREFIX))
+            known = [peer.meta for peer in self.peers.values() if peer.is_known]
+            for address in dict.fromkeys((*self._searched, *known)):
+                self._announce(address)
+        return self.shared.collect()
 
     @property
     def is_told(self) -> bool:
         """True if each peer has told all of its endpoints."""
-        told = all(self._readers[reader].is_complete for _, reader in discovery.SEDP.values())
+        told = all(learner.is_complete for learner in self._learners.values())
         return told and all(peer.is_known for peer in self.peers.values())
 
     def remote_endpoints(self) -> Iterator[Endpoint]:

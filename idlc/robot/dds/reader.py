@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator
 from typing import NamedTuple, TypeAlias
 
 from idlc.robot.dds import formats, wire
@@ -11,9 +11,11 @@ from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 
 #: The IP address and the port of a socket.
 Address: TypeAlias = tuple[str, int]
-#: Bytes of a sample, and of the samples of one writer that cannot be delivered yet.
+#: Bytes of a sample, and of all samples that cannot be delivered yet.
 MOST_SAMPLE = 64 << 20
-MOST_WAITING = 64 << 20
+MOST_WAITING = 512 << 20
+#: The bytes that a sample or fragment takes besides its payload, at least.
+_OVERHEAD = 256
 #: Numbers that a reader asks for at a time, and samples of which it holds fragments.
 _AHEAD = 256
 _MOST_PARTIAL = 8
@@ -29,6 +31,52 @@ class Outgoing(NamedTuple):
     parts: tuple[bytes, ...]
 
 
+class Remote:
+    """The other end of a connection."""
+
+    def __init__(self, guid: bytes, address: Address, reliable: bool) -> None:
+        self.guid = guid
+        self.prefix, self.id = guid[: wire.PREFIX], guid[wire.PREFIX :]
+        self.address = address
+        self.reliable = reliable
+
+
+class Shared:
+    """What the ends of a participant share: the time, packets to send, and room for samples.
+
+    `fragment` returns the most bytes of a fragment for a host. Of the room, a participant gets at
+    most as much as is left for the others.
+    """
+
+    def __init__(self, fragment: Callable[[str], int]) -> None:
+        self.fragment = fragment
+        self.now = 0.0
+        self._packets: list[Outgoing] = []
+        self._used: Counter[bytes] = Counter()
+
+    def send(self, end: Remote, *parts: bytes) -> None:
+        """Send parts of a packet to an end."""
+        self._packets.append(Outgoing(end.address, end.prefix, parts))
+
+    def collect(self) -> list[Outgoing]:
+        """Return the packets to send, once."""
+        packets, self._packets = self._packets, []
+        return packets
+
+    def take(self, prefix: bytes, size: int) -> bool:
+        """Take bytes for samples of a participant; return whether there was room."""
+        if self._used[prefix] + size > MOST_WAITING - self._used.total():
+            return False
+        self._used[prefix] += size
+        return True
+
+    def free(self, prefix: bytes, size: int) -> None:
+        """Give bytes back."""
+        self._used[prefix] -= size
+        if not self._used[prefix]:
+            del self._used[prefix]
+
+
 class Received(NamedTuple):
     """A sample as a reader's callback gets it; without a payload, an instance ended."""
 
@@ -40,6 +88,26 @@ class Received(NamedTuple):
     time: int
 
 
+class Room:
+    """The bytes of the samples that wait, by the participant that sent them."""
+
+    def __init__(self) -> None:
+        self._used: Counter[bytes] = Counter()
+
+    def take(self, prefix: bytes, size: int) -> bool:
+        """Take bytes; a participant gets at most as many as are left for the others."""
+        if self._used[prefix] + size > MOST_WAITING - self._used.total():
+            return False
+        self._used[prefix] += size
+        return True
+
+    def free(self, prefix: bytes, size: int) -> None:
+        """Give bytes back."""
+        self._used[prefix] -= size
+        if not self._used[prefix]:
+            del self._used[prefix]
+
+
 class _Partial:
     """Fragments of a sample by their numbers."""
 
@@ -49,17 +117,20 @@ class _Partial:
         self.parts: dict[int, bytes] = {}
         self.count = -(-part.total // part.size)
 
-    def add(self, part: wire.Fragment) -> int:
-        """Add fragments; return how many bytes were new."""
-        added, number = 0, part.first
-        for at in range(0, len(part.payload), part.size):
-            piece = part.payload[at : at + part.size]
-            if number <= self.count and number not in self.parts:
-                piece = piece[: self.total - (number - 1) * self.size]
-                self.parts[number] = piece
-                added += len(piece)
-            number += 1
-        return added
+    def new(self, part: wire.Fragment) -> Iterator[tuple[int, bytes]]:
+        """Yield the numbers and bytes of fragments that are missing."""
+        for number in range(part.first, self.count + 1):
+            at = (number - part.first) * part.size
+            if at >= len(part.payload):
+                return
+            if number not in self.parts:
+                end = min(part.size, self.total - (number - 1) * self.size)
+                yield number, part.payload[at : at + end]
+
+    @property
+    def bytes(self) -> int:
+        """The memory that the fragments take."""
+        return sum(map(len, self.parts.values())) + _OVERHEAD * len(self.parts)
 
     def missing(self) -> list[int]:
         """Return the numbers of missing fragments, of 256 from the first of them."""
@@ -68,13 +139,11 @@ class _Partial:
         return [n for n in range(first, min(first + _AHEAD, self.count + 1)) if n not in self.parts]
 
 
-class RemoteWriter:
+class RemoteWriter(Remote):
     """What a reader knows of a writer, and the samples of it that wait for earlier ones."""
 
     def __init__(self, guid: bytes, address: Address, reliable: bool) -> None:
-        self.guid = guid
-        self.address = address
-        self.reliable = reliable
+        super().__init__(guid, address, reliable)
         #: The number of the next sample to deliver. Of a reliable writer it is `None` until the
         #: first heartbeat: the writer may know the reader, and send to it, before the reader knows
         #: the writer. Gaps tell what a late reader has missed.
@@ -90,12 +159,20 @@ class RemoteWriter:
 class Reader:
     """Delivers the samples of the matched writers in order: reliable ones without gaps."""
 
-    def __init__(self, guid: bytes, qos: QoSProfile, deliver: Callable[[Received], None]) -> None:
+    def __init__(
+        self,
+        guid: bytes,
+        qos: QoSProfile,
+        deliver: Callable[[Received], None],
+        shared: Shared,
+    ) -> None:
         self.guid = guid
+        self.id = guid[wire.PREFIX :]
         self.qos = qos
         self.deliver = deliver
         self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         self.writers: dict[bytes, RemoteWriter] = {}
+        self._shared = shared
         #: Samples that were not delivered, because they were too large or too many.
         self.lost = 0
 
@@ -109,34 +186,53 @@ class Reader:
         )
 
     def match(self, guid: bytes, address: Address, qos: QoSProfile) -> None:
-        """Receive from a writer."""
+        """Receive from a writer, which learns by a question that this reader is there."""
+        if guid in self.writers:
+            return
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
-        if guid not in self.writers:
-            self.writers[guid] = RemoteWriter(guid, address, reliable)
+        writer = self.writers[guid] = RemoteWriter(guid, address, reliable)
+        if reliable:
+            writer.count += 1
+            # 0 asks where to begin; Cyclone DDS calls it malformed
+            base = 1 if guid.startswith(_CYCLONE) else 0
+            ids = self.id, writer.id
+            question = formats.format_acknack(*ids, base, [], writer.count, is_final=False)
+            self._shared.send(writer, question)
 
     def unmatch(self, guid: bytes) -> None:
         """Forget a writer."""
-        self.writers.pop(guid, None)
+        if (writer := self.writers.pop(guid, None)) is not None:
+            self._release(writer, writer.bytes)
 
-    def ask(self, guid: bytes) -> Outgoing | None:
-        """Return the question by which a writer learns that this reader is there."""
-        writer = self.writers[guid]
-        if not writer.reliable:
-            return None
-        writer.count += 1
-        ids = self.guid[wire.PREFIX :], guid[wire.PREFIX :]
-        # 0 asks where to begin; Cyclone DDS calls it malformed
-        first = 1 if guid.startswith(_CYCLONE) else 0
-        part = formats.format_acknack(*ids, writer.next or first, [], writer.count)
-        # it is not final: the writer has to answer
-        part = part[:1] + bytes([part[1] & ~2]) + part[2:]
-        return Outgoing(writer.address, guid[: wire.PREFIX], (part,))
+    def close(self) -> None:
+        """Forget all writers."""
+        for guid in [*self.writers]:
+            self.unmatch(guid)
+
+    def _hold(self, writer: RemoteWriter, number: int, size: int) -> bool:
+        """Take memory for a sample; the one that all others wait for replaces the last of them."""
+        while not (is_free := self._shared.take(writer.prefix, size)):
+            if number != writer.next or not writer.early:
+                break
+            self._drop(writer, max(writer.early))
+        writer.bytes += size if is_free else 0
+        return is_free
+
+    def _release(self, writer: RemoteWriter, size: int) -> None:
+        writer.bytes -= size
+        self._shared.free(writer.prefix, size)
+
+    def _drop(self, writer: RemoteWriter, number: int) -> Received | None:
+        """Forget a sample that waits, or its fragments; return the sample."""
+        if (partial := writer.partial.pop(number, None)) is not None:
+            self._release(writer, partial.bytes)
+        if (sample := writer.early.pop(number, None)) is not None:
+            self._release(writer, len(sample.payload) + _OVERHEAD)
+        return sample
 
     def data(self, guid: bytes, part: wire.Data) -> None:
-        """Take a sample."""
-        writer = self.writers.get(guid)
-        if writer is not None:
-            self._take(writer, Received(guid, *part[2:]))
+        """Take a sample of a matched writer."""
+        self._take(self.writers[guid], Received(guid, *part[2:]))
 
     def _take(self, writer: RemoteWriter, sample: Received) -> None:
         if writer.next is None and not writer.reliable:
@@ -149,36 +245,29 @@ class Reader:
             return
         if writer.next == sample.number:
             # without the way through the dictionary, as nearly all samples arrive in order
-            self._drop_partial(writer, sample.number)
+            if writer.partial:
+                self._drop(writer, sample.number)
             writer.next += 1
             self.deliver(sample)
-        elif sample.number not in writer.early:
-            size = len(sample.payload)
-            if len(writer.early) >= _AHEAD or writer.bytes + size > MOST_WAITING:
-                return  # the writer has to send it again
-            self._drop_partial(writer, sample.number)
-            writer.early[sample.number] = sample
-            writer.bytes += size
+        elif sample.number not in writer.early and len(writer.early) < _AHEAD:
+            self._drop(writer, sample.number)
+            # the writer has to send it again if there is no room
+            if self._hold(writer, sample.number, len(sample.payload) + _OVERHEAD):
+                writer.early[sample.number] = sample
         if writer.early:
             self._drain(writer)
 
     def _drain(self, writer: RemoteWriter) -> None:
         while writer.next is not None and writer.next in writer.early:
-            sample = writer.early.pop(writer.next)
+            sample = self._drop(writer, writer.next)
             writer.next += 1
             if sample is not None:
-                writer.bytes -= len(sample.payload)
                 self.deliver(sample)
 
-    @staticmethod
-    def _drop_partial(writer: RemoteWriter, number: int) -> None:
-        if (partial := writer.partial.pop(number, None)) is not None:
-            writer.bytes -= sum(map(len, partial.parts.values()))
-
     def fragment(self, guid: bytes, part: wire.Fragment) -> None:
-        """Take fragments; the last one completes the sample."""
-        writer = self.writers.get(guid)
-        if writer is None or part.number in writer.early:
+        """Take fragments of a matched writer; the last one completes the sample."""
+        writer = self.writers[guid]
+        if part.number in writer.early:
             return
         if writer.next is not None and part.number < writer.next:
             return
@@ -191,52 +280,46 @@ class Reader:
         if partial is None:
             while len(writer.partial) >= (_MOST_PARTIAL if writer.reliable else 2):
                 # a reliable reader asks for it again
-                self._drop_partial(writer, next(reversed(writer.partial)))
+                self._drop(writer, next(reversed(writer.partial)))
             partial = writer.partial[part.number] = _Partial(part)
         if (partial.size, partial.total) != (part.size, part.total):
             return
-        if writer.bytes + len(part.payload) > MOST_WAITING + MOST_SAMPLE:
-            return
-        writer.bytes += partial.add(part)
+        for number, piece in partial.new(part):
+            if not self._hold(writer, part.number, len(piece) + _OVERHEAD):
+                return
+            partial.parts[number] = piece
         if len(partial.parts) == partial.count:
             payload = b"".join(partial.parts[number] for number in range(1, partial.count + 1))
-            self._drop_partial(writer, part.number)
+            self._drop(writer, part.number)
             values = (guid, part.number, partial.parameters, payload, False, partial.time)
             self._take(writer, Received(*values))
 
     def gap(self, guid: bytes, part: wire.Gap) -> None:
-        """Go on without numbers that never come."""
-        writer = self.writers.get(guid)
-        if writer is None or not writer.reliable:
+        """Go on without numbers of a matched writer that never come."""
+        writer = self.writers[guid]
+        if not writer.reliable:
             return
         if writer.next is None:
             writer.next = part.first
         if part.first <= writer.next < part.base:
             self._skip(writer, part.base)
-        for number in part.others[:_AHEAD]:
+        for number in (*range(part.first, min(part.base, part.first + _AHEAD)), *part.others):
             if number >= writer.next and len(writer.early) < 2 * _AHEAD:
                 writer.early.setdefault(number, None)
-        if part.first > writer.next:
-            for number in range(part.first, min(part.base, part.first + _AHEAD)):
-                if len(writer.early) < 2 * _AHEAD:
-                    writer.early.setdefault(number, None)
         self._drain(writer)
 
     def _skip(self, writer: RemoteWriter, number: int) -> None:
         """Deliver what has arrived below a number, and go on at it."""
-        for early in sorted(n for n in writer.early if n < number):
-            if (sample := writer.early.pop(early)) is not None:
-                writer.bytes -= len(sample.payload)
+        for early in sorted(n for n in {*writer.early, *writer.partial} if n < number):
+            if (sample := self._drop(writer, early)) is not None:
                 self.deliver(sample)
-        for early in [n for n in writer.partial if n < number]:
-            self._drop_partial(writer, early)
         writer.next = number
 
-    def heartbeat(self, guid: bytes, part: wire.Heartbeat) -> list[Outgoing]:
-        """Ask for what is missing."""
-        writer = self.writers.get(guid)
-        if writer is None or not writer.reliable:
-            return []
+    def heartbeat(self, guid: bytes, part: wire.Heartbeat) -> None:
+        """Ask a matched writer for what is missing."""
+        writer = self.writers[guid]
+        if not writer.reliable:
+            return
         writer.last = part.last
         if writer.next is None:
             writer.next = part.first
@@ -247,14 +330,14 @@ class Reader:
         ahead = range(base, min(part.last, base + _AHEAD - 1) + 1)
         missing = [number for number in ahead if number not in writer.early]
         if part.is_final and not missing:
-            return []
-        ids = self.guid[wire.PREFIX :], guid[wire.PREFIX :]
-        whole = [number for number in missing if number not in writer.partial]
-        parts = []
+            return
         writer.count += 1
+        ids = self.id, writer.id
+        parts = []
         for number in missing:
             if number in writer.partial:
                 lacking = writer.partial[number].missing()
                 parts.append(formats.format_nack_fragment(*ids, number, lacking, writer.count))
-        parts.append(formats.format_acknack(*ids, base, whole, writer.count))
-        return [Outgoing(writer.address, guid[: wire.PREFIX], tuple(parts))]
+        whole = [number for number in missing if number not in writer.partial]
+        acknack = formats.format_acknack(*ids, base, whole, writer.count, is_final=not whole)
+        self._shared.send(writer, *parts, acknack)

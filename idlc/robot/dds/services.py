@@ -126,13 +126,13 @@ class Services:
             guid = guid_of(self._connection.prefix, entity.id + 1, READER if is_reader else WRITER)
             end = Endpoint(guid, names[0], names[1] + HALVES[half][1], qos, entity.hash)
             ends[is_reader] = end
-        writer = self._connection.add_writer(ends[False])
-        return Pair(self._connection.add_reader(ends[True], deliver), writer)
+        with self._connection.acting() as participant:
+            writer = participant.add_writer(ends[False])
+            return Pair(participant.add_reader(ends[True], deliver), writer)
 
     def withdraw(self, pair: Pair) -> None:
         """Withdraw both ends."""
-        for each in pair:
-            self._connection.remove(each.guid)
+        self._connection.remove(*(each.guid for each in pair))
 
     def serve(self, entity: Entity, callback: Callable[[Request], None]) -> Pair:
         """Declare a service."""

@@ -79,8 +79,9 @@ class DdsTransport:
             Endpoint(self._guid(_INFO_ID, kind), info.TOPIC, info.TYPE, _INFO_QOS)
             for kind in (WRITER, READER)
         )
-        self._info = self._connection.add_writer(writer)
-        self._infos = self._connection.add_reader(reader, self._learn)
+        with self._connection.acting() as participant:
+            self._info = participant.add_writer(writer)
+            self._infos = participant.add_reader(reader, self._learn)
         self._connection.start()
 
     def _guid(self, number: int, kind: bytes) -> bytes:
@@ -99,7 +100,8 @@ class DdsTransport:
 
     def publisher(self, entity: Entity) -> Sender:
         """Declare a writer."""
-        return _Sender(self._connection, self._connection.add_writer(self._topic(entity, WRITER)))
+        with self._connection.acting() as participant:
+            return _Sender(self._connection, participant.add_writer(self._topic(entity, WRITER)))
 
     def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
         """Declare a reader."""
@@ -110,7 +112,8 @@ class DdsTransport:
                 attachment = pack_attachment(received.number, sent, received.writer)
                 callback(Sample(unpadded(received.payload), attachment))
 
-        reader = self._connection.add_reader(self._topic(entity, READER), deliver)
+        with self._connection.acting() as participant:
+            reader = participant.add_reader(self._topic(entity, READER), deliver)
         return _Closer(lambda: self._connection.remove(reader.guid))
 
     def service(self, entity: Entity, callback: Callable[[Request], None]) -> Closeable:

@@ -3,33 +3,41 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.reader import Address, Outgoing, Reader, Received
+from idlc.robot.dds.reader import Address, Reader, Received, Remote, Shared
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 #: Seconds between heartbeats for readers that lack something.
 HEARTBEAT = 0.1
 #: Bytes of a history; the newest sample is kept, however large it is.
 MOST_HISTORY = 256 << 20
-#: Bytes that one question of a reader draws.
-_MOST_RESENT = 4 << 20
+#: Bytes that the questions of a reader draw at once, and in a second.
+_MOST_RESENT, _RESENT = 4 << 20, 64 << 20
 
 
-class RemoteReader:
-    """What a writer knows of a reader: its address, and the first number that it lacks."""
+class RemoteReader(Remote):
+    """What a writer knows of a reader: the size of fragments, and the first number it lacks."""
 
     def __init__(self, guid: bytes, address: Address, reliable: bool, size: int, base: int) -> None:
-        self.guid = guid
-        self.address = address
-        self.reliable = reliable
-        #: The most bytes of a fragment.
+        super().__init__(guid, address, reliable)
         self.size = size
         self.start = self.base = base
         self.count = -1
         #: True after it has said which number it wants, as it then has a heartbeat.
         self.is_told = False
+        #: The bytes that it may draw, and when that was so.
+        self._room, self._at = 0.0, 0.0
+
+    def may_draw(self, size: int, now: float) -> bool:
+        """Return whether it gets so many bytes again now."""
+        self._room = min(_MOST_RESENT, self._room + (now - self._at) * _RESENT)
+        self._at = now
+        is_free = self._room > 0
+        self._room -= size if is_free else 0
+        return is_free
 
 
 class Sample(NamedTuple):
@@ -55,8 +63,9 @@ def unpadded(payload: bytes) -> bytes:
 class Writer:
     """Sends samples to the matched readers, and again to those that lack them."""
 
-    def __init__(self, guid: bytes, qos: QoSProfile) -> None:
+    def __init__(self, guid: bytes, qos: QoSProfile, shared: Shared) -> None:
         self.guid = guid
+        self.id = guid[wire.PREFIX :]
         self.qos = qos
         self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         self.readers: dict[bytes, RemoteReader] = {}
@@ -65,27 +74,26 @@ class Writer:
         self.last = 0
         #: When the next heartbeat is due; `None` if all readers have everything.
         self.deadline: float | None = None
+        self._shared = shared
         self._count = 0
         self._bytes = 0
         self._depth = None if qos.history is HistoryPolicy.KEEP_ALL else qos.depth
 
-    def match(
-        self, guid: bytes, address: Address, qos: QoSProfile, size: int, now: float
-    ) -> list[Outgoing]:
+    def match(self, guid: bytes, address: Address, qos: QoSProfile) -> None:
         """Send to a reader from now on, and what is kept if both sides want that."""
-        out: list[Outgoing] = []
         if guid in self.readers:
-            return out
+            return
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         is_late = self.qos.is_latched and qos.is_latched
         first = next(iter(self.history), self.last + 1) if is_late else self.last + 1
+        size = self._shared.fragment(address[0])
         reader = self.readers[guid] = RemoteReader(guid, address, reliable, size, first)
         if reliable:
-            self.deadline = now
+            self.deadline = self._shared.now
+            self.tick()
         elif is_late:  # such a reader never asks
-            for number, sample in self.history.items():
-                self._send(reader, number, sample, out)
-        return out + self.tick(now)
+            for number in self.history:
+                self._send(reader, number)
 
     def match_local(self, reader: Reader) -> None:
         """Deliver to a reader of the same participant."""
@@ -94,11 +102,15 @@ class Writer:
             for number, sample in self.history.items():
                 reader.deliver(Received(self.guid, number, *self._parsed(sample)))
 
+    def close(self) -> None:
+        """Forget all readers."""
+        self.readers.clear()
+
     def unmatch(self, guid: bytes) -> None:
         """Forget a reader."""
         self.readers.pop(guid, None)
 
-    def write(self, payload: bytes, inline: bytes, time: int, now: float) -> list[Outgoing]:
+    def write(self, payload: bytes, inline: bytes = b"", time: int = 0) -> None:
         """Send a sample to all readers; it stays in the history."""
         payload = _padded(payload)
         self.last += 1
@@ -108,18 +120,17 @@ class Writer:
             if len(self.history) == 1:
                 break
             self._bytes -= len(self.history.popitem(last=False)[1].payload)
-        out: list[Outgoing] = []
         for reader in self.readers.values():
-            self._send(reader, self.last, sample, out)
             if reader.reliable:
-                out[-1] = out[-1]._replace(parts=(*out[-1].parts, self._heartbeat(reader)))
-                self.deadline = self.deadline or now + HEARTBEAT
+                self._send(reader, self.last, self._heartbeat(reader))
+                self.deadline = self.deadline or self._shared.now + HEARTBEAT
+            else:
+                self._send(reader, self.last)
         for local in self.local:
             local.deliver(Received(self.guid, self.last, *self._parsed(sample)))
         if not (self.reliable or self.qos.is_latched):
             self.history.clear()
             self._bytes = 0
-        return out
 
     def forget(self, number: int) -> None:
         """Remove a sample from the history."""
@@ -132,78 +143,67 @@ class Writer:
         return inline, sample.payload, not sample.payload, sample.time
 
     def _send(
-        self,
-        reader: RemoteReader,
-        number: int,
-        sample: Sample,
-        out: list[Outgoing],
-        chosen: tuple[int, ...] = (),
+        self, reader: RemoteReader, number: int, *tail: bytes, chosen: Sequence[int] = ()
     ) -> None:
-        """Send a sample to a reader; of its fragments only the chosen ones, if any are."""
-        payload, inline, time = sample
-        ids = reader.guid[wire.PREFIX :], self.guid[wire.PREFIX :]
-        stamp, prefix = formats.at_time(time), reader.guid[: wire.PREFIX]
-        if len(payload) <= reader.size:
-            part = formats.format_data(*ids, number, inline, payload)
-            out.append(Outgoing(reader.address, prefix, (stamp, part)))
+        """Send a sample to a reader; of its fragments only the chosen ones, if any are.
+
+        `tail` follows in the same packet.
+        """
+        payload, inline, time = self.history[number]
+        ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
+        if len(payload) <= size:
+            self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
             return
-        count = -(-len(payload) // reader.size)
-        for first in chosen or range(1, count + 1):
-            if 0 < first <= count:
-                part = formats.format_fragment(*ids, number, inline, payload, first, reader.size)
-                out.append(Outgoing(reader.address, prefix, (stamp, part)))
+        count = -(-len(payload) // size)
+        numbers = [first for first in chosen or range(1, count + 1) if 0 < first <= count]
+        for first in numbers:
+            part = formats.format_fragment(*ids, payload, first, size)
+            self._shared.send(reader, stamp, part, *(tail if first == numbers[-1] else ()))
 
     def _heartbeat(self, reader: RemoteReader) -> bytes:
         self._count += 1
         first = max(next(iter(self.history), self.last + 1), reader.start)
-        ids = reader.guid[wire.PREFIX :], self.guid[wire.PREFIX :]
-        return formats.format_heartbeat(*ids, first, self.last, self._count)
+        return formats.format_heartbeat(reader.id, self.id, first, self.last, self._count)
 
-    def acknack(self, guid: bytes, part: wire.AckNack, now: float) -> list[Outgoing]:
+    def acknack(self, guid: bytes, part: wire.AckNack) -> None:
         """Send what a reader lacks, or say that it never comes."""
-        reader, out = self.readers.get(guid), list[Outgoing]()
+        reader = self.readers.get(guid)
         if reader is None or not reader.reliable or part.base > self.last + 1:
-            return out
+            return
         if part.beat == reader.count:
-            return out  # the network repeated it
+            return  # the network repeated it
         reader.count = part.beat
         reader.base = max(reader.base, part.base)
         reader.is_told |= part.base > 0
-        room = _MOST_RESENT
+        gone = []
         for number in part.missing:
             sample = self.history.get(number) if number >= reader.start else None
-            if sample is not None and room > 0:
-                room -= len(sample.payload)
-                self._send(reader, number, sample, out)
-            elif sample is None and number <= self.last:
-                ids = guid[wire.PREFIX :], self.guid[wire.PREFIX :]
-                gap = formats.format_gap(*ids, number, number + 1)
-                out.append(Outgoing(reader.address, guid[: wire.PREFIX], (gap,)))
+            if sample is None:
+                gone += [number] if number <= self.last else []
+            elif reader.may_draw(len(sample.payload), self._shared.now):
+                self._send(reader, number)
+        if gone:
+            self._shared.send(reader, formats.format_gap(reader.id, self.id, gone))
         if part.missing or part.base == 0:
-            self._beat(reader, out)
-            self.deadline = self.deadline or now + HEARTBEAT
-        return out
+            self._shared.send(reader, self._heartbeat(reader))
+            self.deadline = self.deadline or self._shared.now + HEARTBEAT
 
-    def nack_fragment(self, guid: bytes, part: wire.NackFragment) -> list[Outgoing]:
+    def nack_fragment(self, guid: bytes, part: wire.NackFragment) -> None:
         """Send fragments again."""
-        reader, sample = self.readers.get(guid), self.history.get(part.number)
-        out: list[Outgoing] = []
-        if reader and sample and reader.reliable and part.missing:
-            self._send(reader, part.number, sample, out, part.missing)
-            self._beat(reader, out)
-        return out
+        reader = self.readers.get(guid)
+        if reader is None or not reader.reliable or part.number not in self.history:
+            return
+        now = self._shared.now
+        chosen = [each for each in part.missing if reader.may_draw(reader.size, now)]
+        if chosen:
+            self._send(reader, part.number, self._heartbeat(reader), chosen=chosen)
 
-    def _beat(self, reader: RemoteReader, out: list[Outgoing]) -> None:
-        prefix = reader.guid[: wire.PREFIX]
-        out.append(Outgoing(reader.address, prefix, (self._heartbeat(reader),)))
-
-    def tick(self, now: float) -> list[Outgoing]:
+    def tick(self) -> None:
         """Send heartbeats to the readers that lack something, if they are due."""
-        out: list[Outgoing] = []
-        if self.deadline is None or now < self.deadline:
-            return out
+        if self.deadline is None or self._shared.now < self.deadline:
+            return
+        self.deadline = None
         for reader in self.readers.values():
             if reader.reliable and (reader.base <= self.last or not reader.is_told):
-                self._beat(reader, out)
-        self.deadline = now + HEARTBEAT if out else None
-        return out
+                self._shared.send(reader, self._heartbeat(reader))
+                self.deadline = self._shared.now + HEARTBEAT
