@@ -173,8 +173,6 @@ class Reader:
         self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         self.writers: dict[bytes, RemoteWriter] = {}
         self._shared = shared
-        #: Samples that were not delivered, because they were too large or too many.
-        self.lost = 0
 
     @property
     def is_complete(self) -> bool:
@@ -272,7 +270,6 @@ class Reader:
         if writer.next is not None and part.number < writer.next:
             return
         if part.total > MOST_SAMPLE:
-            self.lost += 1
             writer.early.setdefault(part.number, None)  # else the reader would ask for ever
             self._drain(writer)
             return

@@ -25,8 +25,8 @@ from idlc.robot.transport import OnReply, Request, Sample
 _DEPTH = 1000
 #: Seconds that a request waits for a service to appear, and a reply for its client.
 _APPEARING = 5.0
-#: Replies that wait for their clients.
-_MOST_WAITING = 1000
+#: Requests and replies that wait.
+_MOST_WAITING = 10_000
 
 
 class Pair(NamedTuple):
@@ -36,29 +36,23 @@ class Pair(NamedTuple):
     writer: Writer
 
 
-class _Call:
-    """A request that waits for a service, or for its reply."""
+class _Call(NamedTuple):
+    """A request that waits for its reply."""
 
-    def __init__(self, payload: bytes, attachment: bytes, callback: OnReply, limit: float) -> None:
-        self.payload = payload
-        self.attachment = attachment
-        self.callback = callback
-        #: Seconds until the reply, and when the present wait is over.
-        self.limit = limit
-        self.end = time.monotonic() + min(limit, _APPEARING)
+    attachment: bytes
+    callback: OnReply
+    end: float
 
 
 class _Client:
-    """The ends of a client, and its calls: those that wait for a service, and those by number."""
+    """The ends of a client, and its calls by the numbers of their requests."""
 
     def __init__(self) -> None:
         self.pair: Pair
-        self.waiting: list[_Call] = []
-        self.sent: dict[int, _Call] = {}
+        self.calls: dict[int, _Call] = {}
 
-    @property
     def is_matched(self) -> bool:
-        """True if a service is there."""
+        """Return whether a service is there."""
         reader, writer = self.pair
         return bool(writer.local or (writer.readers and reader.writers))
 
@@ -67,19 +61,25 @@ class _Client:
         named = discovery.related(received.parameters)
         if named is None or named[0] not in {each.guid for each in self.pair}:
             return
-        if (call := self.sent.pop(named[1], None)) is not None:
+        if (call := self.calls.pop(named[1], None)) is not None:
             if not received.is_key:
                 call.callback(Sample(received.payload, call.attachment))
             call.callback(None)
 
+    def end_calls(self, now: float) -> None:
+        """End the calls that nobody answers any more."""
+        is_gone = not self.is_matched()
+        late = [number for number, call in self.calls.items() if is_gone or call.end < now]
+        for number in late:
+            self.calls.pop(number).callback(None)
 
-class _Reply(NamedTuple):
-    """A reply that waits for its client."""
 
-    writer: Writer
-    target: bytes
-    payload: bytes
-    inline: bytes
+class _Waiting(NamedTuple):
+    """What is sent as soon as the other side is matched, or given up."""
+
+    is_matched: Callable[[], bool]
+    send: Callable[[], None]
+    give_up: Callable[[], None]
     end: float
 
 
@@ -97,9 +97,8 @@ class _Request:
         self.attachment = pack_attachment(received.number, time.time_ns(), self._target)
 
     def reply(self, payload: bytes, attachment: bytes) -> None:  # noqa: ARG002 - it is Zenoh's
-        """Send the reply."""
-        inline = discovery.format_related(self._target, self._number)
-        self._services.reply(self._writer, self._target, payload, inline)
+        """Send the reply, now or when its client is matched."""
+        self._services.reply(self._writer, self._target, self._number, payload)
 
     def drop(self) -> None:
         """Finish without a reply; clients of idlc are told."""
@@ -114,7 +113,7 @@ class Services:
         self._connection = connection
         #: By the id of an announced client, and the name and type of a service.
         self._clients: dict[object, _Client] = {}
-        self._replies: list[_Reply] = []
+        self._waiting: list[_Waiting] = []
 
     def _pair(self, entity: Entity, deliver: Callable[[Received], None]) -> Pair:
         """Declare the two ends of a service or a client."""
@@ -122,10 +121,10 @@ class Services:
         is_service = entity.kind is Kind.SERVICE
         ends = {}
         for half, is_reader in (("rq", is_service), ("rr", not is_service)):
-            names = (f"{half}{entity.name}{HALVES[half][0]}", dds_type(entity.type))
+            topic, type_ = (f"{half}{entity.name}", dds_type(entity.type))
             guid = guid_of(self._connection.prefix, entity.id + 1, READER if is_reader else WRITER)
-            end = Endpoint(guid, names[0], names[1] + HALVES[half][1], qos, entity.hash)
-            ends[is_reader] = end
+            names = topic + HALVES[half][0], type_ + HALVES[half][1]
+            ends[is_reader] = Endpoint(guid, *names, qos, entity.hash)
         with self._connection.acting() as participant:
             writer = participant.add_writer(ends[False])
             return Pair(participant.add_reader(ends[True], deliver), writer)
@@ -145,15 +144,6 @@ class Services:
             pair = self._pair(entity, deliver)
             return pair
 
-    def reply(self, writer: Writer, target: bytes, payload: bytes, inline: bytes) -> None:
-        """Send a reply, now or when its client is matched."""
-        with self._connection.lock:
-            if _is_matched(writer, target):
-                self._connection.write(writer, payload, inline)
-            elif len(self._replies) < _MOST_WAITING:
-                end = time.monotonic() + _APPEARING
-                self._replies.append(_Reply(writer, target, payload, inline, end))
-
     def client(self, entity: Entity, *, is_announced: bool) -> _Client:
         """Return a client; those that are not announced share one for each service."""
         key = entity.id if is_announced else (entity.name, entity.type)
@@ -171,41 +161,51 @@ class Services:
         self, client: _Client, payload: bytes, attachment: bytes, callback: OnReply, limit: float
     ) -> None:
         """Send a request, now or when a service is matched."""
-        call = _Call(payload, attachment, callback, limit)
-        if client.is_matched and not client.waiting:
-            self._send(client, call)
-        else:
-            client.waiting.append(call)
 
-    def _send(self, client: _Client, call: _Call) -> None:
-        reader, writer = client.pair
-        call.end = time.monotonic() + call.limit
-        # before it is sent, as a service of this participant may answer at once
-        client.sent[writer.last + 1] = call
-        inline = discovery.format_related(reader.guid, writer.last + 1)
-        self._connection.write(writer, call.payload, inline)
+        def send() -> None:
+            reader, writer = client.pair
+            number = writer.last + 1
+            # before it is sent, as a service of this participant may answer at once
+            client.calls[number] = _Call(attachment, callback, time.monotonic() + limit)
+            self._connection.write(writer, payload, discovery.format_related(reader.guid, number))
+
+        end = time.monotonic() + min(limit, _APPEARING)
+        self._send(_Waiting(client.is_matched, send, lambda: callback(None), end))
+
+    def reply(self, writer: Writer, target: bytes, number: int, payload: bytes) -> None:
+        """Send the reply to a request of a reader, now or when the reader is matched."""
+
+        def is_matched() -> bool:
+            guids = (*writer.readers, *(reader.guid for reader in writer.local))
+            return any(guid.startswith(target[: wire.PREFIX]) for guid in guids)
+
+        def send() -> None:
+            self._connection.write(writer, payload, discovery.format_related(target, number))
+
+        with self._connection.lock:
+            end = time.monotonic() + _APPEARING
+            self._send(_Waiting(is_matched, send, lambda: None, end))
+
+    def _send(self, message: _Waiting) -> None:
+        """Send what can be sent, in the order of its arrival."""
+        if len(self._waiting) < _MOST_WAITING:
+            self._waiting.append(message)
+        else:
+            message.give_up()
+        self._settle(time.monotonic())
+
+    def _settle(self, now: float) -> None:
+        waiting, self._waiting = self._waiting, []
+        for each in waiting:
+            if each.is_matched():
+                each.send()
+            elif each.end < now:
+                each.give_up()
+            else:
+                self._waiting.append(each)
 
     def tick(self, now: float) -> None:
         """Send what waited, and end what is over."""
+        self._settle(now)
         for client in [*self._clients.values()]:
-            while client.waiting and client.is_matched:
-                self._send(client, client.waiting.pop(0))
-            is_gone = not client.is_matched
-            late = [call for call in client.waiting if call.end < now]
-            client.waiting = [call for call in client.waiting if call.end >= now]
-            late += (call for call in client.sent.values() if is_gone or call.end < now)
-            client.sent = {n: call for n, call in client.sent.items() if call not in late}
-            for call in late:
-                call.callback(None)
-        replies, self._replies = self._replies, []
-        for reply in replies:
-            if _is_matched(reply.writer, reply.target):
-                self._connection.write(reply.writer, reply.payload, reply.inline)
-            elif reply.end > now:
-                self._replies.append(reply)
-
-
-def _is_matched(writer: Writer, target: bytes) -> bool:
-    """Return whether a writer reaches the participant of a reader."""
-    guids = (*writer.readers, *(reader.guid for reader in writer.local))
-    return any(guid.startswith(target[: wire.PREFIX]) for guid in guids)
+            client.end_calls(now)

@@ -99,12 +99,13 @@ class Writer:
         """Deliver to a reader of the same participant."""
         self.local.append(reader)
         if self.qos.is_latched and reader.qos.is_latched:
-            for number, sample in self.history.items():
-                reader.deliver(Received(self.guid, number, *self._parsed(sample)))
+            for number, sample in [*self.history.items()]:
+                self._deliver(reader, number, sample)
 
     def close(self) -> None:
         """Forget all readers."""
         self.readers.clear()
+        self.local.clear()
 
     def unmatch(self, guid: bytes) -> None:
         """Forget a reader."""
@@ -126,8 +127,8 @@ class Writer:
                 self.deadline = self.deadline or self._shared.now + HEARTBEAT
             else:
                 self._send(reader, self.last)
-        for local in self.local:
-            local.deliver(Received(self.guid, self.last, *self._parsed(sample)))
+        for local in [*self.local]:
+            self._deliver(local, self.last, sample)
         if not (self.reliable or self.qos.is_latched):
             self.history.clear()
             self._bytes = 0
@@ -137,10 +138,11 @@ class Writer:
         if (sample := self.history.pop(number, None)) is not None:
             self._bytes -= len(sample.payload)
 
-    @staticmethod
-    def _parsed(sample: Sample) -> tuple[wire.Parameters, bytes, bool, int]:
-        inline = wire.parse_parameters(sample.inline, 0, "<")[0] if sample.inline else wire.NONE
-        return inline, sample.payload, not sample.payload, sample.time
+    def _deliver(self, reader: Reader, number: int, sample: Sample) -> None:
+        """Deliver a sample to a reader of the same participant."""
+        payload, inline, time = sample
+        parameters = wire.parse_parameters(inline, 0, "<")[0] if inline else wire.NONE
+        reader.deliver(Received(self.guid, number, parameters, payload, not payload, time))
 
     def _send(
         self, reader: RemoteReader, number: int, *tail: bytes, chosen: Sequence[int] = ()

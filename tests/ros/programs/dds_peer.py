@@ -3,11 +3,13 @@
 import json
 import sys
 import threading
+from contextlib import suppress
 
 import rclpy
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionClient, ActionServer
+from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
@@ -96,4 +98,5 @@ def work():
 
 threading.Thread(target=work, daemon=True).start()
 threading.Thread(target=lambda: (sys.stdin.read(), rclpy.try_shutdown()), daemon=True).start()
-rclpy.spin(node)
+with suppress(ExternalShutdownException):
+    rclpy.spin(node)
