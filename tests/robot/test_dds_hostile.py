@@ -3,13 +3,14 @@
 import random
 import struct
 import time
+from collections import Counter
 
 import pytest
 
 from idlc.robot.dds import formats, info, wire
-from idlc.robot.dds.participant import MOST_PEERS
-from idlc.robot.dds.reader import Reader
-from tests.robot.test_dds_network import ALL, LATCHED, Network, text
+from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
+from idlc.robot.dds.reader import MOST_WAITING, Reader
+from tests.robot.test_dds_network import ALL, LATCHED, PORT, Network, text
 from tests.support.rounds import SEED, rounds
 
 #: A head, from a participant that a test makes known.
@@ -65,22 +66,70 @@ def memory(participant):
 
 @pytest.mark.rounds
 def test_mutated_packets_raise_nothing_and_leave_little():
+    """From a peer, and from a host that never received anything; IDLC_ROUNDS=100 tries 10**7."""
     rng = random.Random(SEED)
     network, packets = conversation()
-    own = network.hosts["10.0.0.1"]
-    begun, slowest = time.process_time(), 0.0
-    for number in range(rounds(20_000)):
+    own, slowest, drawn = network.hosts["10.0.0.1"], 0.0, Counter()
+    for number in range(rounds(100_000)):
         packet = mutated(rng, rng.choice(packets), packets)
+        host = rng.choice(["10.0.0.2", "10.0.0.99"])
+        if host == "10.0.0.99":  # it knows no name of this participant
+            packet = packet.replace(own.prefix, bytes(12))
         before = time.process_time()
-        answers = own.receive(packet, ("10.0.0.2", 7410), network.now)
+        answers = own.receive(packet, (host, 7410), network.now)
         slowest = max(slowest, time.process_time() - before)
-        assert {answer.address[0] for answer in answers} <= {"10.0.0.2"}
+        # nothing goes to an address from which nothing came
+        assert {answer.address[0] for answer in answers} <= {"10.0.0.2", "10.0.0.99"}
+        drawn += Counter(each.prefix for each in answers if each.address[0] == "10.0.0.99")
+        assert sum(len(part) for each in answers for part in each.parts) < 10_000_000
         if number % 100 == 0:
             own.tick(network.now)
             network.now += 0.1
-    assert time.process_time() > begun
     assert slowest < 5
     assert memory(own) < 3000
+    assert own.shared._used.total() < 10_000_000
+    assert 0 < max(drawn.values()) <= MOST_ANNOUNCEMENTS
+
+
+def test_what_a_peer_draws_and_keeps_is_bounded():
+    network, _ = conversation()
+    own = network.hosts["10.0.0.1"]
+    head = HEAD + formats.for_participant(own.prefix)
+    writer = next(
+        end for end in own._ends.values() if end.qos is LATCHED and hasattr(end, "history")
+    )
+    reader = next(iter(writer.readers.values()))
+    # it asks for all large samples, in all packets
+    for _ in range(40):
+        network.write(own, writer, text(7, 2_000_000))
+    missing = [*range(max(1, writer.last - 200), writer.last + 1)]
+    drawn = 0
+    for count in range(1000, 1400):
+        question = formats.format_acknack(reader.id, writer.id, 1, [], count, is_final=False)
+        ask = formats.format_acknack(
+            reader.id, writer.id, missing[0], missing, count + 1000, is_final=False
+        )
+        pieces = formats.format_nack_fragment(
+            reader.id, writer.id, writer.last, [*range(1, 257)], count
+        )
+        answers = own.receive(head + question + ask + pieces, ("10.0.0.2", PORT), network.now)
+        drawn += sum(len(each) for answer in answers for each in answer.parts)
+    assert 1_000_000 < drawn < 10_000_000
+    # it sends the second half of everything
+    far = next(end for end in own._ends.values() if end.qos is ALL and hasattr(end, "writers"))
+    theirs = next(iter(far.writers.values()))
+    for number in range(theirs.next + 1, theirs.next + 4_000):
+        data = formats.format_data(far.id, theirs.id, number, b"", bytes(60_000))
+        own.receive(head + data, ("10.0.0.2", PORT), network.now)
+    for first in range(1, 1000):
+        data = formats.format_fragment(far.id, theirs.id, 9, b"", bytes(60_000), first, 40)
+        own.receive(head + data, ("10.0.0.2", PORT), network.now)
+    assert 10_000_000 < own.shared._used.total() <= MOST_WAITING // 2
+    # and when it goes, all of that goes
+    network.hosts.pop("10.0.0.2")
+    network.run(60)
+    assert own.peers == {}
+    assert own.shared._used == {}
 
 
 def part(kind, body, flags=1):

@@ -34,10 +34,11 @@ class Network:
         self._order = itertools.count()
         self._flying = []
 
-    def add(self, number):
+    def add(self, number, name=0):
+        """Start the participant of a host, in the place of the one that was there."""
         host = f"10.0.0.{number}"
         others = [(f"10.0.0.{other}", PORT) for other in range(1, 9) if other != number]
-        prefix = wire.VENDOR + bytes([number]) * 10
+        prefix = wire.VENDOR + bytes([number]) * 8 + (name or number * 257).to_bytes(2, "big")
         own = Participant(prefix, [(host, PORT)], others, lambda _: self.fragment)
         self.hosts[host] = own
         return own

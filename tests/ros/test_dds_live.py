@@ -161,10 +161,11 @@ def words_in_order(pair):
     pair.node.create_subscription(String, "back", lambda message: words.append(message.data), 1000)
     # either side may know the other one later
     pair.until(lambda: words or publisher.publish(String(data="early")))
-    for number in range(200):
-        publisher.publish(String(data=str(number)))
-    pair.until(lambda: words[-1] == "199")
-    assert [word for word in words if word != "early"] == [str(number) for number in range(200)]
+    sent = [*map(str, range(200)), "of many fragments " * 1000, "end"]
+    for word in sent:
+        publisher.publish(String(data=word))
+    pair.until(lambda: words[-1] == "end")
+    assert [word for word in words if word != "early"] == sent
 
 
 def topics_that_are_latched(pair):
@@ -256,6 +257,8 @@ ON_LOOPBACK = """
 <CycloneDDS><Domain>
   <General>
     <AllowMulticast>false</AllowMulticast>
+    <MaxMessageSize>1400B</MaxMessageSize>
+    <FragmentSize>1300B</FragmentSize>
     <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
   </General>
   <Discovery>

@@ -70,7 +70,9 @@ class Participant:
         for is_writer, ids in discovery.SEDP.items():
             guids = [prefix + each for each in ids]
             announcer = Writer(guids[0], discovery.SEDP_QOS, self.shared)
-            learner = Reader(guids[1], discovery.SEDP_QOS, self._learn, self.shared)
+            learner = Reader(
+                guids[1], discovery.SEDP_QOS, self._learn, self.shared, remembers=False
+            )
             self._ends |= {announcer.id: announcer, learner.id: learner}
             self._announcers[is_writer], self._learners[is_writer] = announcer, learner
         self.move([*addresses])
@@ -319,9 +321,11 @@ class Participant:
             for peer in [*self.peers.values()]:
                 if now - peer.seen > peer.about.lease:
                     self._lose(peer)
+            # a stranger at a searched address is named there, as it may have missed what named it
+            names = {peer.meta: peer.prefix for peer in self.peers.values() if not peer.is_known}
             known = [peer.meta for peer in self.peers.values() if peer.is_known]
             for address in dict.fromkeys((*self._searched, *known)):
-                self._announce(address)
+                self._announce(address, names.get(address, bytes(wire.PREFIX)))
         return self.shared.collect()
 
     @property

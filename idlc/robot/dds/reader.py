@@ -19,6 +19,7 @@ _OVERHEAD = 256
 #: Numbers that a reader asks for at a time, and samples of which it holds fragments.
 _AHEAD = 256
 _MOST_PARTIAL = 8
+_MOST_REMEMBERED = 256
 #: Cyclone DDS as a vendor.
 _CYCLONE = b"\x01\x10"
 
@@ -165,6 +166,8 @@ class Reader:
         qos: QoSProfile,
         deliver: Callable[[Received], None],
         shared: Shared,
+        *,
+        remembers: bool = True,
     ) -> None:
         self.guid = guid
         self.id = guid[wire.PREFIX :]
@@ -173,6 +176,8 @@ class Reader:
         self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         self.writers: dict[bytes, RemoteWriter] = {}
         self._shared = shared
+        #: Where writers go on that were gone for a while, unless this reader begins again.
+        self._remembered: OrderedDict[bytes, int] | None = OrderedDict() if remembers else None
 
     @property
     def is_complete(self) -> bool:
@@ -189,6 +194,8 @@ class Reader:
             return
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         writer = self.writers[guid] = RemoteWriter(guid, address, reliable)
+        if self._remembered:
+            writer.next = self._remembered.pop(guid, None)
         if reliable:
             writer.count += 1
             # 0 asks where to begin; Cyclone DDS calls it malformed
@@ -199,8 +206,13 @@ class Reader:
 
     def unmatch(self, guid: bytes) -> None:
         """Forget a writer."""
-        if (writer := self.writers.pop(guid, None)) is not None:
-            self._release(writer, writer.bytes)
+        if (writer := self.writers.pop(guid, None)) is None:
+            return
+        self._release(writer, writer.bytes)
+        if writer.next is not None and self._remembered is not None:
+            self._remembered[guid] = writer.next
+            if len(self._remembered) > _MOST_REMEMBERED:
+                self._remembered.popitem(last=False)
 
     def close(self) -> None:
         """Forget all writers."""
