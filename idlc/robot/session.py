@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import count
 from threading import Lock
@@ -37,12 +37,13 @@ class Session(AbstractContextManager["Session"]):
     """A connection to a robot, and what its nodes and endpoints share.
 
     Closing it twice, or from another thread, is allowed. `domain` is the ROS_DOMAIN_ID. Tokens
-    contain `id`.
+    contain `id`. `notes` are sentences about variables that idlc does not use.
     """
 
-    def __init__(self, transport: Transport, domain: int) -> None:
+    def __init__(self, transport: Transport, domain: int, notes: Sequence[str] = ()) -> None:
         self.transport = transport
         self.domain = domain
+        self.notes = notes
         self.id = transport.id
         self._ids = count()
         self._lock = Lock()
@@ -99,7 +100,7 @@ def open_session(
         from idlc.robot.dds.transport import DdsTransport
 
         place = parse_place(address or "dds", domain, environ)
-        return Session(DdsTransport(place), place.domain)
+        return Session(DdsTransport(place), place.domain, place.notes)
     path = environ.get("ZENOH_SESSION_CONFIG_URI", "")
     if address:
         path = address.removeprefix(_FILE) if address.startswith(_FILE) else ""

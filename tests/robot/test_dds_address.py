@@ -1,6 +1,10 @@
 """Addresses of DDS: where idlc searches, and that nothing leaves this machine by itself."""
 
+import os
+import re
 import socket
+import subprocess
+import sys
 
 import pytest
 
@@ -8,6 +12,7 @@ from idlc.project.find import is_address
 from idlc.robot.dds.address import PARTICIPANTS, open_sockets, own_hosts, parse_place, searched
 from idlc.robot.errors import RobotError
 from idlc.robot.session import open_session
+from tests.support.domains import held_domain
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 ONLY = "ROS_LOCALHOST_ONLY"
@@ -26,6 +31,7 @@ LOCAL = "127.0.0.1"
         ("dds", {RANGE: "OFF"}, 0, (), False),
         ("dds/192.0.2.1", {}, 0, (LOCAL, "192.0.2.1"), False),
         ("dds:3/192.0.2.1", {RANGE: "OFF"}, 3, ("192.0.2.1",), False),
+        ("dds", {PEERS: "192.0.2.1", RANGE: "OFF"}, 0, (), False),
         ("dds", {PEERS: "192.0.2.1; 192.0.2.2;"}, 0, (LOCAL, "192.0.2.1", "192.0.2.2"), False),
         ("dds", {ONLY: "1", RANGE: "SUBNET", PEERS: "192.0.2.1"}, 0, (LOCAL,), False),
     ],
@@ -54,6 +60,11 @@ def test_a_place_follows_the_address_and_the_variables_of_ros(
         ("dds:7x", {}, "`dds:7x` is not an address of DDS"),
         ("dds:233", {}, "`233` is not a domain (set ROS_DOMAIN_ID to 0)"),
         ("dds", {"ROS_DOMAIN_ID": "-1"}, "`-1` is not a domain"),
+        (
+            "dds",
+            {"ROS_SECURITY_STRATEGY": "Enforce"},
+            "idlc does not support DDS-Security (unset ROS_SECURITY_STRATEGY",
+        ),
         ("dds", {RANGE: "ALL"}, "ROS_AUTOMATIC_DISCOVERY_RANGE is `ALL` (write SUBNET"),
     ],
 )
@@ -65,8 +76,25 @@ def test_what_is_no_address_is_one_sentence(address, environ, message):
 
 
 def test_variables_that_idlc_does_not_use_are_noted():
-    place = parse_place("dds", None, {"CYCLONEDDS_URI": "x", "ROS_DISCOVERY_SERVER": ""})
-    assert place.notes == ("idlc does not use CYCLONEDDS_URI",)
+    environ = {"CYCLONEDDS_URI": "x", "ROS_DISCOVERY_SERVER": "", "ROS_SECURITY_ENABLE": "true"}
+    place = parse_place("dds", None, environ)
+    assert place.notes == (
+        "idlc does not use CYCLONEDDS_URI",
+        "idlc does not use ROS_SECURITY_ENABLE",
+    )
+    assert "; ".join(place.notes) in nodes_stderr(environ)
+
+
+def nodes_stderr(environ):
+    """Return what a program prints that creates a node."""
+    program = "from idlc.robot import Node, init\nwith init(): Node('a').destroy_node()"
+    with held_domain() as domain:
+        environ = {**os.environ, **environ, "ROS_DOMAIN_ID": str(domain)}
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environ, capture_output=True, text=True, check=True
+        )
+    warnings = re.findall(r"\[WARN\] \[[\d.]+\] \[idlc\]: (.*)", done.stderr)
+    return "; ".join(warnings)
 
 
 def test_a_participant_listens_on_loopback_and_each_on_a_port_of_its_own():

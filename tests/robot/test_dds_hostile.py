@@ -66,7 +66,7 @@ def memory(participant):
 
 @pytest.mark.rounds
 def test_mutated_packets_raise_nothing_and_leave_little():
-    """From a peer, and from a host that never received anything; IDLC_ROUNDS=100 tries 10**7."""
+    """From a peer, and from a host that never received anything; IDLC_ROUNDS=100 is 10**7."""
     rng = random.Random(SEED)
     network, packets = conversation()
     own, slowest, drawn = network.hosts["10.0.0.1"], 0.0, Counter()

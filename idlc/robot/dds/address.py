@@ -26,7 +26,13 @@ _FRAGMENTS = (60_000, 8_192, 1_344)
 _BUFFER = 4 << 20
 _RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT", "NOT_SET", "")
 #: Variables that other implementations of DDS honour, and idlc does not.
-_IGNORED = ("ROS_DISCOVERY_SERVER", "CYCLONEDDS_URI", "FASTRTPS_DEFAULT_PROFILES_FILE")
+_IGNORED = (
+    "ROS_DISCOVERY_SERVER",
+    "CYCLONEDDS_URI",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "ROS_SECURITY_ENABLE",
+)
 _MOST_STATIC = 16
 #: Linux's question for the address of a network interface.
 _SIOCGIFADDR = 0x8915
@@ -67,6 +73,11 @@ def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) ->
     peers = environ.get("ROS_STATIC_PEERS", "").split(";")
     if environ.get("ROS_LOCALHOST_ONLY", "").strip() == "1":
         range_, peers = "LOCALHOST", []
+    if range_ == "OFF":
+        peers = []
+    if environ.get("ROS_SECURITY_STRATEGY") == "Enforce":
+        hint = "unset ROS_SECURITY_STRATEGY to send messages that are neither encrypted nor signed"
+        raise RobotError("idlc does not support DDS-Security", hint)
     hosts = [] if range_ == "OFF" else [_LOOPBACK]
     names = [*filter(None, map(str.strip, peers))][:_MOST_STATIC]
     hosts += map(_resolved, [*names, *filter(None, [match[2]])])

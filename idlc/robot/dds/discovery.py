@@ -91,7 +91,6 @@ class Peer:
         self.about = about
         self.host = host
         self.seen = now
-        self.announced = 0
         self.is_known = False
         self.endpoints: dict[bytes, Endpoint] = {}
 

@@ -8,7 +8,7 @@ IP address that its own packets came from, as an announced one may belong to som
 
 from __future__ import annotations
 
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
@@ -21,6 +21,7 @@ MOST_PEERS = 256
 MOST_ANNOUNCEMENTS = 3
 #: Announcements to strangers between two of the periodic ones, whatever names they use.
 MOST_GREETINGS = 256
+_MOST_GREETED = 4096
 MOST_ENDPOINTS, MOST_OF_ALL = 4096, 2**15
 #: Ends of own endpoints that late participants are still told of.
 _ENDS = 256
@@ -64,6 +65,9 @@ class Participant:
         self._removed: deque[tuple[Writer, int]] = deque()
         self._periods = iter(_PERIODS)
         self._announce_at = 0.0
+        #: The announcements that strangers got, those that are gone included, and their number
+        #: since the last periodic one.
+        self._greeted: OrderedDict[bytes, int] = OrderedDict()
         self._greetings = 0
         self._announcers: dict[bool, Writer] = {}
         self._learners: dict[bool, Reader] = {}
@@ -218,11 +222,14 @@ class Participant:
 
     def _greet(self, peer: Peer) -> None:
         """Announce this participant to one that does not know it yet, not for ever."""
-        is_over = peer.announced >= MOST_ANNOUNCEMENTS or self._greetings >= MOST_GREETINGS
-        if not (peer.is_known or is_over):
-            peer.announced += 1
-            self._greetings += 1
-            self._announce(peer.meta, peer.prefix)
+        count = self._greeted.get(peer.prefix, 0)
+        if peer.is_known or count >= MOST_ANNOUNCEMENTS or self._greetings >= MOST_GREETINGS:
+            return
+        self._greeted[peer.prefix] = count + 1
+        if len(self._greeted) > _MOST_GREETED:
+            self._greeted.popitem(last=False)
+        self._greetings += 1
+        self._announce(peer.meta, peer.prefix)
 
     def _announce(self, address: Address, prefix: bytes = bytes(wire.PREFIX)) -> None:
         self._send(address, prefix, self._edition, b"", self._announcement)
@@ -238,6 +245,7 @@ class Participant:
     def _know(self, peer: Peer) -> None:
         """Exchange endpoints with a peer that has named this participant."""
         peer.is_known = True
+        self._greeted.pop(peer.prefix, None)
         for writer, reader in discovery.SEDP.values():
             self._ends[writer].match(peer.prefix + reader, peer.meta, discovery.SEDP_QOS)
             self._ends[reader].match(peer.prefix + writer, peer.meta, discovery.SEDP_QOS)

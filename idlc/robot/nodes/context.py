@@ -14,6 +14,7 @@ from weakref import WeakSet
 
 from idlc.robot.errors import RobotError
 from idlc.robot.nodes.arguments import Arguments, parse_arguments
+from idlc.robot.nodes.logger import get_logger
 from idlc.robot.session import Session, open_session
 
 
@@ -67,6 +68,8 @@ class Context(AbstractContextManager["Context"]):
                 raise RobotError("the context is not initialized", "call `idlc.robot.init()` first")
             if self._session is None:
                 self._session = open_session(self._address)
+                for note in self._session.notes:
+                    get_logger("idlc").warning(note)
                 # tokens go at once, and no thread of the transport calls a program that ends
                 atexit.register(self.shutdown)
             return self._session
