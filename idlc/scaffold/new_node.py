@@ -27,7 +27,9 @@ from idlc.scaffold.spec import Plan, plan
 MANIFEST = "package.xml"
 SETUP = "setup.py"
 SETUP_FILES = ("pyproject.toml", "setup.cfg", SETUP)
-CONFTEST = "test/conftest.py"
+TESTS = "test"
+#: Tests of robust nodes have fixtures of their own.
+ROBUST_TESTS = "test/robust"
 LAUNCH_ENDING = "launch.py"
 
 
@@ -48,7 +50,8 @@ def paths(package: str, launch_files: Iterable[str]) -> list[str]:
     usual = [f"{package}_launch.py", f"{package}.launch.py"]
     chosen = listed if len(listed) == 1 else [name for name in usual if name in listed]
     launch_file = f"launch/{next(iter(chosen), usual[0])}"
-    return [*SETUP_FILES, MANIFEST, CONFTEST, f"{package}/__init__.py", launch_file]
+    shared = [f"{folder}/conftest.py" for folder in (TESTS, ROBUST_TESTS)]
+    return [*SETUP_FILES, MANIFEST, *shared, f"{package}/__init__.py", launch_file]
 
 
 def node_entry(
@@ -82,8 +85,10 @@ def node_entry(
     edits: dict[str, Outcome] = {path: outcome, MANIFEST: manifest}
     # files that nodes need beside them
     added = {} if f"{node.package}/__init__.py" in texts else {f"{node.package}/__init__.py": ""}
-    if CONFTEST not in texts:
-        added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja")
+    conftest = f"{_tests(planned)}/conftest.py"
+    if conftest not in texts:
+        template = f"node/{'short/' if planned.short else ''}conftest.py.jinja"
+        added[conftest] = rendered_for(node.package, template)
     if not launch:
         return Entry(added, edits)
     file = next((name for name in texts if name.startswith("launch/")), "")
@@ -103,6 +108,11 @@ def node_entry(
     return Entry({**added, path: started.text}, edits)
 
 
+def _tests(planned: Plan) -> str:
+    """Return the folder of the node's test."""
+    return TESTS if planned.short else ROBUST_TESTS
+
+
 def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
     project = changes.find_package(settings, report)
@@ -117,7 +127,7 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     with stage("scaffold", name):
         files = {
             f"{own}/{name}.py": render(planned),
-            f"test/test_{name}.py": render_test(planned),
+            f"{_tests(planned)}/test_{name}.py": render_test(planned),
         }
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)

@@ -92,6 +92,7 @@ def options(chance: random.Random) -> list[str]:
     for name in chance.sample(WORDS, chance.choice([0, 0, 1, 2])):
         value = chance.choice(["bool=true", "int=-3", "double=1e-3", "string=a'b", "int[]=1,2"])
         words += ["--param", f"{name}:{value}"]
+    words += ["--robust"] * (chance.random() < 0.4)
     return words + ["--lifecycle"] * (chance.random() < 0.25)
 
 

@@ -74,7 +74,7 @@ def test_colcon_builds_it_and_compiles_its_interfaces(name, scaffolded, tmp_path
     said = run_with(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(site))
     assert ("Drive" if name == "demo" else "RobotCommand") in said
     commands = {path.name for path in (prefix / "lib" / name).iterdir()}
-    tests = {path.stem.removeprefix("test_") for path in package.glob("test/test_*")}
+    tests = {path.stem.removeprefix("test_") for path in package.glob("test/**/test_*")}
     assert commands == tests - {"interfaces", "style"}
 
 

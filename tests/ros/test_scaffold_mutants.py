@@ -1,6 +1,6 @@
 """The generated test of a node notices what a person, or a changed interface, breaks in the node.
 
-Each mutant is a generated node with one thing broken. Its test must fail, and show what the node
+Each mutant is a generated robust node with one thing broken. Its test must fail, and show what the node
 printed. `make test-long` takes every sixth mutant, `make fuzz` all of them.
 """
 
@@ -169,7 +169,7 @@ def package(tmp_path_factory) -> Path:
         assert main(["scaffold", "package", "demo"]) == 0
         os.chdir("demo")
         for name, words in NODES.items():
-            assert main(["scaffold", "node", f"{name}_node", *words]) == 0
+            assert main(["scaffold", "node", f"{name}_node", "--robust", *words]) == 0
     finally:
         os.chdir(here)
     return folder / "demo"
@@ -177,8 +177,8 @@ def package(tmp_path_factory) -> Path:
 
 def run(package: Path, folder: Path, node: str, change: tuple[str, str]) -> tuple[int, str]:
     """Return the status of a node's test after a change, and what it printed."""
-    module, test = f"demo/{node}_node.py", f"test/test_{node}_node.py"
-    for path in ("demo/__init__.py", module, "test/conftest.py", test):
+    module, test = f"demo/{node}_node.py", f"test/robust/test_{node}_node.py"
+    for path in ("demo/__init__.py", module, "test/robust/conftest.py", test):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(package / path, folder / path)
     text = (folder / module).read_text()
@@ -187,10 +187,10 @@ def run(package: Path, folder: Path, node: str, change: tuple[str, str]) -> tupl
         head = "from __future__ import annotations\n"
         text = text.replace(*change)
         (folder / module).write_text(text.replace(head, f"{head}import sys\nprint('{MARK}')\n", 1))
-        conftest = (folder / "test/conftest.py").read_text()
+        conftest = (folder / "test/robust/conftest.py").read_text()
         shorter = conftest.replace("PATIENCE = 20.0", f"PATIENCE = {PATIENCE}")
         assert shorter != conftest
-        (folder / "test/conftest.py").write_text(shorter)
+        (folder / "test/robust/conftest.py").write_text(shorter)
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
     plain = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     return programs.ended(*command, cwd=folder, environment={**os.environ, **plain})
