@@ -409,7 +409,9 @@ def _tested(planned: Plan) -> tuple[tuple[Part, ...], Mapping[str, set[str]]]:
     node = planned.node
     page = Page(planned.messages, taken=_TAKEN_BY_TESTS)
     parts = [
-        _part(placed, page, planned.short)._replace(name=Code(repr(placed.endpoint.topic.replace("~", node.name))))
+        _part(placed, page, planned.short)._replace(
+            name=Code(repr(placed.endpoint.topic.replace("~", node.name)))
+        )
         for placed in planned.endpoints
     ]
     imports = defaultdict(set, page.imports())

@@ -1,7 +1,7 @@
 """The generated test of a node notices what a person, or a changed interface, breaks in the node.
 
-Each mutant is a generated robust node with one thing broken. Its test must fail, and show what the node
-printed. `make test-long` takes every sixth mutant, `make fuzz` all of them.
+Each mutant is a generated robust node with one thing broken. Its test must fail, and show what the
+node printed. `make test-long` takes every sixth mutant, `make fuzz` all of them.
 """
 
 import os
