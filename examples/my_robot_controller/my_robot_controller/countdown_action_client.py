@@ -43,10 +43,12 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         node = CountdownActionClient()
-        node.send_countdown_goal(Countdown.Goal(
-            # Where to start counting down
-            target_count=5,
-        ))
+        node.send_countdown_goal(
+            Countdown.Goal(
+                # Where to start counting down
+                target_count=5,
+            ),
+        )
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:

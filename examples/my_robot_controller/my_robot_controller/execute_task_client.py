@@ -43,10 +43,12 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         node = ExecuteTaskClient()
-        node.send_execute_task_goal(ExecuteTask.Goal(
-            # The task to execute, e.g. "dock"
-            task_name='dock',
-        ))
+        node.send_execute_task_goal(
+            ExecuteTask.Goal(
+                # The task to execute, e.g. "dock"
+                task_name='dock',
+            ),
+        )
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:
