@@ -1,4 +1,4 @@
-"""Results as lines for the terminal and as tables for docs/."""
+"""Results as lines for the terminal and as tables for documents."""
 
 import re
 from collections.abc import Collection, Iterable
@@ -109,8 +109,8 @@ def factor(ratio: float) -> str:
 
 #: Each document, and the function for its text between `<!-- benchmarks -->` and `<!-- end -->`.
 PARTS = {
-    ROOT / "docs" / "performance.md": full_table,
-    ROOT / "docs" / "recorded-data.md": recordings_table,
+    ROOT / "benchmarks" / "performance.md": full_table,
+    ROOT / "benchmarks" / "recordings.md": recordings_table,
     ROOT / "docs" / "fields.md": fields_table,
 }
 PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=<!-- end -->)", re.DOTALL)

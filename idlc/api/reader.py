@@ -9,29 +9,24 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import lru_cache
 from operator import attrgetter
-from types import SimpleNamespace
-from typing import Any, NoReturn, TypeAlias, overload
+from typing import Any, TypeAlias, overload
 
 from idlc import runtime
-from idlc.generate.python.reader import (
-    PathError,
-    Wanted,
-    is_time,
-    reader_source,
-    wanted_values,
-)
+from idlc.generate.python.reader import Path, PathError, PathStep, is_time, paths_of, reader_source
 from idlc.model import ir
 from idlc.model.from_description import message_of
-from idlc.runtime.cdr import NATIVE, order_of
+from idlc.runtime.cdr import NATIVE
 from idlc.runtime.checked import validate_count, validate_element
-from idlc.runtime.codec import FAILURES, READINGS, maker, text_of_view
+from idlc.runtime.codec import FAILURES, READINGS, deserialize, maker, text_of_view
 from idlc.runtime.names import DecodeError, ValidationError, owner_of, slot_name
-from idlc.runtime.typeinfo import CarefulReader, FieldInfo, Structure, structure_of
+from idlc.runtime.typeinfo import FieldInfo, Structure, structure_of
 from idlc.wire.layout import Messages
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 #: Readers that are kept: a program has a few, and those of a server's users are not endless.
 MOST = 256
+#: From this size on, slices of bytes take longer than those of a view.
+_LARGE = 1 << 13
 
 
 @overload
@@ -72,62 +67,78 @@ def field_reader(
     kind: type, paths: tuple[str, ...], nanoseconds: bool = False, asks: bool = False
 ) -> Callable[[Buffer], Any]:
     """Return the function; one that `asks` raises Absent for an element that does not exist."""
-    return _Type(kind).reader(paths, nanoseconds=nanoseconds, asks=asks)
+    owner = _Type(kind)
+    return owner.reader(owner.paths(paths), nanoseconds=nanoseconds, asks=asks)
 
 
-def type_at(kind: type, path: str) -> ir.FieldType:
+def type_at(kind: type, text: str) -> ir.FieldType:
     """Return the type of the single value at a path, or of a time; raise PathError for others."""
     owner = _Type(kind)
-    node = wanted_values((path,), owner.message, owner.messages)
-    while not node.numbers:
-        if None in node.elements:
-            raise PathError(f"`{path}` leads to many values: give an index such as `[0]`")
-        (node,) = (*node.fields.values(), *node.elements.values())
-    if isinstance(node.type, (ir.Primitive, ir.String)) or is_time(node.type, owner.messages):
-        return node.type
-    raise PathError(f"`{path}` is not a single value: give the path of a number or a string")
+    (path,) = owner.paths((text,))
+    if path.has_many:
+        raise PathError(f"`{text}` leads to many values: give an index such as `[0]`")
+    if isinstance(path.type, (ir.Primitive, ir.String)) or is_time(path.type, owner.messages):
+        return path.type
+    raise PathError(f"`{text}` is not a single value: give the path of a number or a string")
 
 
 class _Type:
     """The type of a generated class, for readers."""
 
     def __init__(self, kind: type) -> None:
-        owner: Any = owner_of(kind)
-        self.structure: Structure = structure_of(owner)
+        self.owner: Any = owner_of(kind)
+        self.structure: Structure = structure_of(self.owner)
         # each package may have a runtime of its own, and its errors
-        own_runtime = sys.modules[owner.__base__.__module__.rpartition(".")[0]]
+        own_runtime = sys.modules[self.owner.__base__.__module__.rpartition(".")[0]]
         self.error: type[DecodeError] = own_runtime.DecodeError
         self.validation_error: type[ValidationError] = own_runtime.ValidationError
+        self.name = ir.TypeName.parse(self.structure.name)
         self.messages: Messages = dict(_messages(self.structure))
-        self.message = self.messages[ir.TypeName.parse(self.structure.name)]
+
+    def paths(self, texts: tuple[str, ...]) -> tuple[Path, ...]:
+        """Return what texts mean in the type; raise PathError if some lead nowhere."""
+        return paths_of(texts, self.messages[self.name], self.messages)
 
     def reader(
         self,
-        paths: tuple[str, ...],
+        paths: tuple[Path, ...],
         *,
         nanoseconds: bool = False,
         positions: bool = False,
         asks: bool = False,
     ) -> Callable[[Buffer], Any]:
-        """Return the function that reads values, or their `positions`, and tells byte orders."""
-        wanted = wanted_values(paths, self.message, self.messages)
-        text = reader_source(
-            wanted, len(paths), self.messages, nanoseconds=nanoseconds, positions=positions
-        )
+        """Return the function that reads values, or a tuple of their `positions`."""
 
         def absent(number: int, count: int, offset: int) -> Exception:
             if asks:
                 return Absent()
             problem = f"there is no such element, the list has {count}"
-            return self.error(problem, paths[number], offset)
+            return self.error(problem, paths[number].text, offset)
 
+        def slow(buffer: Buffer) -> Any:
+            """Read what middlewares accept, but the statements do not; or raise the DecodeError."""
+            message = deserialize(self.owner, bytes(buffer))
+            if positions:
+                raise self.error("a field of this message cannot be located")
+            values = []
+            for number, path in enumerate(paths):
+                times = nanoseconds and is_time(path.type, self.messages)
+                try:
+                    values.append(_value_at(message, path.parts, _nanoseconds if times else _view))
+                except _TooShort as error:
+                    raise absent(number, error.args[0], 0) from None
+            return values[0] if len(values) == 1 else tuple(values)
+
+        text = reader_source(
+            self.name, paths, self.messages, nanoseconds=nanoseconds, positions=positions
+        )
         namespace: dict[str, Any] = {
             "_idlc": runtime,
             "reading": READINGS[text_of_view, True],
             "maker_of": lambda name: maker(self.structure.types[name].find_class()),
             "dtype": _dtype,
-            "NATIVE": NATIVE,
-            "swapped": _swapped,
+            "words_of": _words_of,
+            "pass_texts": _pass_texts,
             "DecodeError": self.error,
             "FAILURES": FAILURES,
             "absent": absent,
@@ -141,8 +152,6 @@ class _Type:
 
             namespace["_arrays"] = arrays
         exec(text, namespace)  # noqa: S102 - made of the type's plan, not of the paths' text
-        careful = _Careful(self, wanted, len(paths), nanoseconds, absent)
-        slow = careful.refuse if positions else careful.read
         big = namespace["make"](">", 0, slow, slow)
         fast: Callable[[Buffer], Any] = namespace["make"]("<", 256, big, slow)
         return fast
@@ -160,6 +169,9 @@ def _messages(structure: Structure) -> Iterator[tuple[ir.TypeName, ir.Message]]:
             yield message.name, message
 
 
+# parts of readers
+
+
 def _dtype(order: str, name: str) -> Any:
     import numpy as np
 
@@ -167,94 +179,60 @@ def _dtype(order: str, name: str) -> Any:
     return kind.newbyteorder(order)
 
 
-def _swapped(words: memoryview) -> Any:
+def _words_of(data: Buffer, limit: int, order: str) -> Any:
+    """Return the words of a buffer, among which are the sizes of strings."""
+    words = memoryview(data)[: limit & -4].cast("I")
+    if order == NATIVE:
+        return words
     swapped = array("I", words.tobytes())
     swapped.byteswap()
     return swapped
 
 
-class _Careful:
-    """Reads what the fast function refuses as `deserialize` does, up to the last wanted field."""
-
-    def __init__(
-        self,
-        type_: _Type,
-        wanted: Wanted,
-        count: int,
-        nanoseconds: bool,
-        absent: Callable[[int, int, int], Exception],
-    ) -> None:
-        self.type = type_
-        self.wanted = wanted
-        self.count = count
-        self.nanoseconds = nanoseconds
-        self.absent = absent
-
-    def read(self, buffer: Buffer) -> Any:
-        """Return the values; raise the DecodeError of the class's package."""
-        results = self.values(self.wanted, self.message(bytes(buffer)))
-        values = tuple(results[number] for number in range(self.count))
-        return values[0] if self.count == 1 else values
-
-    def refuse(self, buffer: Buffer) -> NoReturn:
-        """Raise the DecodeError that says why there is no position."""
-        self.message(bytes(buffer))
-        raise self.type.error("a field of this message cannot be located")
-
-    def message(self, data: bytes) -> SimpleNamespace:
-        """Return the fields up to the last that is wanted."""
-        message, missing = SimpleNamespace(), set(self.wanted.fields)
-        try:
-            careful = CarefulReader(data, order_of(data), self.make)
-            for field in self.type.structure.fields:
-                if not missing:
-                    break
-                setattr(message, field.slot, careful.field(field, field.public, message))
-                missing.discard(field.name)
-        except DecodeError as error:
-            raise self.type.error(error.problem, error.path, error.offset) from error
-        return message
-
-    def make(self, structure: Structure) -> Any:
-        """Return an empty message; its package may be missing if none of its messages is wanted."""
-        if _has_messages(self.wanted):
-            return maker(structure.find_class())()
-        return SimpleNamespace()
-
-    def values(self, wanted: Wanted, value: Any) -> dict[int, Any]:
-        """Return what is wanted of a value."""
-        results = dict.fromkeys(wanted.numbers, self.result(wanted.type, value))
-        for name, inner in wanted.fields.items():
-            results |= self.values(inner, getattr(value, slot_name(name)))
-        for index, inner in wanted.elements.items():
-            elements = value.tolist() if hasattr(value, "tolist") else value
-            if index is None:
-                rows = [self.values(inner, element) for element in elements]
-                for number in inner.all_numbers():
-                    results[number] = [row[number] for row in rows]
-            elif -len(elements) <= index < len(elements):
-                results |= self.values(inner, elements[index])
-            else:
-                raise self.absent(min(inner.all_numbers()), len(elements), 0)
-        return results
-
-    def result(self, type_: ir.FieldType, value: Any) -> Any:
-        """Return a value as the fast function does."""
-        if self.nanoseconds and is_time(type_, self.type.messages):
-            return value.sec * 10**9 + value.nanosec
-        if hasattr(value, "tolist"):
-            import numpy as np
-
-            value = np.asarray(value)
-            value.flags.writeable = False
-        return value
+def _pass_texts(words: Any, start: int, count: int) -> int:
+    """Return the end of strings: of all but the last, the next begins at a multiple of four."""
+    if not count:
+        return start
+    word = start >> 2
+    for _ in range(count - 1):
+        word += words[word] + 7 >> 2
+    end: int = 4 * word + 4 + words[word]
+    return end
 
 
-def _has_messages(wanted: Wanted) -> bool:
-    """Return whether values that are wanted are, or hold, messages."""
-    type_ = wanted.type.element if isinstance(wanted.type, (ir.Array, ir.Sequence)) else wanted.type
-    inner = (*wanted.fields.values(), *wanted.elements.values())
-    return (isinstance(type_, ir.Ref) and bool(wanted.numbers)) or any(map(_has_messages, inner))
+class _TooShort(Exception):  # noqa: N818 - an answer, too
+    """A list has only so many elements."""
+
+
+def _value_at(value: Any, parts: tuple[PathStep, ...], finish: Callable[[Any], Any]) -> Any:
+    """Return what is at a path of a message."""
+    for place, (name, index) in enumerate(parts, 1):
+        value = getattr(value, slot_name(name))
+        if index is None:
+            continue
+        elements = value.tolist() if hasattr(value, "tolist") else value
+        if index == "*":
+            return [_value_at(element, parts[place:], finish) for element in elements]
+        assert isinstance(index, int)
+        if not -len(elements) <= index < len(elements):
+            raise _TooShort(len(elements))
+        value = elements[index]
+    return finish(value)
+
+
+def _nanoseconds(value: Any) -> int:
+    nanoseconds: int = value.sec * 10**9 + value.nanosec
+    return nanoseconds
+
+
+def _view(value: Any) -> Any:
+    """Return a value as a reader does: numbers of a list are a view that cannot be written."""
+    if hasattr(value, "tolist"):
+        import numpy as np
+
+        value = np.asarray(value)
+        value.flags.writeable = False
+    return value
 
 
 # replacing fields
@@ -273,94 +251,114 @@ def patch(kind: type, data: Buffer, changes: Mapping[str, Any]) -> bytes:
     if not changes:
         return bytes(data)
     patcher = _patcher(kind, tuple(changes))
-    view = memoryview(data).cast("B")
-    places = patcher.locate(view)
-    structs = patcher.structs["<" if view[1] else ">"]
-    values = [
-        numbers
-        for (path, field), value in zip(patcher.fields.items(), changes.values(), strict=True)
-        for numbers in patcher.numbers(path, field, value)
-    ]
-    end = 0
-    for path, layout, place in zip(patcher.paths, structs, places, strict=True):
-        end = max(end, place + layout.size)
-        if end > len(view):
-            raise patcher.type.error(f"{layout.size} bytes expected", path, place)
+    if type(data) is not bytes:
+        data = memoryview(data).cast("B")
+    places = patcher.locate(data)
+    view = data if len(data) < _LARGE else memoryview(data)
+    end = max(places) + patcher.longest
     head = bytearray(view[:end])
     try:
-        for layout, place, numbers in zip(structs, places, values, strict=True):
-            layout.pack_into(head, place, *numbers)
+        numbers: list[Any] = []
+        for field, value in zip(patcher.fields, changes.values()):  # noqa: B905 # as many
+            numbers += field.numbers(value)
+        runs = patcher.runs[data[1]]
+        for place, (pack_into, chosen) in zip(places, runs):  # noqa: B905 # as many
+            pack_into(head, place, *numbers[chosen])
     except (struct.error, OverflowError):
-        for (path, field), value in zip(patcher.fields.items(), changes.values(), strict=True):
-            patcher.checked(path, field, value)
-        raise
+        for field, value in zip(patcher.fields, changes.values(), strict=True):
+            field.checked(value)
+        raise patcher.error("the message ends before a field", "", len(data)) from None
     return b"".join((head, view[end:]))
 
 
 @lru_cache(MOST)
-def _patcher(kind: type, paths: tuple[str, ...]) -> _Patcher:
-    return _Patcher(_Type(kind), paths)
+def _patcher(kind: type, texts: tuple[str, ...]) -> _Patcher:
+    return _Patcher(_Type(kind), texts)
 
 
 class _Patcher:
-    """Where fields are, and which numbers a value for them consists of."""
+    """The fields to replace, and the runs of numbers without a gap that they consist of."""
 
-    def __init__(self, type_: _Type, paths: tuple[str, ...]) -> None:
+    def __init__(self, type_: _Type, texts: tuple[str, ...]) -> None:
+        self.error = type_.error
+        type_.paths(texts)
+        self.fields = [_Field(type_, text) for text in texts]
+        starts, count, self.longest = [], 0, 0
+        #: By the byte order of a message: what writes a run, and which of all numbers are in it.
+        self.runs: tuple[list[tuple[Callable[..., None], slice]], ...] = [], []
+        for field in self.fields:
+            for leaf, codes, length in field.runs:
+                starts.append(leaf)
+                for order, runs in zip("><", self.runs, strict=True):
+                    layout = struct.Struct(order + codes)
+                    runs.append((layout.pack_into, slice(count, count + length)))
+                    self.longest = max(self.longest, layout.size)
+                count += length
+        self.locate = type_.reader(type_.paths(tuple(starts)), positions=True)
+
+
+class _Field:
+    """A field that can be replaced: its numbers, and where runs of them begin."""
+
+    def __init__(self, type_: _Type, path: str) -> None:
         self.type = type_
-        wanted_values(paths, type_.message, type_.messages)
-        self.fields = {path: self.field(path) for path in paths}
-        leaves = [
-            leaf for path, field in self.fields.items() for leaf in _leaves(path, path, field)
-        ]
-        self.paths = tuple(path for path, _ in leaves)
-        self.structs = {
-            order: [struct.Struct(order + code) for _, code in leaves] for order in "<>"
-        }
-        #: What takes the numbers of a message, where a Struct checks them all.
-        self.getters: dict[str, Callable[[Any], tuple[Any, ...]]] = {}
-        for path in paths:
-            inner = [(leaf, code) for leaf, code in leaves if leaf.startswith(f"{path}.")]
-            if len(inner) > 1 and all(code[0] == "1" and code != "1?" for _, code in inner):
-                ends = (leaf.removeprefix(f"{path}.").split(".") for leaf, _ in inner)
-                slots = (".".join(map(slot_name, end)) for end in ends)
-                self.getters[path] = attrgetter(*slots)
-        locate = type_.reader(self.paths, positions=True)
-        self.locate = locate if len(leaves) > 1 else lambda data: (locate(data),)
-
-    def field(self, path: str) -> FieldInfo:
-        """Return the field at the end of a path."""
-        structure: Structure | None = self.type.structure
+        self.path = path
+        structure: Structure | None = type_.structure
         for part in path.split("."):
             assert structure is not None
             name = part.partition("[")[0]
-            field = next(field for field in structure.fields if field.name == name)
-            structure = field.nested
-        return field
+            self.field = next(field for field in structure.fields if field.name == name)
+            structure = self.field.nested
+        leaves = [*_leaves(path, path, self.field)]
+        self.is_time = structure is not None and _is_time(structure)
+        #: The path of the first, the codes, and how many numbers there are.
+        self.runs: list[tuple[str, str, int]] = []
+        first, size = 0, 0
+        for leaf, count, code in leaves:
+            unit = struct.calcsize(f"={code}")
+            if unit <= first and size % unit == 0:  # so there is no padding
+                start, codes, length = self.runs.pop()
+                self.runs.append((start, f"{codes}{count}{code}", length + count))
+            else:
+                self.runs.append((leaf, f"{count}{code}", count))
+                first, size = unit, 0
+            size += count * unit
+        #: Takes the numbers of a message, where a Struct checks them all.
+        self.getter: Callable[[Any], Any] | None = None
+        inner = [leaf.removeprefix(f"{path}.").split(".") for leaf, _, _ in leaves]
+        if len(leaves) > 1 and all(code != "?" and count == 1 for _, count, code in leaves):
+            self.getter = attrgetter(*(".".join(map(slot_name, names)) for names in inner))
 
-    def numbers(self, path: str, field: FieldInfo, value: Any) -> list[tuple[Any, ...]]:
+    def numbers(self, value: Any) -> Any:
         """Return the numbers of a value; those that a Struct checks are not checked before."""
-        getter = self.getters.get(path)
-        if getter is not None and hasattr(type(value), "_fields_and_field_types"):
-            with suppress(AttributeError):  # a message of another type
-                return [(number,) for number in getter(value)]
-        if field.is_numeric and type(value) in (int, float):
-            return [(value,)]
-        return self.checked(path, field, value)
+        if type(value) in (int, float):
+            if self.field.is_numeric:
+                return (value,)
+            if self.is_time and type(value) is int:
+                return divmod(value, 10**9)
+        elif self.getter is not None:
+            with suppress(AttributeError):  # not a message
+                return self.getter(value)
+        return self.checked(value)
 
-    def checked(self, path: str, field: FieldInfo, value: Any) -> list[tuple[Any, ...]]:
+    def checked(self, value: Any) -> list[Any]:
         """Return the numbers; raise the ValidationError of the class's package."""
         try:
-            return list(_numbers(path, field, value))
+            return [*_numbers(self.path, self.field, value)]
         except ValidationError as error:
             raise error.at(error.path, self.type.validation_error) from None
+
+
+def _is_time(structure: Structure) -> bool:
+    return [field.name for field in structure.fields] == ["sec", "nanosec"]
 
 
 def _is_whole_list(path: str, field: FieldInfo) -> bool:
     return field.is_list and not path.endswith("]")
 
 
-def _leaves(whole: str, path: str, field: FieldInfo) -> Iterator[tuple[str, str]]:
-    """Yield the path of each number or array that a field consists of, and its code."""
+def _leaves(whole: str, path: str, field: FieldInfo) -> Iterator[tuple[str, int, str]]:
+    """Yield the path of each number or array that a field consists of, the count and its code."""
     is_list = _is_whole_list(path, field)
     is_empty = field.nested is not None and not field.nested.fields
     if "*" in path or field.text or is_empty or (is_list and (field.is_sequence or field.nested)):
@@ -371,38 +369,36 @@ def _leaves(whole: str, path: str, field: FieldInfo) -> Iterator[tuple[str, str]
             yield from _leaves(whole, f"{path}.{inner.name}", inner)
         return
     assert field.primitive is not None
-    yield path, f"{field.size if is_list else 1}{field.primitive.code}"
+    yield path, (field.size or 1) if is_list else 1, field.primitive.code
 
 
-def _numbers(path: str, field: FieldInfo, value: Any) -> Iterator[tuple[Any, ...]]:
-    """Yield the numbers of each leaf of a field."""
+def _numbers(path: str, field: FieldInfo, value: Any) -> Iterator[Any]:
+    """Yield the numbers that a field consists of."""
     if field.nested:
-        inner = [(f"{path}.{part.name}", part) for part in field.nested.fields]
-        parts = _parts(path, field.nested, value)
-        for (place, part), element in zip(inner, parts, strict=True):
-            yield from _numbers(place, part, element)
-        return
-    elements: tuple[Any, ...] = (value,)
-    if _is_whole_list(path, field):
+        parts = _parts(path, field, field.nested, value)
+        for part, element in zip(field.nested.fields, parts, strict=True):
+            yield from _numbers(f"{path}.{part.name}", part, element)
+    elif not _is_whole_list(path, field):
+        validate_element(value, field, path, wire_only=True)
+        yield value
+    else:
         if isinstance(value, (str, Mapping)) or not hasattr(value, "__len__"):
             raise ValidationError(path, "a sequence", value)
         validate_count(value, field, path)
-        octets = isinstance(value, (bytes, bytearray)) and not field.is_numeric
-        elements = tuple(bytes((octet,)) for octet in value) if octets else tuple(value)
-    for element in elements:
-        validate_element(element, field, path, wire_only=True)
-    yield elements
+        is_octets = isinstance(value, (bytes, bytearray)) and not field.is_numeric
+        for element in (bytes((octet,)) for octet in value) if is_octets else value:
+            validate_element(element, field, path, wire_only=True)
+            yield element
 
 
-def _parts(path: str, structure: Structure, value: Any) -> list[Any]:
+def _parts(path: str, field: FieldInfo, structure: Structure, value: Any) -> list[Any]:
     """Return the values for the fields of a structure."""
-    names = [field.name for field in structure.fields]
-    if names == ["sec", "nanosec"] and isinstance(value, int):
-        return list(divmod(value, 10**9))
+    names = [part.name for part in structure.fields]
+    if _is_time(structure) and type(value) is int:
+        return [*divmod(value, 10**9)]
     if not isinstance(value, Mapping):
-        if any(not hasattr(value, field.slot) for field in structure.fields):
-            raise ValidationError(path, f"a {structure.name}", value)
-        return [getattr(value, field.slot) for field in structure.fields]
+        validate_element(value, field, path, wire_only=True)
+        return [getattr(value, part.slot) for part in structure.fields]
     if set(value) != set(names):
         raise ValidationError(path, f"a dictionary of {', '.join(names)}", value)
     return [value[name] for name in names]

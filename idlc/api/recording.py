@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import shlex
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 import numpy as np
+from msgspec.structs import replace
 
+from idlc.model.distros import BY_NAME, unknown_distro
 from idlc.recordings.containers.compression import missing
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
-from idlc.recordings.containers.file import CDR, START, unread_reason
+from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
+    NO_TIME,
     Messages,
     Raw,
     Window,
+    in_order,
     join_messages,
 )
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.times import moment
+from idlc.recordings.damage import Damage, DamageWarning
+from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
+from idlc.recordings.times import date_text, moment
 from idlc.runtime.codec import PAUSE
 
 if TYPE_CHECKING:
@@ -32,6 +40,7 @@ if TYPE_CHECKING:
     from idlc.api.conditions import Condition
     from idlc.api.upgrade import Upgrade
     from idlc.recordings.load import TopicType
+    from idlc.runtime.typeinfo import Structure
 
 
 class Reading(NamedTuple):
@@ -39,6 +48,13 @@ class Reading(NamedTuple):
 
     kind: Any
     rules: Any = None
+
+
+def checked_distro(name: str | None) -> str | None:
+    """Return the name of a distribution; raise RecordingError if there is none of that name."""
+    if name is not None and name not in BY_NAME:
+        raise RecordingError(f"no such distribution: `{name}`", unknown_distro(name))
+    return name
 
 
 def readings(as_: Any, rules: Any) -> dict[str, Reading]:
@@ -52,6 +68,7 @@ def readings(as_: Any, rules: Any) -> dict[str, Reading]:
 
 
 Kind = TypeVar("Kind")
+Selected = TypeVar("Selected", bound="Selection")
 #: The path in errors of many messages: the index of a message, and the path in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
 #: So many messages are decoded ahead, of so many bytes together.
@@ -79,27 +96,38 @@ else:
         message: Any
 
 
+class ReadOptions(NamedTuple):
+    """How messages are read.
+
+    `include` are folders in which types are looked for that the recording does not define, `distro`
+    is the distribution of such types, and `others` are topics with other versions of the type. With
+    `reading`, messages are converted to another version. They match all `conditions`. `checks` are
+    the recording's `check` and `strict`.
+    """
+
+    include: tuple[str, ...] = ()
+    distro: str | None = None
+    others: tuple[Topic, ...] = ()
+    reading: Reading | None = None
+    conditions: tuple[Condition, ...] = ()
+    checks: tuple[bool | None, bool] = (None, False)
+
+
 class Selection:
     """Messages of one topic.
 
     They are of the type that was recorded, compiled when it is first needed, unless a class that
-    idlc generated is given; that must be of the same type as the recorded one. `include` are
-    folders in which types are looked for that the recording does not define. With `reading`, they
-    are converted to another version of the type first. Only messages that match all `conditions`
-    are read; `absent` counts those in which a path of one does not exist.
+    idlc generated is given; that must be of the same type as the recorded one. `absent` counts the
+    messages in which a path of a condition does not exist.
     """
 
-    def __init__(
-        self,
-        topic: Topic,
-        include: tuple[str, ...] = (),
-        reading: Reading | None = None,
-        conditions: tuple[Condition, ...] = (),
-    ) -> None:
+    #: The messages whose lengths were compared with the type, and whether one does not fit.
+    _compared = 0
+    _differs = False
+
+    def __init__(self, topic: Topic, options: ReadOptions) -> None:
         self.topic = topic
-        self.include = include
-        self.reading = reading
-        self.conditions = conditions
+        self.options = options
         self.absent = 0
 
     def read_all(self) -> Iterator[Messages]:
@@ -108,16 +136,22 @@ class Selection:
 
     def recorded(self) -> Iterator[Messages]:
         """Yield the messages that match, as they are recorded, many at a time."""
-        if not self.conditions:
-            yield from self.read_all()
+        self.absent = 0
+        return self.matching(self.read_all())
+
+    def matching(self, batches: Iterable[Messages]) -> Iterator[Messages]:
+        """Yield the messages of batches that match the conditions."""
+        if not self.options.conditions:
+            yield from batches
             return
         from idlc.api.conditions import Filter
 
-        matching, done = Filter(self._type.kind, self.conditions), 0
-        for batch in self.read_all():
+        matching, done = Filter(self._type.kind, self.options.conditions), 0
+        absent = self.absent
+        for batch in batches:
             views = batch.views()
             results, error = _each(matching.matches, views)
-            self.absent = matching.absent
+            self.absent = absent + matching.absent
             if any(results):
                 mask = np.zeros(len(batch), bool)
                 mask[: len(results)] = results
@@ -130,12 +164,12 @@ class Selection:
         """Yield the messages, many at a time, in the version that they are read as."""
         done = 0
         for batch in self.recorded():
-            yield self._read_as(batch, done)
+            yield self.read_as(batch, done)
             done += len(batch)
 
-    def _read_as(self, batch: Messages, first: int = 0) -> Messages:
+    def read_as(self, batch: Messages, first: int = 0) -> Messages:
         """Return messages in the version that they are read as."""
-        if self.reading is None or self._upgrade.plan.same:
+        if self.options.reading is None or self._upgrade.plan.same:
             return batch
         from idlc.api.upgraded import Upgraded
 
@@ -146,35 +180,93 @@ class Selection:
     def _upgrade(self) -> Upgrade:
         from idlc.api.upgrade import upgrade
 
-        assert self.reading is not None
-        return upgrade(self._type.kind, *self.reading)
+        assert self.options.reading is not None
+        return upgrade(self._type.kind, *self.options.reading)
+
+    @property
+    def structure(self) -> Structure:
+        """The type of the messages as they are recorded."""
+        return self._type.structure
 
     @cached_property
     def _type(self) -> TopicType:
         from idlc.recordings.load import type_of
 
-        return type_of(self.topic, self.include)
+        return type_of(self.topic, self.options.include, self.options.distro, self._sample)
+
+    def _sample(self) -> list[Raw]:
+        """Return some messages as they are recorded."""
+        raws: list[Raw] = []
+        for batch in self.read_all():
+            raws += batch.first_views(SAMPLE - len(raws))
+            if len(raws) >= SAMPLE:
+                break
+        return raws
+
+    def compare_lengths(self, batch: Messages | None = None, kind: Any = None) -> None:
+        """Compare the lengths of the first messages with their type: see `_judge`."""
+        if self._compared >= SAMPLE or self.topic.encoding != CDR:
+            return
+        from idlc.recordings.columns import unread_bytes
+
+        count = SAMPLE - self._compared
+        raws = self._sample() if batch is None else batch.first_views(count)
+        structure = self._structure(kind)
+        unread = unread_bytes(structure, raws)
+        self._compared += len(raws)
+        self._judge(structure, unread, raws)
+
+    def _structure(self, kind: Any) -> Structure:
+        """Return the type that recorded messages are read as."""
+        is_recorded = kind is None or self.options.reading is not None
+        if is_recorded:
+            return self._type.structure
+        from idlc.runtime.typeinfo import structure_of
+
+        return structure_of(kind)
+
+    def _judge(self, structure: Structure, unread: Any, raws: Sequence[Raw]) -> None:
+        """Warn, once, if messages are longer than their type; raise if they are of another one."""
+        if self._differs or not raws:
+            return
+        from idlc.recordings.load import OtherDefinitionWarning, known_versions
+
+        known = known_versions(self.topic, self.options.include, self.options.others)
+        if problem := check_lengths(self.topic, structure, unread, raws[:SAMPLE], known):
+            self._differs = True
+            warnings.warn(problem, OtherDefinitionWarning, stacklevel=4)
+
+    def _on_unread(self, kind: Any, batch: Messages) -> Callable[[Any], None]:
+        """Return what judges messages whose lengths were compared as they were read."""
+        self.compare_lengths(batch, kind)
+
+        def judge(unread: Any) -> None:
+            if (unread > MOST_PADDING).any():
+                self._judge(self._structure(kind), unread, batch.first_views(SAMPLE))
+
+        return judge
 
     @property
     def kind(self) -> Any:
         """The class of the messages, compiled from what was recorded unless it was given."""
-        return self._type.kind if self.reading is None else self.reading.kind
+        reading = self.options.reading
+        return self._type.kind if reading is None else reading.kind
 
     def _source(self, kind: Any) -> Any:
         """Return what columns are read by: `kind` if it is of the recorded type, or that type."""
         if self.topic.encoding != CDR:
-            what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
-            raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
-        if self.reading is not None:
-            if kind not in (None, self.reading.kind):
-                what = f"`{self.topic.name}` is read as {self.reading.kind.__name__}"
+            raise RecordingError(*other_encoding(self.topic.name, self.topic.encoding))
+        reading = self.options.reading
+        if reading is not None:
+            if kind not in (None, reading.kind):
+                what = f"`{self.topic.name}` is read as {reading.kind.__name__}"
                 raise RecordingError(what, "omit the class")
-            return self.reading.kind
+            return reading.kind
         if kind is None:
             return self._type.structure
         from idlc.recordings.load import check_class
 
-        return check_class(kind, self.topic, self.include)
+        return check_class(kind, self.topic, self.options.include)
 
     def __iter__(self) -> Iterator[Stamped[Any]]:
         return self.messages()
@@ -196,23 +288,26 @@ class Selection:
         """Yield each message with its time, in the order in which they were recorded.
 
         With `fields`, the values at these paths take the place of the message, and nothing else is
-        decoded: one value for one path, a tuple for several, as `idlc.reader` reads them.
+        decoded: one value for one path, a tuple for several, as `idlc.reader` reads them. A time
+        after the year 2262 is None.
         """
         self._source(kind)
-        kind, done = kind or self.kind, 0
+        recorded_kind, kind, done = kind, kind or self.kind, 0
         read = kind.deserialize
         if fields is not None:
             from idlc.api.reader import reader
 
             read = reader(kind, *([fields] if isinstance(fields, str) else fields))
-        for batch in self.batches():
+        for recorded in self.recorded():
+            self.compare_lengths(recorded, recorded_kind)
+            batch = self.read_as(recorded, done)
             views = batch.views()
             # many small messages at once, because the collector is paused meanwhile
             step = max(1, min(MANY, AHEAD * len(views) // (sum(map(len, views)) + 1)))
             for first in range(0, len(views), step):
                 part = views[first : first + step]
                 values, error = _each(read, part)
-                times = batch.log_times[first : first + len(values)].tolist()
+                times = _known_times(batch.log_times[first : first + len(values)])
                 yield from map(Stamped, times, values)
                 if error:
                     _raise(error, self.topic, part[len(values)], done + len(values))
@@ -230,9 +325,10 @@ class Selection:
 
         source = self._source(kind)
         recorded = join_messages(list(self.recorded()))
-        batch = self._read_as(recorded)
+        batch = self.read_as(recorded)
+        judge = self._on_unread(kind, recorded)
         with _at(self.topic, recorded.views):
-            table = to_columns(source, batch, fields)
+            table = to_columns(source, batch, fields, on_unread=judge)
         times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
         columns = {name: values for name, values in times if values is not None}
         codes = {**dict.fromkeys(columns, "M8[ns]"), **table.times}
@@ -259,21 +355,25 @@ class Selection:
         """
         pa = arrow()
         source = self._source(kind)
-        tables = list(self._tables(source, options))
+        tables = list(self._tables(source, options, kind))
         return pa.concat_tables(tables) if tables else _table(source, options)
 
     def to_reader(self, kind: Any = None, **options: Any) -> pa.RecordBatchReader:
         """Return the same piece by piece, without the whole table in memory."""
         pa = arrow()
         source = self._source(kind)
-        batches = (batch for table in self._tables(source, options) for batch in table.to_batches())
+        batches = (
+            batch for table in self._tables(source, options, kind) for batch in table.to_batches()
+        )
         return pa.RecordBatchReader.from_batches(_table(source, options).schema, batches)
 
-    def _tables(self, source: Any, options: Any) -> Iterator[pa.Table]:
+    def _tables(self, source: Any, options: Any, kind: Any) -> Iterator[pa.Table]:
         done = 0
         for batch in self.recorded():
+            judge = self._on_unread(kind, batch)
             with _at(self.topic, batch.views, done):
-                table = _table(source, options, self._read_as(batch, done))
+                more = {**options, "on_unread": judge}
+                table = _table(source, more, self.read_as(batch, done))
             yield table
             done += len(batch)
 
@@ -295,9 +395,23 @@ def _table(source: Any, options: Any, batch: Messages | None = None) -> pa.Table
         if times is None:
             column = pa.nulls(len(batch), kind)
         else:
-            column = pa.Array.from_buffers(kind, len(batch), [None, pa.py_buffer(times)])
+            column = pa.Array.from_buffers(kind, len(batch), [_known(times), pa.py_buffer(times)])
         table = table.add_column(0, pa.field(name, kind), column)
     return table
+
+
+def _known_times(times: Any) -> list[Any]:
+    """Return times as a list; None for those that are not known."""
+    known: list[Any] = times.tolist()
+    if (times == NO_TIME).any():
+        return [None if time == NO_TIME else time for time in known]
+    return known
+
+
+def _known(times: Any) -> Any:
+    """Return Arrow's bits of the times that are known; None if all are."""
+    known = times != NO_TIME
+    return None if known.all() else arrow().py_buffer(np.packbits(known, bitorder="little"))
 
 
 def arrow() -> Any:
@@ -345,6 +459,13 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
         raise RecordingError(f"{what}: {problem} at byte {error.offset}") from error
 
 
+def _warn(damage: tuple[Damage, ...], warned: int) -> int:
+    """Warn of the damage after the first `warned` ones; return how much there is."""
+    for each in damage[warned:]:
+        warnings.warn(DamageWarning(str(each)), stacklevel=3)
+    return len(damage)
+
+
 class Part(Selection):
     """Some of the messages of a topic, to be read wherever the file can be opened.
 
@@ -358,11 +479,9 @@ class Part(Selection):
         ids: tuple[int, ...],
         pieces: tuple[Any, ...],
         window: Window,
-        include: tuple[str, ...] = (),
-        reading: Reading | None = None,
-        conditions: tuple[Condition, ...] = (),
+        options: ReadOptions,
     ) -> None:
-        super().__init__(topic, include, reading, conditions)
+        super().__init__(topic, options)
         self.place = place
         self.ids = ids
         self.pieces = pieces
@@ -370,15 +489,19 @@ class Part(Selection):
 
     def __reduce__(self) -> tuple[Any, ...]:
         where = self.place, self.ids, self.pieces, self.window
-        return Part, (self.topic, *where, self.include, self.reading, self.conditions)
+        return Part, (self.topic, *where, self.options)
 
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
 
     def read_all(self) -> Iterator[Messages]:
         """Yield all messages as they are recorded, many at a time."""
-        with closing(open_pieces(self.place)) as file:
-            yield from file.messages(self.ids, self.pieces, self.window)
+        with closing(open_pieces(self.place, *self.options.checks)) as file:
+            warned = 0
+            for batch in file.messages(self.ids, self.pieces, self.window):
+                warned = _warn(tuple(file.damage), warned)
+                yield batch
+            _warn(tuple(file.damage), warned)
 
 
 #: A part reads about so many bytes of a recording.
@@ -391,7 +514,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
     `path` is an .mcap or .db3 file, the folder of a bag, a list of these which are then one
     recording, a URL of an .mcap file that fsspec can open, or a file object. `notes` says what is
     unusual about it. Without `index`, summary and indexes of MCAP files are not used. `check`
-    compares checksums. `include` are folders in which types are looked for that the recording does
+    compares checksums; by default, only those of files that are known to be damaged. What is
+    damaged is left out with a warning, and is in `damage`; `strict` raises RecordingError instead.
+    `include` are folders in which types are looked for that the recording does
     not define, as those of ROS 2 Humble do not. `as_` is a class, or several, that earlier versions
     of its type are read as; `rules` are files and folders of rules that this runs.
     """
@@ -401,14 +526,18 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         path: Any,
         *,
         index: bool = True,
-        check: bool = False,
+        check: bool | None = None,
+        strict: bool = False,
         include: Iterable[str] = (),
+        distro: str | None = None,
         as_: Any = (),
         rules: Any = None,
     ) -> None:
         self._readings = readings(as_, rules)
-        self._include = tuple(map(str, include))
-        self._container: Container = open_recording(path, index=index, check=check)
+        names = tuple(map(str, include))
+        self._options = ReadOptions(names, checked_distro(distro), checks=(check, strict))
+        self._container: Container = open_recording(path, index=index, check=check, strict=strict)
+        _warn(self._container.damage, 0)
         self._topics: dict[str, list[Topic]] = {}
         for topic in self.topics:
             self._topics.setdefault(topic.name, []).append(topic)
@@ -423,6 +552,11 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         """Notes about anomalies of the recording, such as that it was not closed."""
         return self._container.notes
 
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """The parts that cannot be read, as far as the recording was read."""
+        return self._container.damage
+
     def __getitem__(self, name: str) -> RecordedTopic:
         topics = self._topics.get(name)
         if not topics:
@@ -430,11 +564,84 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
 
             hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
             raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
-        if len(topics) > 1:
-            kinds = ", ".join(sorted({topic.type for topic in topics}))
-            raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
+        return self._selected(topics)
+
+    def topic(self, name: str, type_name: str | None = None) -> RecordedTopic:
+        """Return the messages of a topic, only those of one type if several were recorded."""
+        if type_name is None:
+            return self[name]
+        topics = [
+            topic for topic in self._topics.get(name, ()) if topic.type == full_name(type_name)
+        ]
+        if not topics:
+            kinds = ", ".join(sorted({topic.type for topic in self._topics.get(name, ())}))
+            what = f"`{name}` has no messages of `{type_name}`"
+            raise RecordingError(what, f"it has {kinds}" if kinds else None)
+        return self._selected(topics)
+
+    def _selected(self, topics: list[Topic]) -> RecordedTopic:
+        """Return the messages of topics of one name, which must be of one type."""
+        name, kinds = topics[0].name, {topic.type for topic in topics}
+        if len(kinds) > 1 or len({topic.encoding for topic in topics}) > 1:
+            listed = ", ".join(sorted(kinds))
+            hint = "select one of them with --type, or recording.topic(name, type)"
+            what = f"`{name}` has messages of several types, {listed}"
+            raise RecordingError(what, hint if len(kinds) > 1 else None)
         reading = self._readings.get(topics[0].type)
-        return RecordedTopic(self._container, topics[0], ALWAYS, self._include, reading)
+        groups: dict[str, list[RecordedTopic]] = {}
+        for single in self._apart(topics):
+            digest = single.structure.hash if len(topics) > 1 else ""
+            groups.setdefault(digest, []).append(single)
+        versions = [self._joined(group) for group in groups.values()]
+        if len(versions) == 1:
+            return versions[0]
+        if reading is not None:
+            return RecordedVersions(self._container, ALWAYS, versions)
+        places = (f"{digest} ({', '.join(self._files(group))})" for digest, group in groups.items())
+        files = [self._files(group) for group in groups.values()]
+        target = "PATH"
+        if (
+            not set(files[-1]).intersection(name for own in files[:-1] for name in own)
+            and len(files[-1]) == 1
+        ):
+            target = shlex.quote(files[-1][0])
+        olds = " ".join(map(shlex.quote, dict.fromkeys(name for own in files[:-1] for name in own)))
+        hint = f"convert them: `idlc upgrade {olds} --to {target} -o upgraded`; or use `as_=`"
+        raise RecordingError(
+            f"`{name}` has messages of {len(versions)} versions of {topics[0].type}: "
+            f"{' and '.join(places)}",
+            hint,
+        )
+
+    def _apart(self, topics: Iterable[Topic]) -> Iterator[RecordedTopic]:
+        """Yield the messages of each definition by themselves."""
+        every = tuple(topics)
+        same_type: dict[str, list[Topic]] = {}
+        for topic in every:
+            same_type.setdefault(topic.type, []).append(topic)
+        for topic in every:
+            options = self._options._replace(
+                reading=self._readings.get(topic.type),
+                others=tuple(each for each in same_type[topic.type] if each is not topic),
+            )
+            yield RecordedTopic(self._container, topic, ALWAYS, options)
+
+    def definitions(self) -> Iterator[RecordedTopic]:
+        """Yield the messages of each topic, those of different definitions apart."""
+        for topics in self._topics.values():
+            yield from self._apart(topics)
+
+    def _joined(self, group: list[RecordedTopic]) -> RecordedTopic:
+        """Return the messages of topics whose types are the same."""
+        if len(group) == 1:
+            return group[0]
+        topic = self._container.joined([each.topic for each in group])
+        return RecordedTopic(self._container, topic, ALWAYS, group[0].options)
+
+    def _files(self, group: list[RecordedTopic]) -> list[str]:
+        """Return the paths of the files that have messages of some topics."""
+        places = (place for each in group for place in self._container.places(each.topic))
+        return list(dict.fromkeys(file.name for file, *_ in places))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -470,13 +677,11 @@ class RecordedTopic(Selection):
         container: Container,
         topic: Topic,
         window: Window,
-        include: tuple[str, ...],
-        reading: Reading | None = None,
-        conditions: tuple[Condition, ...] = (),
+        options: ReadOptions,
     ) -> None:
-        super().__init__(topic, include, reading, conditions)
+        super().__init__(topic, options)
         self._container = container
-        self._window = window
+        self.window = window
 
     def __repr__(self) -> str:
         return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
@@ -496,7 +701,27 @@ class RecordedTopic(Selection):
         first, last = (
             None if time is None else moment(time, self._container.start) for time in (start, end)
         )
-        return self._narrowed(self._window.narrowed(first, last), self.conditions)
+        window = self.window.narrowed(first, last)
+        if (start, end) != (None, None):
+            self._check_range(window)
+        return self._narrowed(window, self.options)
+
+    def _check_range(self, window: Window) -> None:
+        """Raise RecordingError if a range of times does not touch the recording."""
+        span = self._container.span()
+        if None not in window and window.start > window.end:  # type: ignore[operator]
+            raise RecordingError("the range of times ends before it starts")
+        if span is None:
+            return
+        is_late = window.start is not None and window.start > span[1]
+        is_early = window.end is not None and window.end < span[0]
+        if not (is_late or is_early):
+            return
+        limits = " to ".join("" if time is None else date_text(time) for time in window).strip()
+        recorded = " to ".join(map(date_text, span))
+        hint = "write a text, such as `'10'`, for seconds from the start; an int is nanoseconds"
+        what = f"no message is in the range of times ({limits})"
+        raise RecordingError(f"{what}: the recording is from {recorded}", hint)
 
     def where(self, path: str, operator: str, value: Any) -> RecordedTopic:
         """Return the messages in which a field compares with a value: ==, !=, <, <=, > or >=.
@@ -511,24 +736,89 @@ class RecordedTopic(Selection):
 
         self._source(None)
         condition = Condition(path, operator, value).typed(self._type.kind, self._container.start)
-        return self._narrowed(self._window, (*self.conditions, condition))
+        conditions = *self.options.conditions, condition
+        return self._narrowed(self.window, self.options._replace(conditions=conditions))
 
-    def _narrowed(self, window: Window, conditions: tuple[Condition, ...]) -> RecordedTopic:
-        how = self.include, self.reading, conditions
-        return RecordedTopic(self._container, self.topic, window, *how)
+    def _narrowed(self, window: Window, options: ReadOptions) -> RecordedTopic:
+        return RecordedTopic(self._container, self.topic, window, options)
 
     def read_all(self) -> Iterator[Messages]:
         """Yield all messages as they are recorded, many at a time."""
-        return self._container.messages(self.topic, self._window)
+        warned = len(self._container.damage)
+        for batch in self._container.messages(self.topic, self.window):
+            warned = _warn(self._container.damage, warned)
+            yield batch
+        _warn(self._container.damage, warned)
 
     def parts(self, size: int = PART) -> list[Part]:
         """Return pieces for others to read, each of about `size` bytes of the recording.
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
-        how = self._window, self.include, self.reading, self.conditions
+        how = self.window, self.options
         return [
             Part(self.topic, file.place, tuple(numbers), pieces, *how)
             for file, numbers, _ in self._container.places(self.topic)
-            for pieces in file.parts(numbers, self._window, size)
+            for pieces in file.parts(numbers, self.window, size)
         ]
+
+
+class RecordedVersions(RecordedTopic):
+    """The messages of several versions of one type, read as one of them."""
+
+    def __init__(self, container: Container, window: Window, versions: list[RecordedTopic]) -> None:
+        first, count = versions[0], sum(version.topic.count for version in versions)
+        super().__init__(container, replace(first.topic, count=count), window, first.options)
+        self.versions = versions
+
+    def between(self, start: Any = None, end: Any = None, *, by: str = "") -> RecordedVersions:
+        """Return those of a time: see `RecordedTopic.between`."""
+        return self._each(lambda version: version.between(start, end, by=by))
+
+    def where(self, path: str, operator: str, value: Any) -> RecordedVersions:
+        """Return those in which a field compares with a value: see `RecordedTopic.where`.
+
+        Each version must have the path.
+        """
+        return self._each(lambda version: version.where(path, operator, value))
+
+    def _each(self, select: Callable[[RecordedTopic], RecordedTopic]) -> RecordedVersions:
+        versions = [select(version) for version in self.versions]
+        return RecordedVersions(self._container, versions[0].window, versions)
+
+    def parts(self, size: int = PART) -> list[Part]:
+        """Return pieces for others to read, those of each version apart."""
+        return [part for version in self.versions for part in version.parts(size)]
+
+    def compare_lengths(self, batch: Messages | None = None, kind: Any = None) -> None:
+        """Compare nothing: `recorded` compares the lengths of each version."""
+
+    def _on_unread(self, _kind: Any, _batch: Messages) -> Callable[[Any], None]:
+        return lambda _: None
+
+    def read_as(self, batch: Messages, first: int = 0) -> Messages:  # noqa: ARG002
+        """Return messages as they are: `recorded` has converted them."""
+        return batch
+
+    def recorded(self) -> Iterator[Messages]:
+        """Yield the messages as one version; those that are stored together in order of time."""
+        numbers: dict[int, list[tuple[RecordedTopic, list[int]]]] = {}
+        for version in self.versions:
+            version.absent = 0
+            for file, mine, _ in self._container.places(version.topic):
+                numbers.setdefault(id(file), []).append((version, mine))
+        warned = len(self._container.damage)
+        for file in self._container.files:
+            owners = numbers.get(id(file), [])
+            every = [number for _, mine in owners for number in mine]
+            for pieces in file.parts(every, self.window, PART) if every else ():
+                batches = []
+                for version, mine in owners:
+                    recorded = file.messages(mine, pieces, self.window)
+                    for batch in version.matching(recorded):
+                        version.compare_lengths(batch)
+                        batches.append(version.read_as(batch))
+                self.absent = sum(version.absent for version in self.versions)
+                warned = _warn(self._container.damage, warned)
+                if batches:
+                    yield in_order(batches) if len(owners) > 1 else join_messages(batches)

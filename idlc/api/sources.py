@@ -9,11 +9,11 @@ from idlc.recordings.types import RecordingTopics, read_topics
 
 
 def read_source(
-    path: str, root: Root, report: Report, *, check: bool = False
+    path: str, root: Root, report: Report, *, check: bool = False, verify: bool = False
 ) -> RecordingTopics | None:
     """Return the topics of a recording, or of the robot at an address; `None` after an error."""
     if not is_address(path):
-        return read_topics(path, root, report, check=check)
+        return read_topics(path, root, report, check=check, verify=verify)
     from idlc.robot.live.types import read_robot
 
     robot = read_robot(path, report)

@@ -14,7 +14,8 @@ from idlc.recordings.columns import to_arrow, to_columns
 from idlc.recordings.containers.messages import Separate
 from idlc.versions.classes import version_of
 from idlc.versions.conversion import NO_RULES, Finding, Plan, RuleFiles, make_plan
-from idlc.versions.converters import Converters, Functions, Payloads, words_of
+from idlc.versions.converters import Converters, Functions, words_of
+from idlc.versions.exact import Payloads
 from idlc.versions.rules import Known, read_rules, rule_files, run_rules
 
 
@@ -102,11 +103,11 @@ class Upgrade:
 
     @cached_property
     def _message(self) -> Any:
-        return Converters(self._run, shares=False).message(self.plan)
+        return Converters(self._run).message(self.plan)
 
     @cached_property
     def _payloads(self) -> Payloads:
-        return Payloads.of(self.plan, self._run)
+        return Payloads(self.plan, self._run)
 
     def message(self, message: Any) -> Any:
         """Return the message of the new class; it shares nothing with the old one.

@@ -11,6 +11,7 @@ from idlc.diagnostics.source import Span
 from idlc.model.link import Model
 from idlc.packaging.cmake import GENERATE, Call, Script
 from idlc.packaging.facts import Facts
+from idlc.packaging.layout import build_backend
 from idlc.project.settings import toml
 
 #: Commands of ROS 1's catkin, which ROS 2 lacks.
@@ -65,9 +66,7 @@ def other_backend(facts: Facts) -> str:
         document = toml(facts.pyproject.text)
     except ValueError:
         return ""
-    system = document.get("build-system")
-    backend = system.get("build-backend") if isinstance(system, dict) else None
-    top = backend.partition(".")[0] if isinstance(backend, str) else "setuptools"
+    top = build_backend(document).partition(".")[0]
     return "" if top == "setuptools" else top
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -251,12 +252,15 @@ def _config_hint(place: Span, name: str, view: Layout, missing: Sequence[str]) -
     root = view.roots.get("", "").removesuffix(".")
     if view.installed and view.installed.finders:
         return "change its `where`, `include` and `exclude` to match these packages"
-    if view.installed and view.installed.names:
-        return f"add {enumerated([f'`{each}`' for each in missing])} to this list"
+    names = view.installed.names if view.installed else ()
     if place.source.path.endswith(".toml"):
         # setuptools takes every folder below `where` for a package, tests and sources, too
-        where = f'where = ["{root}"]' if root else f'include = ["{name.partition(".")[0]}*"]'
+        own = f"{name.partition('.')[0]}*"
+        include = [*(each for each in names if not fnmatchcase(each, own)), own]
+        where = f'where = ["{root}"]' if root else f"include = {json.dumps(include)}"
         return f"write `packages.find = {{ {where} }}` in [tool.setuptools]"
+    if names:
+        return f"add {enumerated([f'`{each}`' for each in missing])} to this list"
     also = f", and `where = {root}` in [options.packages.find]" if root else ""
     return f"write `packages = find:`{also}"
 

@@ -45,13 +45,14 @@ class _Context(click.Context):
 
 
 class LazyGroup(click.Group):
-    """A group of commands, each with its line in the overview.
+    """Commands in groups, each with its line in the overview.
 
     The module of a command is `modules` with its name; `synonyms` are words of other tools with
     the commands that are suggested for them.
     """
 
     context_class = _Context
+    groups: Mapping[str, Mapping[str, str]]
     overview: Mapping[str, str]
     modules: str
     synonyms: Mapping[str, str]
@@ -85,33 +86,46 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the overview without importing any command."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(self.overview.items()))
+        width = max(map(len, self.overview))
+        for heading, commands in self.groups.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), text) for name, text in commands.items()])
 
 
-#: Each command with its line in the overview; its module is `idlc.cli.<name>`.
-COMMANDS = {
-    "init": "Set up a package, library or workspace.",
-    "gen": "Compile interface files into a Python package.",
-    "check": "Check interface files and packages.",
-    "breaking": "Compare two versions and report breaking changes.",
-    "fmt": "Format interface files.",
-    "hash": "Print type hashes (RIHS01).",
-    "show": "Show an interface with its nested messages.",
-    "columns": "Convert recorded topics to Parquet, Arrow or CSV.",
-    "upgrade": "Convert recordings to new versions of their types.",
-    "echo": "Print the messages of a robot's topic.",
-    "call": "Call a service of a robot.",
-    "record": "Record topics of a robot.",
-    "list": "List packages and types.",
-    "robot": "Connect programs without ROS to each other and to robots.",
-    "docs": "Generate a documentation site.",
-    "lsp": "Run the language server.",
-    "describe": "Print a type description as JSON.",
-    "scaffold": "Create packages, interfaces and nodes.",
-    "doctor": "Check the installed programs, ROS 2 and packages.",
-    "explain": "Explain a rule such as IDL201.",
+#: Each command with its line in the overview, in groups; its module is `idlc.cli.<name>`.
+GROUPS = {
+    "Start": {
+        "init": "Set up a package, library or workspace.",
+        "gen": "Compile interface files into a Python package.",
+        "check": "Check interface files and packages.",
+        "columns": "Show recorded topics, or convert them to Parquet, Arrow or CSV.",
+    },
+    "Write": {
+        "scaffold": "Create packages, interfaces and nodes.",
+        "fmt": "Format interface files.",
+    },
+    "Look": {
+        "show": "Show an interface, a recording or a robot.",
+        "list": "List packages and types.",
+        "docs": "Generate a documentation site.",
+        "explain": "Explain a rule such as IDL201.",
+    },
+    "Versions": {
+        "breaking": "Compare two versions and report breaking changes.",
+        "upgrade": "Convert recordings to new versions of their types.",
+    },
+    "Robots": {
+        "echo": "Print the messages of a robot's topic.",
+        "call": "Call a service of a robot.",
+        "record": "Record topics of a robot.",
+        "router": "Run a Zenoh router.",
+    },
+    "Tools": {
+        "doctor": "Check the installed programs, ROS 2 and packages.",
+        "lsp": "Run the language server.",
+    },
 }
+COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 
 
 #: Words of other tools, with the names of the commands here.
@@ -124,10 +138,12 @@ SYNONYMS = {
     **dict.fromkeys(("doc", "documentation", "html", "site"), "docs"),
     **dict.fromkeys(("diff", "compare", "compat", "changes"), "breaking"),
     **dict.fromkeys(("info", "cat", "view", "print", "proto"), "show"),
+    "describe": "show --format type-description",
+    "hash": "show --format hash",
     **dict.fromkeys(("ls", "packages", "types", "search", "find"), "list"),
     **dict.fromkeys(("export", "convert", "extract", "parquet", "arrow", "csv", "read"), "columns"),
     **dict.fromkeys(("migrate", "rewrite", "update"), "upgrade"),
-    **dict.fromkeys(("zenoh", "router", "daemon"), "robot"),
+    **dict.fromkeys(("zenoh", "zenohd", "rmw_zenohd", "daemon"), "router"),
     **dict.fromkeys(("rule", "rules", "why", "codes"), "explain"),
 }
 
@@ -135,6 +151,7 @@ SYNONYMS = {
 class App(LazyGroup):
     """The group of all commands, which `idlc help` explains too."""
 
+    groups = GROUPS
     overview = COMMANDS
     modules = "idlc.cli."
     synonyms = SYNONYMS

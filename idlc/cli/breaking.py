@@ -13,9 +13,11 @@ from idlc.cli import options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
-    from idlc.tasks.breaking.files import Verdict
+    from idlc.project.settings import Config
+    from idlc.tasks.breaking.files import BreakingOptions, Verdict
     from idlc.tasks.breaking.graph import GraphVerdict
     from idlc.tasks.breaking.recordings import RecordedVerdict
+    from idlc.versions.packages import Allowance
 GRAPH = "graph"
 PATIENCE = 5.0
 
@@ -33,30 +35,18 @@ def _summary(
     verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...], report: Report
 ) -> str:
     """Return the last line of the text: changes, consequence, omissions and the next version."""
-    from idlc.diagnostics import codes
     from idlc.diagnostics.report import first_few
     from idlc.diagnostics.terminal import counted
     from idlc.tasks.breaking.files import Verdict
     from idlc.tasks.breaking.recordings import RecordedVerdict
 
-    broken = {level: number for level, number in verdict.levels.items() if number}
     added = verdict.added if isinstance(verdict, Verdict) else ()
     parts = []
     if verdict.not_compared:
         parts.append(f"{len(verdict.not_compared)} not compared")
-    at = ""
-    if broken:
-        levels_of = ", ".join(f"{number} {level}" for level, number in broken.items())
-        number = sum(bool(problem.levels) for problem in report)
-        consequence = _CONSEQUENCES[next(iter(broken))][isinstance(verdict, RecordedVerdict)]
-        parts.append(f"{counted(number, 'breaking change')} ({levels_of}): {consequence}")
-    elif verdict.hidden:
-        at = f" at level {', '.join(levels)}"
-    nothing = any(problem.code == codes.NOTHING_COMPARED.id for problem in report)
-    if not (broken or nothing) and (added or any(verdict.seen.values())):
-        parts.append(f"no breaking changes{' in the rest' if verdict.not_compared else ''}{at}")
+    parts += _result(verdict, levels, report)
     if verdict.hidden:
-        parts.append(f"--level hides {counted(verdict.hidden, 'change')}")
+        parts.append(f"`levels` in [tool.idlc.breaking] hides {counted(verdict.hidden, 'change')}")
     if verdict.allowed:
         parts.append(f"{verdict.allowed} allowed")
     parts.append(
@@ -68,11 +58,37 @@ def _summary(
         parts += _advice(verdict)
     elif isinstance(verdict, RecordedVerdict):
         if verdict.others:
-            others = counted(verdict.others, "change")
-            parts.append(f"hidden: {others} without effect on readers (see --level)")
+            others = counted(verdict.others, "more change")
+            verb = "does" if verdict.others == 1 else "do"
+            parts.append(f"{others} {verb} not affect readers")
     elif verdict.silent:
         parts.append(f"{counted(verdict.silent, 'endpoint')} without a type hash")
     return "; ".join(parts)
+
+
+def _result(
+    verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...], report: Report
+) -> Iterator[str]:
+    """Yield the changes with their consequence, or that there are none; nothing without a yes."""
+    from idlc.diagnostics import codes
+    from idlc.diagnostics.terminal import counted
+    from idlc.tasks.breaking.files import Verdict
+    from idlc.tasks.breaking.recordings import RecordedVerdict
+
+    broken = {level: number for level, number in verdict.levels.items() if number}
+    if broken:
+        levels_of = ", ".join(f"{number} {level}" for level, number in broken.items())
+        number = sum(bool(problem.levels) for problem in report)
+        consequence = _CONSEQUENCES[next(iter(broken))][isinstance(verdict, RecordedVerdict)]
+        yield f"{counted(number, 'breaking change')} ({levels_of}): {consequence}"
+        return
+    if any(problem.code == codes.NOTHING_COMPARED.id for problem in report):
+        return
+    added = verdict.added if isinstance(verdict, Verdict) else ()
+    if added or any(verdict.seen.values()):
+        rest = " in the rest" if verdict.not_compared else ""
+        at = f" at {', '.join(levels)} level" if verdict.hidden else ""
+        yield f"no breaking changes{rest}{at}"
 
 
 def _advice(verdict: Verdict) -> Iterator[str]:
@@ -87,10 +103,11 @@ def _advice(verdict: Verdict) -> Iterator[str]:
 
 
 EPILOG = options.example(
-    "mkdir -p old/msg new/msg",
+    "mkdir -p old/msg",
     "echo 'float64 speed 0.5  # [m/s]' > old/msg/Drive.msg",
-    "echo 'float64 speed 0.7  # [m/s]' > new/msg/Drive.msg",
-    "idlc breaking new --against old --level hash",
+    "cp -r old new",
+    "echo 'string text' > new/msg/Note.msg",
+    "idlc breaking new --against old",
 )
 EPILOG += "\n" + options.example(
     "[[tool.idlc.breaking.allow]]",
@@ -119,15 +136,6 @@ EPILOG += "\n" + options.example(
     help="With --against graph or ADDRESS, stop waiting for nodes and replies after this time.  "
     "[default: 5]",
 )
-@click.option(
-    "--level",
-    "levels",
-    multiple=True,
-    type=click.Choice(("wire", "hash", "source", "behaviour")),
-    help="Report only changes with this level. May be repeated. By default, idlc reports all "
-    "changes. If you compare with recordings, it reports only changes that affect programs that "
-    "read recordings.",
-)
 @options.packages
 @options.distro
 @options.report_style
@@ -135,7 +143,6 @@ def command(
     paths: tuple[str, ...],
     against: str | None,
     timeout: float | None,
-    levels: tuple[str, ...],
     style: str,
     **scoping: Any,
 ) -> int:
@@ -162,15 +169,12 @@ def command(
     """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli import output
     from idlc.project.find import is_address
-    from idlc.project.git import GIT
-    from idlc.project.settings import scope, settings_here
-    from idlc.tasks.breaking.files import BreakingOptions, breaking
+    from idlc.project.settings import settings_here
     from idlc.versions import packages
-    from idlc.versions.changes import LEVELS
-    from idlc.versions.distribution import is_distro
 
     settings, report = settings_here()
     against = against or packages.against(settings, report)
+    levels = packages.levels(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
         raise click.UsageError(
@@ -182,35 +186,86 @@ def command(
         raise click.UsageError("--timeout needs --against graph")
     verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
     if against is not None and not report.had_errors:
-        recordings: tuple[str, ...] = ()
-        newer: tuple[str, ...] = ()
-        files = paths
-        if not is_running and not is_distro(against) and not against.startswith(GIT):
-            from idlc.recordings.find import recordings_of
-
-            recordings, newer, files = recordings_of(against, paths, settings.root)
-        needs_none = recordings or is_distro(against)
-        comparison = BreakingOptions(
-            paths=() if newer else files or settings.paths or (() if needs_none else (".",)),
-            against=against,
-            scope=scope(settings, **scoping),
-            levels=levels or (() if recordings else LEVELS),
-            allowed=allowed,
-            allowed_in=settings.source.path if settings.source else "",
-            today=datetime.datetime.now().astimezone().date().isoformat(),
-        )
-        if recordings:
-            from idlc.tasks.breaking.recordings import compare_with_recordings
-
-            verdict = compare_with_recordings(comparison, recordings, newer, report)
-            output.notes(report, sys.stderr)
-        elif is_running:
+        comparison = _comparison(paths, against, settings, levels, allowed, scoping)
+        if is_running:
             from idlc.tasks.breaking.graph import compare_with_graph
 
             patience = timeout or PATIENCE
             verdict = compare_with_graph(comparison, patience, report, has_paths=bool(paths))
         else:
-            verdict = breaking(comparison, report)
+            verdict = _compare_files(comparison, paths, settings, levels, report)
+    _show(verdict, style, levels, report)
+    return output.status(report)
+
+
+def _comparison(
+    paths: tuple[str, ...],
+    against: str,
+    settings: Config,
+    levels: tuple[str, ...],
+    allowed: tuple[Allowance, ...],
+    scoping: dict[str, Any],
+) -> BreakingOptions:
+    """Return the comparison of the paths, else of those in the settings, else of this folder."""
+    from idlc.project.settings import scope
+    from idlc.tasks.breaking.files import BreakingOptions
+    from idlc.versions.changes import LEVELS
+    from idlc.versions.distribution import is_distro
+
+    paths = paths or settings.paths
+    if not paths and not is_distro(against):
+        paths = (".",)
+    return BreakingOptions(
+        paths=paths,
+        against=against,
+        scope=scope(settings, **scoping),
+        levels=levels or LEVELS,
+        allowed=allowed,
+        allowed_in=settings.source.path if settings.source else "",
+        today=datetime.datetime.now().astimezone().date().isoformat(),
+    )
+
+
+def _compare_files(
+    comparison: BreakingOptions,
+    paths: tuple[str, ...],
+    settings: Config,
+    levels: tuple[str, ...],
+    report: Report,
+) -> Verdict | RecordedVerdict | None:
+    """Compare with a recording or with a version of the files; `paths` and `levels` are options."""
+    import msgspec
+
+    from idlc.cli import output
+    from idlc.project.git import GIT
+    from idlc.tasks.breaking.files import breaking
+    from idlc.versions.distribution import is_distro
+
+    against = comparison.against
+    if is_distro(against) or against.startswith(GIT):
+        return breaking(comparison, report)
+    from idlc.recordings.find import recordings_of
+
+    recordings, newer, files = recordings_of(against, paths, settings.root)
+    if not recordings:
+        return breaking(comparison, report)
+    from idlc.tasks.breaking.recordings import compare_with_recordings
+
+    current = () if newer else files or settings.paths
+    comparison = msgspec.structs.replace(comparison, paths=current, levels=levels)
+    verdict = compare_with_recordings(comparison, recordings, newer, report)
+    output.notes(report, sys.stderr)
+    return verdict
+
+
+def _show(
+    verdict: Verdict | GraphVerdict | RecordedVerdict | None,
+    style: str,
+    levels: tuple[str, ...],
+    report: Report,
+) -> None:
+    from idlc.cli import output
+
     text = _summary(verdict, levels, report) if verdict else ""
     if style in options.DOCUMENTS:
         output.document(report, style, "breaking")
@@ -218,7 +273,7 @@ def command(
             from idlc.diagnostics.formats import notice
 
             output.lines(notice("idlc breaking", text), style, sys.stdout)
-        return output.status(report)
+        return
     output.show(report, style, sys.stdout)
     if style == "json":
         facts = verdict._asdict() if verdict else {}
@@ -227,4 +282,3 @@ def command(
         output.fact(sys.stdout, "summary", **output.counts(report), **facts)
     elif verdict:
         sys.stdout.write(f"{text}\n")
-    return output.status(report)

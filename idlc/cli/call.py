@@ -38,6 +38,7 @@ def command(
     style: str,
     session: Session,
     report: Report,
+    include: tuple[str, ...],
 ) -> None:
     """Call a service of a robot and print the response.
 
@@ -51,7 +52,7 @@ def command(
     from idlc.robot.keys import Kind
     from idlc.robot.live import connect, traffic
 
-    kind, ends = traffic.find_version(session, service, [Kind.SERVICE], report)
+    kind, ends = traffic.find_version(session, service, [Kind.SERVICE], report, include)
     if kind is None:
         return
     request = messages.message_of(kind.Request, values)

@@ -25,7 +25,6 @@ from idlc.cli import completion, options
     "--diff", is_flag=True, help="Show the changes that --fix would make, and write nothing."
 )
 @click.option("--strict", is_flag=True, help="Also fail on warnings.")
-@click.option("--statistics", is_flag=True, help="Show only the number of problems for each rule.")
 @click.option(
     "--prefix",
     metavar="DIR",
@@ -38,10 +37,9 @@ from idlc.cli import completion, options
 def command(paths: tuple[str, ...], **arguments: Any) -> int:
     """Check interface files and the packages that contain them.
 
-    PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv or
-    .action file. If PATH is a package.xml, CMakeLists.txt, setup.py, setup.cfg or pyproject.toml,
-    idlc checks the package that the file belongs to. Without PATH, idlc checks the `paths` in
-    pyproject.toml. If `paths` is not set, idlc checks the working folder.
+    PATH is a file or folder. If PATH is a package.xml, CMakeLists.txt, setup.py, setup.cfg or
+    pyproject.toml, idlc checks the package that the file belongs to. Without PATH, idlc checks the
+    `paths` in pyproject.toml. If `paths` is not set, idlc checks the working folder.
 
     If you select several distributions, idlc reports each problem once and names the affected
     distributions.

@@ -67,7 +67,13 @@ from idlc.cli import completion, options
     show_default=True,
     help="Convert each Time and Duration to one column.",
 )
-@click.option("--check", is_flag=True, help="Verify the checksums of the recording.")
+@click.option(
+    "--check/--no-check",
+    default=None,
+    help="Verify the checksums of the recording. By default, idlc verifies those of a damaged "
+    "recording.",
+)
+@click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @click.option(
     "--index/--no-index",
     "use_index",
@@ -75,7 +81,14 @@ from idlc.cli import completion, options
     show_default=True,
     help="Use the indexes of MCAP files.",
 )
+@click.option(
+    "--type",
+    "type_name",
+    metavar="NAME",
+    help="Select the messages of this type, if a topic has messages of several types.",
+)
 @options.include
+@options.distro
 @click.option("--force", is_flag=True, help="Replace existing files.")
 def command(subject: str, fields: str | None, conditions: tuple[str, ...], **arguments: Any) -> int:
     """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.
@@ -90,7 +103,7 @@ def command(subject: str, fields: str | None, conditions: tuple[str, ...], **arg
     from idlc.diagnostics.ci import Form
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
-    from idlc.recordings.find import expand, split_recordings
+    from idlc.recordings.find import expand, in_order, split_recordings
     from idlc.tasks.columns import ColumnsOptions, columns
 
     report = Report()
@@ -100,7 +113,7 @@ def command(subject: str, fields: str | None, conditions: tuple[str, ...], **arg
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
-    paths = (*expand(subject), *recordings)
+    paths = tuple(in_order([*expand(subject), *recordings]))
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
     form = Form.EXACT if request.style == "csv" else Form.TEXT
     with output.progress_bar(sys.stderr) as update, written_as(form, sys.stdout):

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
+    from idlc.tasks.check import CheckResult
 
 
 def check_paths(
@@ -14,7 +19,6 @@ def check_paths(
     diff: bool = False,
     strict: bool = False,
     style: str = "text",
-    statistics: bool = False,
     prefix: str | None = None,
     package: str | None = None,
     include: tuple[str, ...] = (),
@@ -27,9 +31,6 @@ def check_paths(
     """
     from idlc.check.select import selection
     from idlc.cli import output
-    from idlc.diagnostics import terminal
-    from idlc.diagnostics.terminal import counted
-    from idlc.diagnostics.text import one_line
     from idlc.project.settings import scope, settings_here
     from idlc.tasks.check import CheckOptions, CheckResult, check
 
@@ -44,36 +45,51 @@ def check_paths(
         where = scope(settings, package, include, exclude, distro)
         options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix, diff)
         checked = check(options, report)
-    files, fixed = checked.files, checked.fixed
-    match style:
-        case "text":
-            stream = sys.stderr if diff else sys.stdout  # a diff alone can be applied
-            paint = output.painter(stream)
-            for name, (old, new) in checked.texts.items() if diff else ():
-                output.diff(name, old, new, sys.stdout)
-            if not statistics:
-                output.show(report, style, stream, fixable=True)
-            if statistics or len(report) > terminal.MANY:
-                stream.writelines(terminal.statistics(report))
-            done = f"{fixed} {'would be fixed' if diff else 'fixed'}, " if fixed else ""
-            what = counted(len(files), "file")
-            if not files and checked.packages:
-                what = f"{counted(checked.packages, 'package')} without interfaces"
-            which = f" for {', '.join(checked.distros)}" if checked.distros else ""
-            rest = paint("good", f"no problems in {what}{which}")
-            stream.write(f"{done}{terminal.summary(report) if len(report) else rest}\n")
-            if fixable := sum(bool(problem.edits) for problem in report):
-                star = paint("hint", "[*]")
-                stream.write(f"{star} {counted(fixable, 'problem')} fixable with `--fix`\n")
-            sys.stderr.writelines(f"note: {one_line(note)}\n" for note in checked.notes)
-        case "json":
-            output.show(report, style, sys.stdout)
-            facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
-            facts |= {"distros": list(checked.distros)} if checked.distros else {}
-            output.fact(sys.stdout, "summary", **output.counts(report), **facts)
-        case _:
-            output.document(report, style, "check", files, strict=strict)
-    return output.status(report) or int((strict and len(report) > 0) or (diff and fixed > 0))
+    if style == "text":
+        _show(checked, report, diff=diff)
+    elif style == "json":
+        output.show(report, style, sys.stdout)
+        facts: dict[str, object] = {"files": len(checked.files)}
+        if checked.fixed:
+            facts["fixed"] = checked.fixed
+        if checked.distros:
+            facts["distros"] = list(checked.distros)
+        output.fact(sys.stdout, "summary", **output.counts(report), **facts)
+    else:
+        output.document(report, style, "check", checked.files, strict=strict)
+    is_refused = (strict and len(report) > 0) or (diff and checked.fixed > 0)
+    return output.status(report) or int(is_refused)
+
+
+def _show(checked: CheckResult, report: Report, *, diff: bool) -> None:
+    """Print problems and a summary; a diff goes to standard output alone, so it can be applied."""
+    from idlc.cli import output
+    from idlc.diagnostics import terminal
+    from idlc.diagnostics.terminal import counted
+    from idlc.diagnostics.text import one_line
+
+    stream = sys.stderr if diff else sys.stdout
+    paint = output.painter(stream)
+    if diff:
+        for name, (old, new) in checked.texts.items():
+            output.diff(name, old, new, sys.stdout)
+    output.show(report, "text", stream, fixable=True)
+    if len(report) > terminal.MANY:
+        stream.writelines(terminal.statistics(report))
+    if checked.fixed:
+        stream.write(f"{checked.fixed} {'would be fixed' if diff else 'fixed'}, ")
+    if len(report):
+        stream.write(f"{terminal.summary(report)}\n")
+    else:
+        subject = counted(len(checked.files), "file")
+        if not checked.files and checked.packages:
+            subject = f"{counted(checked.packages, 'package')} without interfaces"
+        distros = f" for {', '.join(checked.distros)}" if checked.distros else ""
+        stream.write(f"{paint('good', f'no problems in {subject}{distros}')}\n")
+    if fixable := sum(bool(problem.edits) for problem in report):
+        star = paint("hint", "[*]")
+        stream.write(f"{star} {counted(fixable, 'problem')} fixable with `--fix`\n")
+    sys.stderr.writelines(f"note: {one_line(note)}\n" for note in checked.notes)
 
 
 def serve_editor() -> int:

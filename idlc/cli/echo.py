@@ -48,6 +48,7 @@ def command(
     style: str,
     session: Session,
     report: Report,
+    include: tuple[str, ...],
 ) -> None:
     """Print the messages of a robot's topic as they arrive.
 
@@ -59,10 +60,11 @@ def command(
     shows the first 16 elements of an array that has more than 32.
     """
     from idlc.cli import messages, output
+    from idlc.diagnostics.text import one_line
     from idlc.robot.live import traffic
     from idlc.robot.live.connect import TOPICS
 
-    kind, ends = traffic.find_version(session, topic, TOPICS, report)
+    kind, ends = traffic.find_version(session, topic, TOPICS, report, include)
     if kind is None:
         return
     output.notes(report, sys.stderr)
@@ -73,7 +75,12 @@ def command(
             read = messages.fields_of(kind, [path.strip() for path in fields.split(",")])
         except ValueError as error:
             raise click.UsageError(str(error)) from None
-    arrived = traffic.messages(session, ends, read, count, report)
+
+    def complain(reason: str) -> None:
+        sys.stderr.write(f"note: {one_line(reason)}\n")
+        sys.stderr.flush()
+
+    arrived = traffic.messages(session, ends, read, count, report, complain)
     with suppress(KeyboardInterrupt):
         for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):
             output.lines(text, style, sys.stdout)

@@ -67,8 +67,11 @@ def _line(package: Generated, check: bool, paint: Paint) -> str:
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
 
-    is_all = not check and package.written >= package.files and not package.removed
-    note = "" if is_all else f" ({'up to date' if check else package.changes})"
+    note = f" ({package.changes})"
+    if check:
+        note = " (up to date)"
+    elif package.written >= package.files and not package.removed:
+        note = ""
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
         f"{paint('good', package.package)}: {counted(package.interfaces, 'interface')} → "
@@ -123,12 +126,6 @@ def _snapshot(request: GenOptions) -> dict[str, Stamp]:
 
 
 EPILOG = options.example(*options.DEMO, "idlc gen demo -o out/demo")
-EPILOG += "\n" + options.example(
-    "[tool.idlc]",
-    'paths = ["demo"]',
-    'out = "out/demo"',
-    title="You can set PATH and OUT in pyproject.toml",
-)
 
 
 class _Command(click.Command):
@@ -148,7 +145,7 @@ class _Command(click.Command):
     metavar="PREFIX",
     type=click.Path(),
     default="",
-    help="Install the package into this folder, where ROS 2 and its C++ tools find it.",
+    help="Install into this prefix, for ROS 2's tools.",
 )
 @click.option(
     "--topic",
@@ -156,53 +153,43 @@ class _Command(click.Command):
     metavar="NAME",
     multiple=True,
     shell_complete=completion.topics,
-    help="Compile only the types that this recorded topic uses. May be repeated.",
+    help="Use only this recorded topic. Repeatable.",
 )
 @options.packages
 @options.distro
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
-@click.option("--watch", is_flag=True, help="Keep running and compile again after every change.")
+@click.option("--watch", is_flag=True, help="Compile again after every change.")
 @click.option(
     "--vendor-deps",
     "vendoring",
     type=click.Choice(("private", "beside")),
     is_flag=False,
     flag_value="private",
-    metavar="[=beside]",
-    help="Copy types of other packages into OUT if the interfaces use them. With =beside, write "
-    "the copies as packages next to OUT.",
+    metavar="",
+    help="Also copy types of other packages that you use.",
 )
 @click.option(
     "--runtime",
     type=click.Choice(["carried", "installed"]),
-    help="`carried` copies the runtime into OUT. With `installed`, OUT imports idlc-runtime. By "
-    "default, idlc repeats the choice of the last run; the first run uses `carried`.",
+    help="Copy the runtime, or import idlc-runtime.",
 )
 @click.option(
     "--force",
     is_flag=True,
-    help="Also replace files that you edited or that idlc did not write, and keep backups.",
+    help="Also replace other files, and keep backups.",
 )
 @options.report_style
 def command(style: str, watch: bool, **arguments: Any) -> int:
     """Compile interface files into a Python package.
 
-    PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv or
-    .action file. PACKAGE and TYPE are names of installed or built-in interfaces, such as
-    std_msgs and std_msgs/msg/Header. REC is a recording: an .mcap or .db3 file, or a bag folder.
-    idlc compiles the types of all topics in a recording.
+    PATH is a file or folder, PACKAGE and TYPE are names such as std_msgs and std_msgs/msg/Header,
+    and REC is a recording. idlc writes the package to the folder OUT, or several packages to
+    OUT/NAME. In the folder of a package with a setup.py, `idlc gen` is enough.
 
-    idlc writes the Python package to the folder OUT. If you compile several packages, idlc writes
-    each package to its own folder, OUT/NAME. In the folder of a package with a setup.py, you can
-    omit PATH and OUT: idlc then compiles this package into its Python folder.
-
-    With --ament, idlc installs the package into the folder PREFIX, which several packages can
-    share. To use these packages, run `source PREFIX/setup.bash`. No build is necessary.
+    With --ament, `source PREFIX/setup.bash` makes the packages available to ROS 2.
     """
     from idlc.cli import output
-    from idlc.project.find import is_path
     from idlc.project.settings import scope, settings_here
-    from idlc.recordings.find import split_recordings
     from idlc.tasks.gen import GenOptions, in_package, with_settings
 
     settings, report = settings_here()
@@ -218,6 +205,22 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     arguments["vendoring"] = arguments["vendoring"] or ""
     typed = GenOptions(**arguments, scope=scope(settings, *words), again=again)
     request = in_package(with_settings(typed, settings))
+    _refuse_what_has_no_effect(request, package)
+    if request.check and (watch or request.force):
+        raise click.UsageError("--check cannot be combined with --watch or --force")
+    if watch and style in options.DOCUMENTS:
+        raise click.UsageError("--watch needs --format text or json")
+    if watch:
+        return run_again(request, style)
+    return once(request, style)
+
+
+def _refuse_what_has_no_effect(request: GenOptions, package: str | None) -> None:
+    """Raise a usage error without inputs or an output, and for options that do not apply."""
+    from idlc.cli import output
+    from idlc.project.find import is_path
+    from idlc.recordings.find import split_recordings
+
     if not request.paths or not (request.out or request.ament):
         missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
         message = f"missing {missing}; add it, or set it in [tool.idlc] of pyproject.toml"
@@ -227,7 +230,6 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
             message = f"this folder contains several packages; run `{' && '.join(commands)}`"
         raise click.UsageError(message)
     root = request.scope.root
-    # which may have no effect on the paths
     judged = request.paths if package or request.topics else ()
     recordings, others = split_recordings(judged, root)
     if request.topics and not recordings:
@@ -235,10 +237,3 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if package and not any(is_path(word, root) for word in others):
         what = "a recording" if recordings else "an installed package"
         raise click.UsageError(f"--package applies to files, but {what} keeps its own package name")
-    if request.check and (watch or request.force):
-        raise click.UsageError("--check cannot be combined with --watch or --force")
-    if watch and style in options.DOCUMENTS:
-        raise click.UsageError("--watch needs --format text or json")
-    if watch:
-        return run_again(request, style)
-    return once(request, style)

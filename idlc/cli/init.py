@@ -37,12 +37,13 @@ def command(path: str, service: str | None, yes: bool) -> int:
     """Set up ROS 2 interfaces in a package, library or workspace.
 
     PATH is a ROS 2 package (ament_python or ament_cmake), a Python library with any build backend,
-    a workspace of packages, or an empty folder. In an empty folder, idlc creates a package.
+    a workspace of packages, or an empty folder. In an empty folder, idlc creates the
+    package that `idlc scaffold package` creates, with an example.
 
     idlc shows every change first. On a terminal, it asks before it writes; elsewhere, it writes
     only with --yes. It then compiles the interfaces, installs a copy of the package into a
     temporary folder, and imports the classes from that folder. The installation runs the package's
-    own build. A second run changes nothing.
+    own build. A second run changes nothing, and tests again.
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
@@ -83,7 +84,7 @@ def command(path: str, service: str | None, yes: bool) -> int:
         note = "note: idlc's docs/ci.md describes what this file installs, and from where\n"
         status = max(status, _write(draft, note * (draft is checks)))
     for preparation in planned:
-        status = max(status, _finish(preparation, root))
+        status = max(status, _finish(preparation, root, again=yes))
     if not changed and not status:
         sys.stdout.write("nothing to do\n")
     if planned and not status:
@@ -112,7 +113,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
     from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
     from idlc.scaffold.changes import Settings
-    from idlc.scaffold.init import prepare
+    from idlc.scaffold.init import prepare, siblings
     from idlc.scaffold.layouts import layout_of
 
     planned, status = [], 0
@@ -133,7 +134,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
         if inner:
             interfaces = counted(number, "interface") if number else "no interfaces yet"
             sys.stdout.write(f"{within}{one_line(inner.sentence(interfaces))}\n")
-        preparation = prepare(inner, Settings(own), report) if inner else None
+        preparation = prepare(inner, Settings(own), report, siblings(inner)) if inner else None
         sys.stdout.flush()
         output.show(report, "text", sys.stderr)
         if preparation is None:
@@ -175,20 +176,27 @@ def _write(draft: Draft, note: str) -> int:
     return output.status(report)
 
 
-def _finish(preparation: Preparation, root: Root) -> int:
-    """Write and compile a package, prove it if it was changed, and return the exit status."""
+def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
+    """Write and compile a package, prove it, and return the exit status.
+
+    A package that did not change is proved `again`, because an earlier proof may have failed.
+    """
     from idlc.cli import output
     from idlc.diagnostics import codes
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
     from idlc.scaffold.init import generate
-    from idlc.scaffold.proof import prove
+    from idlc.scaffold.layouts import SETUP
+    from idlc.scaffold.proof import installed_files, prove
 
     report = Report()
     folder = preparation.layout.folder
     within = "" if folder == root.base else f"{one_line(root.shown(folder))}: "
-    is_written = preparation.draft.write(report) is not None
+    draft, backend = preparation.draft, preparation.layout.backend
+    is_edited = SETUP in draft.reasons and draft.project.has(SETUP)
+    before = installed_files(folder, backend) if is_edited and backend else frozenset()
+    is_written = draft.write(report) is not None
     done = generate(preparation, report) if is_written else ()
     output.show(report, "text", sys.stderr)
     if not done:
@@ -198,7 +206,7 @@ def _finish(preparation: Preparation, root: Root) -> int:
         if package.written or package.removed:
             count = counted(package.interfaces, "interface")
             sys.stdout.write(f"{within}compiled {count} into {one_line(package.out)}\n")
-    if not preparation.draft.reasons:
+    if not (draft.reasons or again):
         return 0
     if not preparation.is_packed:
         sys.stdout.write(f"{within}not tested, because the build omits the classes (see above)\n")
@@ -208,11 +216,13 @@ def _finish(preparation: Preparation, root: Root) -> int:
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
     is_complete = not done[0].needs and all(problem.code != unimportable for problem in report)
     classes = preparation.classes if is_complete else ()
-    proof = prove(folder, preparation.layout.backend, classes, source)
+    proof = prove(folder, backend, classes, source, before)
     if proof.tried:
         result = "test failed: " if proof.failure else "test passed: "
         sys.stdout.write(f"{within}{result}{proof.tried}\n")
     sys.stdout.writelines(f"  {line}\n" for line in proof.failure.splitlines())
+    if proof.obstacle:
+        sys.stdout.write(f"{within}not tested: the import, because {proof.obstacle}\n")
     if not is_complete:
         names = ", ".join(f"`{name}`" for name in done[0].needs) or "a package"
         verb = "are" if len(done[0].needs) > 1 else "is"

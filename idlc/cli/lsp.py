@@ -11,18 +11,6 @@ from idlc.cli import options
 
 @click.command("lsp", epilog=options.example("idlc lsp --check"))
 @click.option("--check", is_flag=True, help="Print the server's capabilities as JSON, and exit.")
-@click.option(
-    "--stdio",
-    is_flag=True,
-    expose_value=False,
-    help="Some editors pass this option. It has no effect, because the server always uses stdio.",
-)
-@click.option(
-    "--clientProcessId",
-    metavar="ID",
-    expose_value=False,
-    help="Some editors pass this option. It has no effect.",
-)
 def command(check: bool) -> int:
     """Run the language server on standard input and output. Your editor starts it.
 

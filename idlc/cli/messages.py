@@ -10,6 +10,7 @@ import re
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import cache, partial
 from typing import Any
 
 import click
@@ -137,6 +138,10 @@ def _shortened(value: Any) -> Any:
     return [*shown, f"... {len(value)} in all"] if len(value) > _LONG else shown
 
 
+#: Stands for a long array in a document; nobody who writes a message knows it.
+_MARK = f"array{secrets.token_hex(8)}x"
+
+
 def _yaml(values: Any) -> str:
     """Return a YAML document; text that is not plainly visible is quoted, with escapes.
 
@@ -145,9 +150,30 @@ def _yaml(values: Any) -> str:
     """
     import yaml
 
-    mark, arrays = f"array{secrets.token_hex(8)}x", list[str]()
+    arrays: list[str] = []
+    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
+
+    def dumped(width: int) -> str:
+        arrays.clear()
+        text = yaml.dump(values, Dumper=partial(_dumper(), arrays), width=width, **options)
+        return "\n".join(map(_escaped, text.split("\n")))
+
+    text = dumped(100)
+    if silenced(text, Form.COMMANDS) != silenced(text):  # a line begins within a value
+        text = dumped(1 << 30)
+    return re.sub(rf"{_MARK}(\d+)x", lambda match: arrays[int(match[1])], text)
+
+
+@cache
+def _dumper() -> Any:
+    """Return the class that writes documents, and long arrays of numbers into a list."""
+    import yaml
 
     class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+        def __init__(self, arrays: list[str], *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            self.arrays = arrays
+
         def represent_text(self, text: str) -> Any:
             is_odd = one_line(text) != text or silenced(text) != text
             style = "'" if _NUMBER.fullmatch(text) else None
@@ -159,21 +185,12 @@ def _yaml(values: Any) -> str:
                 return self.represent_list(array)
             plain = repr(array)
             is_plain = "e" not in plain and "n" not in plain
-            arrays.append(plain if is_plain else f"[{', '.join(map(_number, array))}]")
-            return self.represent_text(f"{mark}{len(arrays) - 1}x")
-
-    def dumped(width: int) -> str:
-        arrays.clear()
-        text = yaml.dump(values, Dumper=Dumper, width=width, **options)
-        return "\n".join(map(_escaped, text.split("\n")))
+            self.arrays.append(plain if is_plain else f"[{', '.join(map(_number, array))}]")
+            return self.represent_text(f"{_MARK}{len(self.arrays) - 1}x")
 
     Dumper.add_representer(str, Dumper.represent_text)
     Dumper.add_representer(list, Dumper.represent_array)
-    options = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
-    text = dumped(100)
-    if silenced(text, Form.COMMANDS) != silenced(text):  # a line begins within a value
-        text = dumped(1 << 30)
-    return re.sub(rf"{mark}(\d+)x", lambda match: arrays[int(match[1])], text)
+    return Dumper
 
 
 def _escaped(line: str) -> str:

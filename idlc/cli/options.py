@@ -53,8 +53,7 @@ def typed(*without: str) -> tuple[str, ...]:
 package = click.option(
     "--package",
     metavar="NAME",
-    help="Package name. By default, idlc uses the name in the nearest package.xml. If there is no "
-    "package.xml, it uses the name of the generated package, or else the name of the folder.",
+    help="Package name.  [default: from package.xml]",
 )
 include = click.option(
     "-I",
@@ -62,14 +61,13 @@ include = click.option(
     metavar="DIR",
     multiple=True,
     type=click.Path(file_okay=False),
-    help="Search this folder first for packages that the interfaces use. The folder can be a "
-    "package, a source tree or an install prefix. May be repeated.",
+    help="Search this folder first. Repeatable.",
 )
 exclude = click.option(
     "--exclude",
     metavar="PATTERN",
     multiple=True,
-    help="Exclude files or folders, such as `msg/ros1/**` or `*_test`. May be repeated.",
+    help="Exclude files (`msg/ros1/**`). Repeatable.",
 )
 
 
@@ -94,23 +92,17 @@ def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | 
 
 
 def _distro(metavar: str, text: str, callback: Any) -> Callable[[Command], Command]:
-    more = (
-        "By default, idlc uses `distro` in [tool.idlc]. If `distro` is not set, idlc uses the "
-        "installed distribution, or else jazzy."
-    )
     return click.option(
         "--distro",
         metavar=metavar,
-        help=f"{text} {more}",
+        help=f"{text}  [default: the installed]",
         callback=callback,
         shell_complete=completion.distros,
     )
 
 
-distro = _distro("NAME", "Name of the ROS 2 distribution.", _single)
-distros = _distro(
-    "NAME,...", "Check that the interfaces work in these ROS 2 distributions.", _several
-)
+distro = _distro("NAME", "ROS 2 distribution.", _single)
+distros = _distro("NAME,...", "ROS 2 distributions in which the interfaces have to work.", _several)
 
 
 def output_style(formats: Sequence[str], text: str) -> Callable[[Command], Command]:
@@ -121,10 +113,8 @@ def output_style(formats: Sequence[str], text: str) -> Callable[[Command], Comma
     )
 
 
-style = output_style(FORMATS, "Output format: text, or one JSON object per line.")
-report_style = output_style(
-    REPORT_FORMATS, "Output format: text, one JSON object per line, or the format of a CI system."
-)
+style = output_style(FORMATS, "Output format.")
+report_style = output_style(REPORT_FORMATS, "Output format.")
 
 
 def scoped(
@@ -165,24 +155,26 @@ def scoped(
     return decorate
 
 
-def on_robot(command: Callable[..., None]) -> Callable[..., int]:
+def on_robot(command: Callable[..., bool | None]) -> Callable[..., int]:
     """Have a command called with the `session` with a robot whose ADDRESS is given, and a `report`.
 
-    The report is written after it.
+    `include` has the folders of -I and of the settings. The report is written after it.
+    If it returns True, it failed.
     """
 
     @wraps(command)
-    def run(address: str, **arguments: Any) -> int:
+    def run(address: str, include: tuple[str, ...], **arguments: Any) -> int:
         from idlc.cli import output
-        from idlc.diagnostics.report import Report
+        from idlc.project.settings import settings_here
         from idlc.robot.live.connect import connected
 
-        report = Report()
+        settings, report = settings_here()
+        folders, failed = (*include, *settings.include), False
         with connected(address, report) as session:
-            if session:
-                command(session=session, report=report, **arguments)
+            if session and not report.had_errors:
+                failed = bool(command(session=session, report=report, include=folders, **arguments))
         output.show(report, "text", sys.stderr)
         output.notes(report, sys.stderr)
-        return output.status(report)
+        return output.status(report) or int(failed)
 
-    return click.argument("address", metavar="ADDRESS")(run)
+    return click.argument("address", metavar="ADDRESS")(include(run))

@@ -33,8 +33,13 @@ if TYPE_CHECKING:
     help="Stop after this time.  [default: Ctrl-C stops]",
 )
 def command(
-    topics: tuple[str, ...], out: str, duration: float | None, session: Session, report: Report
-) -> None:
+    topics: tuple[str, ...],
+    out: str,
+    duration: float | None,
+    session: Session,
+    report: Report,
+    include: tuple[str, ...],
+) -> bool:
     """Record topics of a robot into an MCAP file.
 
     ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447. Without
@@ -57,11 +62,11 @@ def command(
         raise click.UsageError(f"{error}; run `pip install 'idlc[zenoh,recordings]'`") from None
     names = {end.name for end in find_endpoints(session, topics, TOPICS, report)}
     if report.had_errors:
-        return
+        return False
     end = float("inf") if duration is None else time.monotonic() + duration
     try:
         with stop_signals() as stopped, open(out, "xb") as file:  # noqa: PTH123 - never a link
-            recorder = Recorder(session, file, names, report)
+            recorder = Recorder(session, file, names, report, include)
             sys.stderr.write(f"recording to {one_line(out)}; press Ctrl-C to stop\n")
             sys.stderr.flush()
             try:
@@ -77,3 +82,8 @@ def command(
     else:
         for name, count in sorted(counts.items()):
             sys.stderr.write(f"{name}: {count:,} messages → {one_line(out)}\n")
+        if not any(counts.values()):
+            topics_there = f"of {len(counts)} topics" if counts else "because there is no topic"
+            report.notes.append(f"`{out}` contains no messages {topics_there}")
+            return True
+    return False

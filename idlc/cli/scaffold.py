@@ -31,6 +31,7 @@ SYNONYMS = {
 class Scaffold(LazyGroup):
     """The group of these commands."""
 
+    groups = {"Commands": COMMANDS}  # noqa: RUF012 - a constant
     overview = COMMANDS
     modules = "idlc.cli.scaffold_"
     synonyms = SYNONYMS

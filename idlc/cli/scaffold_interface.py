@@ -21,20 +21,18 @@ EPILOG = options.example(
 @click.argument("kind", type=click.Choice(["msg", "srv", "action"]))
 @click.argument("name", metavar="NAME")
 @click.argument("fields", metavar="FIELD...", nargs=-1, type=click.UNPROCESSED)
-@click.option("--comment", default="", help="Description of the interface.")
 @common
 def command(
     kind: str,
     name: str,
     fields: tuple[str, ...],
-    comment: str,
     include: tuple[str, ...],
     **arguments: Any,
 ) -> int:
     """Create an interface in the package that contains the working folder.
 
-    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]'. `---` separates the sections
-    of services and actions.
+    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]', a constant or a comment.
+    `---` separates the sections of services and actions.
     """
     from idlc.diagnostics.report import Report
     from idlc.model.ir import KINDS
@@ -45,10 +43,10 @@ def command(
     report = Report()
     try:
         interface.check_interface_name(name)
-        interface.interface_text(kind, fields, comment)
+        interface.interface_text(kind, fields)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     settings = Settings(Root.here(), include=include, **arguments)
     checked_kind = KINDS[KINDS.index(kind)]
-    result = interface.interface(checked_kind, name, fields, comment, settings, report)
+    result = interface.interface(checked_kind, name, fields, settings, report)
     return finish(result, report)

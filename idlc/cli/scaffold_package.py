@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from idlc.cli import options
 from idlc.cli.scaffold import common, finish
 
+if TYPE_CHECKING:
+    from idlc.project.root import Root
+    from idlc.scaffold.package import Package
+
 EPILOG = options.example(
     "idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com",
     "idlc scaffold package --interfaces my_msgs Drive srv/Ask",
     title="Examples",
 )
-BUILD_TYPES = ("ament_python", "ament_cmake")
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 
 
@@ -24,7 +27,7 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.option("--description", default="", help="Description of the package, in one sentence.")
 @click.option("--maintainer", help="Name of the maintainer.  [default: git's user.name]")
 @click.option("--email", help="Email address of the maintainer.  [default: git's user.email]")
-@click.option("--license", "licence", type=click.Choice(LICENSES))
+@click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
 @click.option(
     "--interfaces",
     "--interfaces-only",
@@ -34,40 +37,25 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
     "language, and pip builds it for Python. INTERFACE is an interface to create, such as "
     "`Drive` or `srv/Ask`.",
 )
-@click.option(
-    "--build-type",
-    type=click.Choice(BUILD_TYPES),
-    help="ament_python builds Python nodes and their interfaces. ament_cmake requires "
-    "--interfaces, and also compiles the interfaces for C++.",
-)
-@click.option("-C", "--folder", metavar="DIR", default=".", help="Parent folder of the package.")
 @common
 def command(
     name: str,
     starters: tuple[str, ...],
     interfaces_only: bool,
-    build_type: str | None,
-    folder: str,
     **arguments: Any,
 ) -> int:
     """Create a package that you can build with colcon and install with pip.
 
     Each build of the package compiles the interfaces in its msg/, srv/ and action/ folders.
+    `idlc init` creates the same package in an empty folder, with an example, and compiles it.
     """
     from idlc.cli.output import program
     from idlc.diagnostics.report import Report
-    from idlc.project.git import setting
     from idlc.project.root import Root
     from idlc.scaffold.changes import Settings
     from idlc.scaffold.interface import starter
-    from idlc.scaffold.package import Package, check_package_name, package
+    from idlc.scaffold.package import check_package_name, package
 
-    if build_type == "ament_cmake" and not interfaces_only:
-        raise click.UsageError("--build-type ament_cmake needs --interfaces")
-    if interfaces_only and build_type == "ament_python":
-        raise click.UsageError(
-            "--interfaces needs ament_cmake; omit it: ament_python packages can contain them"
-        )
     if starters and not interfaces_only:
         raise click.UsageError("INTERFACE needs --interfaces")
     try:
@@ -76,18 +64,26 @@ def command(
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report, root = Report(), Root.here()
-    requested = Package(
+    build_type = "ament_cmake" if interfaces_only else "ament_python"
+    requested = _requested(name, arguments, build_type, root)
+    shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
+    chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
+    chosen |= {"starters"} if starters else set()
+    result = package(requested, Settings(root, **shared), report, examples, chosen)
+    example = f"{program()} scaffold interface msg Status 'float32 battery'"
+    return finish(result, report, (f"cd {name}", example))
+
+
+def _requested(name: str, arguments: dict[str, Any], build_type: str, root: Root) -> Package:
+    """Return the package with the defaults for what was not set."""
+    from idlc.project.git import setting
+    from idlc.scaffold.package import Package
+
+    return Package(
         name,
         arguments["description"] or f"The package {name}.",
         arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
         arguments["email"] or setting("user.email", root.base) or "you@example.com",
         arguments["licence"] or LICENSES[0],
-        BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
+        build_type,
     )
-    shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
-    chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
-    chosen |= {"starters"} if starters else set()
-    result = package(requested, folder, Settings(root, **shared), report, examples, chosen)
-    inside = name if folder in ("", ".") else f"{folder}/{name}"
-    example = f"{program()} scaffold interface msg Status 'float32 battery'"
-    return finish(result, report, (f"cd {inside}", example))

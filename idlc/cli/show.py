@@ -16,11 +16,13 @@ if TYPE_CHECKING:
     from idlc.project.settings import Scope
     from idlc.robot.live.overview import Connection
     from idlc.robot.qos import QoSProfile
-    from idlc.tasks.show import TopicFacts
+    from idlc.tasks.show import RecordingFacts, TopicFacts
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8
-HEAD = ("topic", "type", "messages", "hash", "here")
+HEAD = ("topic", "type", "messages", "rate", "size", "QoS", "hash", "here")
+#: Columns of numbers.
+NUMBERS = {"messages", "rate", "size"}
 ROBOT_HEAD = ("", "name", "type", "hash", "here", "from", "to", "QoS")
 #: Nodes, profiles and mismatches that text lists.
 LISTED = 3
@@ -41,7 +43,10 @@ def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
         # lines that begin with other characters may be commands to a CI system
         name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
         type_ = one_line(facts.type_name)
-        rows.append((name, type_, count, hash_[:SHORT], facts.here + no_definition))
+        rate = "-" if facts.rate is None else f"{facts.rate:.4g} Hz"
+        size = "-" if facts.size is None else size_text(facts.size)
+        qos, here = one_line(facts.qos or "-"), facts.here + no_definition
+        rows.append((name, type_, count, rate, size, qos, hash_[:SHORT], here))
     yield from _aligned(HEAD, rows)
 
 
@@ -53,8 +58,47 @@ def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str
         cells = []
         for title, text, width in zip(head, row, widths, strict=True):
             space = " " * (width - display_width(text))
-            cells.append(space + text if title == "messages" else text + space)
+            cells.append(space + text if title in NUMBERS else text + space)
         yield "  ".join(cells).rstrip() + "\n"
+
+
+def size_text(size: int) -> str:
+    """Return a number of bytes with a unit."""
+    value, units = float(size), iter(("B", "kB", "MB", "GB"))
+    unit = next(units)
+    while value >= 1000 and unit != "GB":
+        value, unit = value / 1000, next(units)
+    return f"{value:.4g} {unit}"
+
+
+def _summary(subject: str, facts: RecordingFacts) -> str:
+    """Return the line about a whole recording."""
+    from idlc.diagnostics.terminal import counted
+    from idlc.diagnostics.text import one_line
+    from idlc.recordings.times import date_text
+
+    parts = [counted(facts.messages, "message"), size_text(facts.size)]
+    if facts.start is not None and facts.end is not None:
+        parts.append(f"{(facts.end - facts.start) / 1e9:.9g} s")
+        parts.append(f"{date_text(facts.start)} to {date_text(facts.end)}")
+    return f"{one_line(subject)}: {', '.join(parts)}\n"
+
+
+def _recording(subject: str, style: str, scope: Scope, report: Report) -> None:
+    """Write the summary of a recording, and its topics."""
+    from idlc.cli import output
+    from idlc.tasks import show
+
+    whole, topics = show.recording(subject, scope, report)
+    if style == "json":
+        if whole:
+            output.fact(sys.stdout, "recording", **whole._asdict())
+        for facts in topics:
+            output.fact(sys.stdout, "topic", **facts._asdict())
+        return
+    if whole:
+        sys.stdout.write(_summary(subject, whole))
+    sys.stdout.writelines(_table(topics))
 
 
 def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
@@ -134,35 +178,71 @@ def _robot(address: str, style: str, scope: Scope, report: Report) -> None:
         sys.stdout.write(f"similar names: {sent} has no receiver, and {received} no sender\n")
 
 
-@click.command("show", epilog=options.example("idlc show geometry_msgs/msg/PoseStamped"))
+@click.command(
+    "show",
+    epilog=options.example(
+        "idlc show geometry_msgs/msg/PoseStamped", "idlc show std_msgs/msg/Header --format hash"
+    ),
+)
 @click.argument(
     "subject", metavar="TYPE|PATH|REC", type=click.Path(), shell_complete=completion.types_and_paths
 )
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @options.output_style(
-    ("text", "json", "ros2idl", "jsonschema", "mcap"),
-    "Output format: text, JSON facts, IDL, JSON Schema or an MCAP schema.",
+    ("text", "json", "hash", "type-description", "ros2idl", "jsonschema", "mcap", "msg"),
+    "Output format: text, JSON facts, type hashes (RIHS01), the type description that ROS 2 "
+    "installs as JSON, IDL, JSON Schema, an MCAP schema, or the files of the recorded definitions "
+    "(see --out).",
 )
-@options.scoped(options.package, options.include, options.distro)
+@click.option(
+    "-o",
+    "--out",
+    metavar="DIR",
+    type=click.Path(file_okay=False),
+    help="With --format msg, the folder to write a recording's .msg, .srv, .action and .idl files "
+    "to: a package in each folder.",
+)
+@options.scoped(options.package, options.include, options.exclude, options.distro)
 def command(
-    subject: str, topics: tuple[str, ...], style: str, scope: Scope, report: Report
+    subject: str,
+    topics: tuple[str, ...],
+    style: str,
+    out: str | None,
+    scope: Scope,
+    report: Report,
 ) -> None:
     """Show an interface with its nested messages and all comments.
 
-    REC is a recording: an .mcap or .db3 file, or a bag folder. For a recording, idlc lists each
-    topic with its type, message count and type hash, and shows whether your local type matches.
-    With TOPIC, it shows the recorded definitions of these topics.
+    For a recording, idlc lists each topic with its type, message count and type hash, and shows
+    whether your local type matches. With TOPIC, it shows the recorded definitions of these topics.
 
     REC can also be the address of a robot, such as `dds` or tcp/robot:7447. idlc lists the robot's
     topics, services and actions, and the nodes that use them. It also reports incompatible
     endpoints.
+
+    With --format hash, idlc prints the hashes of all TYPE, PATH and REC arguments, and for a
+    service or action those of the messages that ROS 2 derives from it.
     """
     from idlc.cli import output
     from idlc.project.find import is_address
     from idlc.recordings.find import is_recording
     from idlc.tasks import show
 
-    if not is_recording(subject, scope.root):
+    is_of_recording = is_recording(subject, scope.root)
+    if (style == "msg") != (out is not None) or (style == "msg" and not is_of_recording):
+        raise click.UsageError("`--format msg` and `-o DIR` belong together, and need a recording")
+    if out is not None:
+        from idlc.api.sources import read_source
+        from idlc.recordings.packages import write_definitions
+
+        for path in write_definitions(read_source, subject, topics, out, scope, report):
+            sys.stdout.write(f"{path}\n")
+        return
+    if style == "hash" and not (topics and is_of_recording):
+        paint = output.painter(sys.stdout)
+        for value, name in show.hashes((subject, *topics), scope, report):
+            sys.stdout.write(f"{paint('value', value)}  {name}\n")
+    elif not is_of_recording:
         if topics:
             raise click.UsageError(
                 f"`{subject}` is not a recording; TOPIC selects from an .mcap or .db3 file or a bag"
@@ -174,10 +254,7 @@ def command(
         output.texts(definitions, style, sys.stdout, interfaces=True)
     elif is_address(subject) and style in options.FORMATS:
         _robot(subject, style, scope, report)
-    elif style == "json":
-        for facts in show.topics(subject, scope, report):
-            output.fact(sys.stdout, "topic", **facts._asdict())
-    elif style == "text":
-        sys.stdout.writelines(_table(show.topics(subject, scope, report)))
+    elif style in ("json", "text"):
+        _recording(subject, style, scope, report)
     else:
         raise click.UsageError(f"--format {style} needs a topic; `idlc show {subject}` lists them")

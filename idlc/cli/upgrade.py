@@ -89,14 +89,14 @@ EPILOG += "\n" + options.example(
 )
 @click.option(
     "--to",
-    metavar="PATH|git:REF|distro:NAME",
-    help="The types to upgrade to: a package folder, a git revision, or the standard interfaces "
-    "of a distribution. By default, idlc uses the types of this machine.",
+    metavar="PATH|REC|git:REF|distro:NAME",
+    help="The types to upgrade to: a package folder, another recording, a git revision, or the "
+    "standard interfaces of a distribution. By default, idlc uses the types of this machine.",
 )
 @click.option(
     "--from",
     "old",
-    metavar="PATH|git:REF|distro:NAME",
+    metavar="PATH|REC|git:REF|distro:NAME",
     help="The old types, for recordings that do not contain their definitions, such as .db3 files "
     "of Humble.",
 )
@@ -127,6 +127,7 @@ EPILOG += "\n" + options.example(
     is_flag=True,
     help="If the new version does not contain the type of a message, keep the message unchanged.",
 )
+@click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @options.packages
 @options.distro
 @options.style
@@ -159,7 +160,7 @@ def command(
     again = shlex.join(("idlc", "upgrade", *options.typed("write_rules", "dry_run", "style")))
     where = scope(settings, package, include, exclude, distro)
     request = UpgradeOptions(recordings, where, out, again=again, **arguments)
-    result = Result([], [], [])
+    result = Result([], [], [], {})
     if not report.had_errors:
         with output.progress_bar(sys.stderr) as update:
             result = upgrade_recordings(request, report, update)
@@ -197,5 +198,8 @@ def _show(result: Result, request: UpgradeOptions, style: str, *, failed: bool) 
                 topic = topics[entry.topic]
                 fate = "converted" if topic.converted else "copied under the new definition"
                 fate = fate if entry.plan else "kept under the old type"
-                lines.append(f"  {entry.topic}: {counted(topic.messages, 'message')} {fate}")
+                line = f"  {entry.topic}: {counted(topic.messages, 'message')} {fate}"
+                lines += [line] if line not in lines else []
+        if len(lines) == 1:
+            lines.append("  no types changed")
         output.texts(("".join(f"{one_line(line)}\n" for line in lines),), "text", sys.stdout)

@@ -236,6 +236,7 @@ MISSING_DEFINITION = DiagnosticCode("IDL652", "missing-definition", WARNING)
 SEVERAL_DEFINITIONS = DiagnosticCode("IDL653", "several-definitions", ERROR)
 RECORDED_HASH_DIFFERS = DiagnosticCode("IDL654", "recorded-hash-differs", WARNING)
 NO_SUCH_TOPIC = DiagnosticCode("IDL655", "no-such-topic", ERROR, usage=True)
+DAMAGED_RECORDING = DiagnosticCode("IDL656", "damaged-recording", ERROR)
 
 # upgrades of recordings
 RULE_NEEDED = DiagnosticCode("IDL661", "rule-needed", ERROR)

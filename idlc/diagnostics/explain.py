@@ -1,4 +1,4 @@
-"""All codes: their pages as one Markdown document, which is docs/rules.md, and their names."""
+"""All codes: their pages as one Markdown document, and their names."""
 
 from __future__ import annotations
 

@@ -146,9 +146,21 @@ MAX_TEXT = 1 << 20
 def model_of_sources(
     texts: Mapping[ir.TypeName, str], name: ir.TypeName, type_hash: str, program: str = "a node"
 ) -> Model | None:
-    """Return the model of texts, if the type `name` has this hash in it."""
+    """Return the model of texts, if the type `name` has this hash in it.
+
+    The catalogue replaces incomplete texts of standard types if these have that hash, too.
+    """
     if sum(map(len, texts.values())) > MAX_TEXT:
         return None
+    standard = {own for own, text in texts.items() if INCOMPLETE in text and catalog.source(own)}
+    rest = {own: text for own, text in texts.items() if own not in standard}
+    model = _model(rest, name, type_hash, program) if standard else None
+    return model or _model(texts, name, type_hash, program)
+
+
+def _model(
+    texts: Mapping[ir.TypeName, str], name: ir.TypeName, type_hash: str, program: str
+) -> Model | None:
     report = Report()
     own = [
         lower(parse(Source(f"{own} ({program})", text, program)), own, report, NEWEST)

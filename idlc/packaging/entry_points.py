@@ -9,13 +9,22 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from posixpath import normpath
 from typing import Any, TypeAlias
 
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
+from idlc.packaging.layout import Layout
 from idlc.packaging.outcome import Edited, Outcome, Refused, Script, already_taken, split
-from idlc.packaging.setup_edits import append_element, is_spread, margin_of, step_of
-from idlc.packaging.setup_py import Setup, name_of_call, parse, range_of
+from idlc.packaging.setup_edits import (
+    append_element,
+    insertion,
+    is_spread,
+    margin_of,
+    step_of,
+)
+from idlc.packaging.setup_py import DataFiles, Setup, name_of_call, parse, range_of
 from idlc.project.settings import toml
 
 SECTION = "options.entry_points"
@@ -226,7 +235,6 @@ def _in_literal(setup: Setup, value: ast.Constant, script: Script, *, in_section
 PYPROJECT = "pyproject.toml"
 SETUP_CFG = "setup.cfg"
 SETUP_PY = "setup.py"
-TABLE = "project.scripts"
 
 
 def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, Outcome]:
@@ -234,12 +242,13 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
 
     The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
     """
-    project = _project(files.get(PYPROJECT, ""))
-    if isinstance(project, Refused):
-        return PYPROJECT, project._replace(line=_line(script))
-    dynamic = project.get("dynamic", ())
-    if project and not {"scripts", "entry-points"}.intersection(dynamic):
-        return PYPROJECT, _in_pyproject(files[PYPROJECT], project, script)
+    for name in ("project", "tool.poetry"):
+        project = _table(files.get(PYPROJECT, ""), name)
+        if isinstance(project, Refused):
+            return PYPROJECT, project._replace(line=_line(script))
+        dynamic = project.get("dynamic", ())
+        if project and not {"scripts", "entry-points"}.intersection(dynamic):
+            return PYPROJECT, _in_pyproject(files[PYPROJECT], name, project, script)
     in_cfg = _section(files.get(SETUP_CFG, "").splitlines(), SECTION)
     if SETUP_PY in files and not in_cfg:
         return SETUP_PY, add_to_setup(files[SETUP_PY], script)
@@ -249,11 +258,14 @@ def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, O
     return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
 
 
-def _project(text: str) -> dict[str, Any] | Refused:
+def _table(text: str, name: str) -> dict[str, Any] | Refused:
+    """Return a table of a pyproject.toml, empty if there is none."""
     try:
-        table = toml(text).get("project", {})
+        table: Any = toml(text)
     except ValueError:
-        return Refused("this is not valid TOML", "", f"to [{TABLE}]")
+        return Refused("this is not valid TOML", "", f"to [{name}.scripts]")
+    for key in name.split("."):
+        table = table.get(key) if isinstance(table, dict) else None
     return table if isinstance(table, dict) else {}
 
 
@@ -262,10 +274,10 @@ def _line(script: Script) -> str:
     return f'{key} = "{script.target}"'
 
 
-def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome:
-    """Return a pyproject.toml with another line in `[project.scripts]`, added if missing."""
-    why = "idlc cannot edit the scripts"
-    refused = Refused(why, _line(script), f"to [{TABLE}]")
+def _in_pyproject(text: str, name: str, project: dict[str, Any], script: Script) -> Outcome:
+    """Return a pyproject.toml with another line in the table of scripts, added if missing."""
+    why, table = "idlc cannot edit the scripts", f"{name}.scripts"
+    refused = Refused(why, _line(script), f"to [{table}]")
     scripts = project.get("scripts", {})
     if script.name in scripts:
         if script.same(f"{script.name} = {scripts[script.name]}"):
@@ -273,28 +285,60 @@ def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome
         why = already_taken(script, str(scripts[script.name]), refused.where).why
         return refused._replace(why=why)
     lines = text.splitlines(keepends=True)
-    section = _section(lines, TABLE)
-    at, header = (section[1], []) if section else (len(lines), ["", f"[{TABLE}]"])
+    section = _section(lines, table)
+    at, header = (section[1], []) if section else (len(lines), ["", f"[{table}]"])
     edited = _inserted(lines, at, [*header, _line(script)])
     expected = {**project, "scripts": {**scripts, script.name: script.target}}
-    return edited if _project(edited.text) == expected else refused
+    return edited if _table(edited.text, name) == expected else refused
 
 
-WHERE = "to `data_files` in the call of setup()"
+def add_launch(text: str, package: str, path: str) -> tuple[str, str]:
+    """Return a setup.py that installs a launch file, and the line that it lacks, if any.
 
-
-def add_launch(text: str, package: str, path: str) -> Outcome:
-    """Return a setup.py that installs a launch file.
-
-    One that names `launch` anywhere does so already; one without `data_files` installs none.
+    The line is for a setup.py that idlc cannot edit or that computes its `data_files`.
     """
     element = f"('share/{package}/launch', ['{path}'])"
-    if parse(text) is None:
-        return Refused("this is not valid Python", f"{element},", WHERE)
     setup = Setup(Source("setup.py", text))
-    if "data_files" not in setup.arguments or any("launch" in line for line in _lines(setup)):
-        return Edited(text)
-    listed = setup.list_of("data_files")
-    if listed is None:
-        return Refused("the data files are not a literal list", f"{element},", WHERE)
-    return Edited(apply(text, append_element(setup.source, listed, element))[0])
+    entries, listed = setup.data_files, setup.list_of("data_files")
+    if any(_installs(entry, path) for entry in entries or ()):
+        return text, ""
+    if setup.call is None or listed is None or entries is None:
+        return text, element
+    return apply(text, append_element(setup.source, listed, element))[0], ""
+
+
+def _installs(entry: DataFiles, path: str) -> bool:
+    """Return whether an entry of `data_files` installs a file; computed names of files may be it.
+
+    A pattern fits only files in its own folder.
+    """
+    if entry.files is None:
+        return entry.folder is None or "launch" in entry.folder
+    return any(
+        pattern.count("/") == path.count("/") and fnmatchcase(path, pattern)
+        for pattern in map(normpath, entry.files)
+    )
+
+
+def add_package(text: str, package: str, view: Layout | None) -> tuple[str, str]:
+    """Return a setup.py that installs a Python package, and what it lacks, if anything.
+
+    `view` is setuptools' view of the folders, the package's included. What is computed stays.
+    """
+    setup = Setup(Source("setup.py", text))
+    missing = f"add `{package}` to `packages`, unless the code that computes it does so"
+    if view is None or (view.installed is None and "packages" in setup.arguments):
+        return text, missing
+    if view.installed is None or view.installed.covers(package, view.folder(package)):
+        return text, ""
+    listed = setup.list_of("packages")
+    target = setup.value(setup.arguments.get("packages"))
+    edits: tuple[Edit, ...] = ()
+    if listed is not None:
+        edits = append_element(setup.source, listed, f"'{package}'")
+    elif isinstance(target, ast.Call):
+        end = range_of(setup.source, target)[1]
+        edits = (insertion(setup.source, end, f" + ['{package}']"),)
+    if not edits:
+        return text, f"add `{package}` to `packages` in `{view.installed.place.source.path}`"
+    return apply(text, edits)[0], ""

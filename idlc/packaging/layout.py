@@ -134,6 +134,20 @@ def layout(
     return Layout(roots or {}, Installed(place, is_nothing=True) if is_nothing else None)
 
 
+#: The backend of a package that names none.
+SETUPTOOLS = "setuptools.build_meta"
+
+
+def build_backend(document: Mapping[str, Any]) -> str:
+    """Return the build backend that a pyproject.toml names, or that its settings are for."""
+    system, tool = document.get("build-system"), document.get("tool")
+    backend = system.get("build-backend") if isinstance(system, dict) else None
+    if isinstance(backend, str):
+        return backend
+    is_poetry = isinstance(tool, dict) and "poetry" in tool
+    return "poetry.core.masonry.api" if is_poetry else SETUPTOOLS
+
+
 def _is_within(root: str) -> bool:
     """Return whether a folder is within the package's."""
     return re.fullmatch(r"(?!/)[\w./ -]*", root) is not None and ".." not in root.split("/")

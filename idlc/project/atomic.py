@@ -42,6 +42,35 @@ def only_writer_on_windows() -> Iterator[bool]:
         kernel.CloseHandle(handle)
 
 
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[bool | None]:
+    """Lock a folder until the end, or until the process ends.
+
+    Gives False if another process has locked it, and `None` where folders cannot be locked.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield None
+        return
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        yield False
+        return
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        except OSError:  # not on every network file system
+            yield None
+        else:
+            yield True
+    finally:
+        os.close(handle)
+
+
 _WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
 
 

@@ -1,4 +1,4 @@
-"""The type definitions in a recording → interface texts by name.
+"""The type definitions in a recording → interface texts by name; and the texts of recorders.
 
 The texts are not trusted: names that ROS 2 does not allow are ignored, and of repeated
 definitions the first counts.
@@ -13,6 +13,8 @@ from typing import NamedTuple, TypeAlias
 from idlc.diagnostics.source import Source
 from idlc.language.parse import LINE_ENDS
 from idlc.model import ir, names
+from idlc.model.idl_text import file_text
+from idlc.model.link import Model, held
 from idlc.project.files import MAX_LINES
 from idlc.recordings.containers.container import Schema, Topic
 
@@ -129,3 +131,25 @@ def _definitions(topic: Topic, root: ir.TypeName) -> Iterator[tuple[ir.TypeName,
             # as every distribution reads it, without the line ends that recorders add
             tidy = text.rstrip("\r\n") + "\n" if text.strip() else ""
             yield own, "idl" if is_idl else own.kind, tidy if is_idl else _ODDITIES.sub(r"\1", tidy)
+
+
+#: The line between messages in an MCAP schema of encoding `ros2msg`.
+MCAP_LINE = "=" * 80
+
+
+def mcap_text(interface: ir.Interface, model: Model) -> str:
+    """Return a message's MCAP schema of encoding `ros2msg`: its text and nested messages' texts."""
+    text = file_text(interface)
+    for name in held(interface, model):
+        line_end = "" if not text or text.endswith("\n") else "\n"
+        text += f"{line_end}{MCAP_LINE}\nMSG: {name.package}/{name.name}\n"
+        text += file_text(model.interfaces[name])
+    return text if not text or text.endswith("\n") else f"{text}\n"
+
+
+def definition_text(interface: ir.Interface, model: Model) -> str:
+    """Return the text that a recorder writes: an interface's file, and those it refers to."""
+    text = mcap_text(interface, model)
+    if isinstance(interface, ir.Message):
+        return text
+    return f"{MCAP_LINE}\n{interface.name.kind.upper()}: {interface.name}\n{text}"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from glob import glob, has_magic
 from pathlib import Path
 
 from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS, is_address
 from idlc.project.root import MANIFEST, Root
-from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
+from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES, natural
 
 #: Cannot be read, which opening it reports.
 ROS_1 = ".bag"
@@ -59,8 +60,18 @@ def files(words: Iterable[str], root: Root) -> list[Path]:
 def expand(word: str) -> list[str]:
     """Return the paths that a word means, which may be a pattern such as `bags/*.mcap`."""
     if has_magic(word) and not is_there(word) and not is_address(word):
-        return sorted(glob(word, recursive=True))  # noqa: PTH207 - keeps what was typed
+        paths = glob(word, recursive=True)  # noqa: PTH207 - keeps what was typed
+        return sorted(paths, key=natural)
     return [word]
+
+
+def in_order(words: Sequence[str]) -> list[str]:
+    """Return the files of a split recording in the order of their numbers; others as they are.
+
+    A shell sorts the matches of a pattern as texts: drive_10.mcap before drive_2.mcap.
+    """
+    is_split = len({re.sub(r"\d+", "0", word) for word in words}) == 1
+    return sorted(words, key=natural) if is_split else list(words)
 
 
 def recordings_of(

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import cached_property, lru_cache
 from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+import msgspec
+
 from idlc.compiler.compiler import Compiler, library_for, sources_of
+from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.model import ir
-from idlc.model.distros import Distro
+from idlc.model.distros import BY_NAME, DISTROS, Distro, titles
 from idlc.model.python_names import class_
 from idlc.model.type_data import content
 from idlc.project.find import is_path
@@ -21,9 +25,11 @@ from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.recordings.containers.container import Topic
+from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
+from idlc.recordings.lengths import fits
 from idlc.recordings.memory import (
     Models,
     class_in,
@@ -172,15 +178,32 @@ class TopicType:
         return class_in(home_of(self._models), self._name)
 
 
-def type_of(topic: Topic, include: tuple[str, ...] = ()) -> TopicType:
+def type_of(
+    topic: Topic,
+    include: tuple[str, ...] = (),
+    distro: str | None = None,
+    sample: Callable[[], Sequence[Raw]] = tuple,
+) -> TopicType:
     """Return the type of a topic's messages.
 
     Warns if something else had to be used than what was recorded, or if that is not what the
-    topic's publisher said it is.
+    topic's publisher said it is. Where a definition is missing and `distro` does not say of which
+    distribution it is, it is the one that a `sample` of messages fits, if the local one does not.
     """
-    topic_type, report = _type_of(topic, include, Scope(Root.here()).distro)
+    release = BY_NAME[distro] if distro else Scope(Root.here()).distro
+    topic_type, report = _type_of(topic, include, release)
+    borrowed = any(problem.code == codes.MISSING_DEFINITION.id for problem in report)
+    title = ""
+    if borrowed and distro is None:
+        raws = sample()
+        if raws and not fits(topic_type.structure, raws):
+            topic_type, title = _fitting(topic, include, raws) or (topic_type, "")
     for diagnostic in report:
-        warnings.warn(MissingDefinitionWarning(topic.name, diagnostic.message), stacklevel=2)
+        message = diagnostic.message
+        if title:
+            what = message.partition("; ")[0]
+            message = f"{what}; idlc uses the type of {title}, which fits the messages"
+        warnings.warn(MissingDefinitionWarning(topic.name, message), stacklevel=2)
     if list(report):  # the local definitions that are used instead may change
         _type_of.cache_clear()
     if topic.hash not in (None, topic_type.structure.hash):
@@ -189,9 +212,51 @@ def type_of(topic: Topic, include: tuple[str, ...] = ()) -> TopicType:
     return topic_type
 
 
+def _fitting(
+    topic: Topic, include: tuple[str, ...], raws: Sequence[Raw]
+) -> tuple[TopicType, str] | None:
+    """Return the type that fits messages, and its distributions; `None` if it is not the only one.
+
+    Types are looked up in each distribution of ROS 2.
+    """
+    every: dict[str, tuple[TopicType, list[Distro]]] = {}
+    for distro in DISTROS:
+        with suppress(RecordingError):
+            other, _ = _compiled(topic, include, distro)
+            if fits(other.structure, raws):
+                every.setdefault(other.structure.hash, (other, []))[1].append(distro)
+    if len(every) != 1:
+        return None
+    ((fitting, distros),) = every.values()
+    return fitting, titles(tuple(distros))
+
+
+def known_versions(
+    topic: Topic, include: tuple[str, ...], others: Iterable[Topic]
+) -> Iterator[tuple[str, Structure]]:
+    """Yield other versions of a topic's type, each with the words that name it.
+
+    They are those of `others`, that of this machine, and those of each distribution of ROS 2.
+    """
+    release = Scope(Root.here()).distro
+    bare = msgspec.structs.replace(topic, schema=None, hash=None)
+    candidates = [
+        *(("another version in the recording", other, release) for other in others),
+        ("the version on this machine", bare, release),
+        *((f"the version of ROS 2 {distro.title}", bare, distro) for distro in DISTROS),
+    ]
+    for words, candidate, distro in candidates:
+        with suppress(RecordingError):
+            yield words, _compiled(candidate, include, distro)[0].structure
+
+
 @lru_cache(maxsize=64)
-def _type_of(topic: Topic, include: tuple[str, ...], _: Distro) -> tuple[TopicType, Report]:
-    types, report = _types(topic, include)
+def _type_of(topic: Topic, include: tuple[str, ...], distro: Distro) -> tuple[TopicType, Report]:
+    return _compiled(topic, include, distro)
+
+
+def _compiled(topic: Topic, include: tuple[str, ...], distro: Distro) -> tuple[TopicType, Report]:
+    types, report = _types(topic, include, distro)
     if not types.topics or types.errors or report.had_errors:
         problems = [*types.errors, *report]
         first = min(problems, key=lambda problem: problem.severity, default=None)
@@ -201,8 +266,11 @@ def _type_of(topic: Topic, include: tuple[str, ...], _: Distro) -> tuple[TopicTy
     return TopicType(types.models, types.topics[0].name), report
 
 
-def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
-    where, report = Scope(Root.here(), include=include), Report()
+def _types(
+    topic: Topic, include: tuple[str, ...], distro: Distro | None = None
+) -> tuple[RecordedTypes, Report]:
+    distros = (distro,) if distro else ()
+    where, report = Scope(Root.here(), include=include, distros=distros), Report()
     (version,) = versions([read_definition(topic, topic.name)])
     return recorded_types(version, LocalTypes(where, report), report), report
 

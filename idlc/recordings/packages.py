@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -13,7 +14,7 @@ from idlc.diagnostics.report import Diagnostic, Label, Report, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.model import ir
-from idlc.project import inputs, prefixes
+from idlc.project import inputs, prefixes, write
 from idlc.project.library import InterfaceTexts
 from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
@@ -109,3 +110,34 @@ def recorded_packages(
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
     home = scope.root.absolute(paths[0])
     return [msgspec.structs.replace(package, home=home) for package in packages], types.texts
+
+
+def write_definitions(
+    read: Reader, recording: str, topics: Sequence[str], out: str, scope: Scope, report: Report
+) -> list[str]:
+    """Write each definition of a recording, or of some topics, to its file; return their paths.
+
+    Files that exist with another content are an error, and nothing is written.
+    """
+    groups = versions(topics_of(read, [recording], topics, scope.root, report) or ())
+    check_versions(groups, report)
+    if report.had_errors:
+        return []
+    files: dict[str, bytes] = {}
+    for name, source in groups[0].texts.items() if groups else ():
+        suffix = "idl" if source.is_idl else name.kind
+        files[f"{name.package}/{name.kind}/{name.name}.{suffix}"] = source.text.encode()
+    if not files:
+        report.add(codes.NO_INTERFACES.of(recording, f"`{recording}` contains no definitions"))
+        return []
+    folder, shown = Path(scope.root.path(out)).absolute(), out.rstrip("/")
+    changes = write.compare(folder, shown, files, {}, report)
+    for change in changes:
+        if change.old is not None:
+            path = write.shown(shown, change.path)
+            hint = "choose another folder with -o"
+            report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint=hint))
+    plan = write.WritePlan(folder, tuple(changes), {})
+    if report.had_errors or not write.apply(plan, shown, report):
+        return []
+    return [write.shown(shown, path) for path in files]

@@ -6,20 +6,50 @@ Whatever is not of a changed topic keeps its content, order and compression.
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
-from idlc.project.atomic import ended_by_errors, make_folder, move_new, uninterrupted
+from msgspec.structs import replace
+
+from idlc.project.atomic import (
+    ended_by_errors,
+    locked,
+    make_folder,
+    move_new,
+    uninterrupted,
+)
 from idlc.recordings.containers import bag
+from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.container import is_db3
-from idlc.recordings.containers.conversion import Conversion, Recorded, RewrittenTopic
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.conversion import (
+    Conversion,
+    Conversions,
+    Recorded,
+    RewrittenTopic,
+)
+from idlc.recordings.containers.db3_to_mcap import as_mcap
+from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes
+from idlc.recordings.damage import Damage, DamageList
 
 __all__ = ["Conversion", "RewrittenTopic", "rewrite"]
+
+#: New drafts that are made if other runs remove them as abandoned before they are locked.
+ATTEMPTS = 3
+
+
+class Rewritten(NamedTuple):
+    """The fate of each topic of a recording, and the parts that are damaged."""
+
+    topics: dict[str, RewrittenTopic]
+    damage: tuple[Damage, ...]
+
 
 #: Called with a file's name, how much of it is done, and its size.
 Progress = Callable[[str, int, int], object]
@@ -27,19 +57,26 @@ Progress = Callable[[str, int, int], object]
 BESIDE = ("-journal", "-shm", "-wal")
 
 
+def mcap_name(path: Path) -> str:
+    """Return the name of the MCAP file that a recording becomes."""
+    plain = path.with_name(path.name.removesuffix(bag.ZSTD))
+    return plain.with_suffix(".mcap").name if plain.suffix == ".db3" else plain.name
+
+
 def rewrite(
     source: str,
     target: str,
-    conversions: Mapping[str, Conversion],
+    conversions: Conversions,
     progress: Progress = lambda *_: None,
     *,
     index: bool = True,
-) -> dict[str, RewrittenTopic]:
+    strict: bool = False,
+) -> Rewritten:
     """Write a recording with conversions of topics, by their names, to a path that is free.
 
-    Both are files of one format, or folders of bags. Without `index`, the counts in MCAP files are
-    not used. Returns the fate of each topic. Raises RecordingError, and what `convert` raises:
-    then nothing is left of the target.
+    Files that are written are MCAP, and folders are those of bags. Without `index`, the counts in
+    MCAP files are not used. What is damaged is left out, or an error if `strict`. Raises
+    RecordingError, and what `convert` raises: then nothing is left of the target.
     """
     start, end = Path(source), Path(target)
     if os.path.lexists(end):
@@ -48,7 +85,7 @@ def rewrite(
     if start.resolve() in end.resolve().parents:
         raise RecordingError(f"`{target}` is inside of `{source}`")
     with _draft(end) as draft:
-        rewriting = _Rewriting(conversions, index, progress)
+        rewriting = _Rewriting(conversions, index, progress, strict)
         if start.is_dir():
             rewriting.folder(start, draft)
         else:
@@ -59,72 +96,131 @@ def rewrite(
                     os.fsync(file.fileno())
         with uninterrupted():
             move_new(draft, end)
-    return rewriting.topics
+    return Rewritten(rewriting.topics, tuple(rewriting.damage))
 
 
 @contextmanager
 def _draft(target: Path) -> Iterator[Path]:
     """Give a path in a hidden folder beside the target, which is removed at the end."""
     created: list[Path] = []
-    folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    with ended_by_errors():
+    folder = target.parent
+    with ended_by_errors(), ExitStack() as held:
         try:
             make_folder(target.parent, created)
-            folder.mkdir()
+            _remove_abandoned(target)
+            for _ in range(ATTEMPTS):
+                folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+                folder.mkdir()
+                is_locked = held.enter_context(locked(folder))
+                if is_locked is not False and folder.exists():
+                    break  # no other run has taken it for an abandoned one meanwhile
             yield folder / target.name
             created = []
         except OSError as error:
             reason = error.strerror or error
             raise RecordingError(f"`{target}` cannot be written: {reason}") from None
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            if folder != target.parent:
+                shutil.rmtree(folder, ignore_errors=True)
             for path in reversed(created):
                 with suppress(OSError):
                     path.rmdir()
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove the drafts of runs that were killed: nobody has locked them anymore."""
+    name = re.compile(re.escape(f".{target.name}.") + "[0-9a-f]{8}")
+    for folder in target.parent.iterdir():
+        if name.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
+            with locked(folder) as is_mine:
+                if is_mine:
+                    shutil.rmtree(folder, ignore_errors=True)
 
 
 class _Rewriting:
     """The files of one recording; `topics` sums up what was written."""
 
     def __init__(
-        self, conversions: Mapping[str, Conversion], index: bool, progress: Progress
+        self, conversions: Conversions, index: bool, progress: Progress, strict: bool
     ) -> None:
         self.conversions = conversions
         self.index = index
         self.progress = progress
         self.recorded: dict[str, Recorded] = {}
+        self.strict = strict
         self.topics: dict[str, RewrittenTopic] = {}
+        self.damage: list[Damage] = []
 
     def file(self, path: Path, target: Path) -> None:
         """Write a file."""
+        if first_bytes(path).startswith(ZSTD_MAGIC):
+            self.packed(path, target)
+            return
         progress = partial(self.progress, path.name)
-        if is_db3(path):
-            from idlc.recordings.containers.db3_rewrite import rewrite_db3
+        with target.open("xb") as file:
+            if is_db3(path):
+                from idlc.recordings.containers.db3_to_mcap import convert_db3
 
-            topics = rewrite_db3(path, target, self.conversions, self.recorded, progress)
-        else:
-            from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
+                how = self.conversions, self.recorded, progress, self.strict
+                topics, damage = convert_db3(path, file, *how)
+            else:
+                from idlc.recordings.containers.mcap_rewrite import rewrite_mcap
 
-            with target.open("xb") as file:
+                damage = DamageList(str(path), self.strict)
                 topics = rewrite_mcap(
-                    path, file, self.conversions, self.recorded, self.index, progress
+                    path, file, self.conversions, self.recorded, self.index, progress, damage
                 )
+        self.damage += damage
         for name, own in topics.items():
             before = self.topics.get(name, RewrittenTopic(0, 0, own.converted))
             count, size = before.messages + own.messages, before.size + own.size
-            self.topics[name] = RewrittenTopic(count, size, own.converted)
+            is_converted = own.converted or before.converted
+            self.topics[name] = RewrittenTopic(count, size, is_converted)
+
+    def packed(self, path: Path, target: Path) -> None:
+        """Write a file that is compressed as a whole; the new one is not."""
+        known = len(self.damage)
+        with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
+            plain = Path(folder, path.name.removesuffix(bag.ZSTD))
+            problem = unpack(path, plain)
+            if problem and self.strict:
+                raise DamageError(f"`{path}`: {problem}")
+            try:
+                self.file(plain, target)
+            except RecordingError as error:
+                message = error.message.replace(str(plain), str(path))
+                raise type(error)(message, error.hint) from None
+        found = [replace(damage, file=str(path)) for damage in self.damage[known:]]
+        self.damage[known:] = [*([Damage(str(path), problem)] if problem else []), *found]
+
+    def split(self, path: Path, target: Path, is_only: bool) -> None:
+        """Write one of the files of a bag; others do not need it."""
+        try:
+            self.file(path, target)
+        except DamageError as error:
+            if self.strict or is_only:
+                raise
+            target.unlink(missing_ok=True)
+            self.damage.append(Damage(str(path), error.message.replace(f"`{path}`", "it")))
 
     def folder(self, folder: Path, target: Path) -> None:
         """Write a bag, with all that is in its folder."""
-        paths, _ = bag.files_of(folder)
+        bag_files = bag.files_of(folder)
+        paths = bag_files.paths
+        self.damage += bag_files.missing
         beside = {f"{path.name}{suffix}" for path in paths for suffix in BESIDE}
-        types = {name: (own.type, own.type_hash) for name, own in self.conversions.items()}
+        types: dict[str, tuple[str, str]] = {}
+        for name, new in self.conversions.items():
+            last = new if isinstance(new, Conversion) else new[-1]
+            types[name] = last.type, last.type_hash
         target.mkdir()
         for path in sorted(folder.iterdir()):
             if path in paths:
-                self.file(path, target / path.name)
-            elif path.name == bag.METADATA and (new := bag.retyped(path, types)) is not None:
-                (target / path.name).write_bytes(new)
+                self.split(path, target / mcap_name(path), len(paths) == 1)
+            elif path.name == bag.METADATA and (data := bag.retyped(path, types)) is not None:
+                is_mcap = all(path.suffix == ".mcap" for path in paths)
+                data = data if is_mcap else as_mcap(data.decode()).encode()
+                (target / path.name).write_bytes(data)
             elif path.name not in beside:
                 _copy(path, target / path.name)
 

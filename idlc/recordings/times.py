@@ -58,6 +58,16 @@ def moment(value: Any, start: Callable[[], int]) -> int:
     raise _no_time(value)
 
 
+def date_text(time: int) -> str:
+    """Return a time of a recording, in nanoseconds since 1970, as a date in UTC."""
+    seconds, nanoseconds = divmod(time, SECOND)
+    try:
+        date = _EPOCH + timedelta(seconds=seconds)
+    except OverflowError:
+        return f"{seconds}.{nanoseconds:09}"
+    return f"{date:%Y-%m-%d %H:%M:%S}.{nanoseconds:09}"
+
+
 def _no_time(value: Any) -> TypeError:
     return TypeError(f"a time is an int in nanoseconds, a text or a datetime, not {value!r}")
 

@@ -25,8 +25,9 @@ from idlc.project.library import InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.file import UnreadTopic
+from idlc.recordings.containers.file import CDR, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
+from idlc.recordings.damage import Damage
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import oversized
@@ -40,6 +41,29 @@ class RecordingTopics(NamedTuple):
 
     topics: tuple[RecordedDefinition, ...]
     unread: tuple[UnreadTopic, ...] = ()
+    damage: tuple[Damage, ...] = ()
+    summary: Summary | None = None
+
+
+class Summary(NamedTuple):
+    """The times of the first and last message, the bytes of the files, and of each topic."""
+
+    span: tuple[int, int] | None
+    size: int
+    sizes: dict[str, int]
+
+
+#: Reports list so much damage of a recording.
+LISTED = 20
+
+
+def damage_problems(path: str, damage: Sequence[Damage]) -> Iterator[Diagnostic]:
+    """Yield IDL656 for the damage of a recording."""
+    for each in damage[:LISTED]:
+        yield codes.DAMAGED_RECORDING.of(path, str(each))
+    if len(damage) > LISTED:
+        message = f"{len(damage) - LISTED:,} more parts of the recording are damaged"
+        yield codes.DAMAGED_RECORDING.of(path, message)
 
 
 #: Returns the topics of a recording by its path, and maybe those of a robot by its address.
@@ -54,23 +78,35 @@ class Version(msgspec.Struct):
 
 
 def read_topics(
-    path: str, root: Root, report: Report, *, check: bool = False
+    path: str, root: Root, report: Report, *, check: bool = False, verify: bool = False
 ) -> RecordingTopics | None:
     """Return the topics of a recording; report IDL651 and return `None` for other files.
 
     Reports name it by `path`, as the user wrote it. With `check`, topics that cannot be read are in
-    `unread`.
+    `unread`, and there is a summary. With `verify`, all messages are read, so that all damage is
+    known.
     """
     place = root.path(path) if is_local(path) else path
     if not is_there(place):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
         return None
     try:
-        with open_recording(place) as container:
+        with open_recording(place, check=True if verify else None) as container:
+            if verify:
+                container.verify()
             report.notes += container.notes
             cache: TextCache = {}
             topics = tuple(read_definition(topic, path, cache) for topic in container.topics)
-            return RecordingTopics(topics, tuple(container.unread()) if check else ())
+            unread = tuple(container.unread()) if check else ()
+            summary = None
+            if check:
+                size = sum(file.size for file in container.files)
+                summary = Summary(container.span(), size, container.sizes())
+            damage = tuple(
+                msgspec.structs.replace(each, file=each.file.replace(place, path))
+                for each in container.damage
+            )
+            return RecordingTopics(topics, unread, damage, summary)
     except RecordingError as error:
         message = error.message.replace(place, path)
         hint = error.hint.replace(place, path) if error.hint else None
@@ -288,7 +324,9 @@ class RecordedTypes:
             recorded, name, interface = topic.topic, topic.name, topic.interface
             schema = recorded.schema
             reason = f" ({topic.problem})" if topic.problem else ""
-            if not recorded.type:
+            if recorded.encoding != CDR:
+                why = f"its messages are written as `{recorded.encoding}`, not as ROS 2 writes them"
+            elif not recorded.type:
                 why = "its type is not a ROS 2 type"
             elif name is None or interface is None:
                 encoding = schema.encoding if schema else ""
@@ -310,8 +348,9 @@ class RecordedTypes:
         for (recording, why), names in missing.items():
             listed = first_few((f"`{name}`" for name in names), NAMED)
             advice = f"{including('DIR')}, where DIR contains the package's sources"
-            hint = None if "no type of" in why else advice
-            message = f"idlc skips {listed}: {why}"
+            is_other = "not as ROS 2 writes them" in why
+            hint = None if is_other or "no type of" in why else advice
+            message = f"idlc {'does not read' if is_other else 'skips'} {listed}: {why}"
             report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
 
     def _substitutions(self) -> Iterator[Diagnostic]:

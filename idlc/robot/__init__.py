@@ -11,6 +11,7 @@ from idlc.robot.nodes.arguments import remove_ros_args as remove_ros_args
 from idlc.robot.nodes.clock import Clock as Clock
 from idlc.robot.nodes.clock import ClockType as ClockType
 from idlc.robot.nodes.clock import Duration as Duration
+from idlc.robot.nodes.clock import GuardCondition as GuardCondition
 from idlc.robot.nodes.clock import Time as Time
 from idlc.robot.nodes.clock import Timer as Timer
 from idlc.robot.nodes.context import Context as Context
@@ -25,6 +26,7 @@ from idlc.robot.nodes.endpoints import SubscriptionEventCallbacks as Subscriptio
 from idlc.robot.nodes.executor import Executor as Executor
 from idlc.robot.nodes.executor import ExternalShutdownException as ExternalShutdownException
 from idlc.robot.nodes.executor import Future as Future
+from idlc.robot.nodes.executor import MultiThreadedExecutor as MultiThreadedExecutor
 from idlc.robot.nodes.executor import (
     MutuallyExclusiveCallbackGroup as MutuallyExclusiveCallbackGroup,
 )

@@ -66,7 +66,7 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
     name: str = ""
     type: str = ""
     hash: str = ""
-    qos: QoSProfile = QoSProfile()
+    qos: QoSProfile = msgspec.field(default_factory=QoSProfile)
     token: str = ""
 
     def __post_init__(self) -> None:
@@ -97,9 +97,9 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
         return xxh3_128_intdigest(self.token.encode()).to_bytes(GID_SIZE, "little")
 
 
-def all_tokens(domain: int) -> str:
-    """Return the key expression of all tokens of a domain."""
-    return f"{_PREFIX}/{domain}/**"
+def all_tokens(domain: int | None) -> str:
+    """Return the key expression of all tokens of a domain, or of all domains."""
+    return f"{_PREFIX}/{'*' if domain is None else domain}/**"
 
 
 def _make_token(entity: Entity) -> str:

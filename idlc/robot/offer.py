@@ -28,7 +28,10 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
         " ParameterAlreadyDeclaredException ParameterException ParameterNotDeclaredException"
         " ParameterUninitializedException"
     ),
-    "rclpy.executors": "Executor ExternalShutdownException SingleThreadedExecutor",
+    "rclpy.executors": (
+        "Executor ExternalShutdownException MultiThreadedExecutor SingleThreadedExecutor"
+    ),
+    "rclpy.guard_condition": "GuardCondition",
     "rclpy.logging": "LoggingSeverity get_logger",
     "rclpy.parameter": "Parameter parameter_value_to_python",
     "rclpy.qos": (

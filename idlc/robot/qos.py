@@ -54,7 +54,7 @@ class LivelinessPolicy(IntEnum):
     BEST_AVAILABLE = 5
 
 
-class QoSProfile(msgspec.Struct, frozen=True, kw_only=True):
+class QoSProfile(msgspec.Struct, kw_only=True):
     """Quality of service of one endpoint.
 
     Durations are nanoseconds, or objects that have `nanoseconds`, such as rclpy's; a profile
@@ -84,6 +84,14 @@ class QoSProfile(msgspec.Struct, frozen=True, kw_only=True):
                 raise ValueError(f"{name} must be between 0 and {most}, not {number}")
             msgspec.structs.force_setattr(self, name, number)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Change a value; endpoints have a profile of their own, which stays as it is."""
+        changed = msgspec.structs.replace(self, **{name: value})
+        msgspec.structs.force_setattr(self, name, getattr(changed, name))
+
+    def __hash__(self) -> int:
+        return hash(msgspec.structs.astuple(self))
+
     @property
     def is_latched(self) -> bool:
         """True if late subscriptions get earlier messages."""
@@ -108,8 +116,10 @@ qos_profile_rosout_default = QoSProfile(
 
 
 def qos_profile(value: QoSProfile | int) -> QoSProfile:
-    """Return a profile as it is, or the default profile with this depth."""
-    return value if isinstance(value, QoSProfile) else QoSProfile(depth=value)
+    """Return a copy of a profile, or the default profile with this depth."""
+    if isinstance(value, QoSProfile):
+        return msgspec.structs.replace(value)
+    return QoSProfile(depth=value)
 
 
 #: The offered and the requested value that do not fit; durations fit if they are not longer.

@@ -112,7 +112,7 @@ def open_session(
         "listen/endpoints": _LOOPBACK,
     }
     where = f"`{one_line(address or path)}`" if address or path else "the router"
-    hint = f"is rmw_zenohd or `idlc robot router` running there? idlc waited {timeout:g} s"
+    hint = f"is rmw_zenohd or `idlc router` running there? idlc waited {timeout:g} s"
     return _open(path or settings, domain, environ, f"{where} does not answer", hint)
 
 

@@ -87,8 +87,8 @@ class Transport(Protocol):
     def watch(self, domain: int, callback: Callable[[str, bool], None]) -> Closeable:
         """Call `callback` with each token of a domain, now and later: True appears, False goes."""
 
-    def tokens(self, domain: int, timeout: float) -> Iterable[str]:
-        """Yield the tokens of a domain that exist now.
+    def tokens(self, domain: int | None, timeout: float) -> Iterable[str]:
+        """Yield the tokens of a domain that exist now; `None`: of all that can be seen.
 
         Raises TimeoutError after `timeout` seconds if answers may be missing.
         """

@@ -129,7 +129,7 @@ class ZenohTransport:
         subscriber = self._liveliness.declare_subscriber(pattern, _direct(receive), history=True)
         return _Declared(self._declared, subscriber)
 
-    def tokens(self, domain: int, timeout: float) -> Iterator[str]:
+    def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:
         """Query the liveliness tokens that exist."""
         # The session answers from its own memory before `get` returns, so nothing may block there
         replies: SimpleQueue[Any] = SimpleQueue()

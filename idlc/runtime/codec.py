@@ -171,8 +171,8 @@ def functions(kind: type) -> Functions:
         return pair
     codecs = owner._codec_
     little = codecs("<")
-    encode, decode = little.encode, little.decode
-    join = b"".join
+    encode, decode, join = little.encode, little.decode, b"".join
+    view: Any = None
 
     def serialize(self: Any, byteorder: str = "little") -> Any:
         try:
@@ -183,9 +183,12 @@ def functions(kind: type) -> Functions:
             raise encode_error(self, byteorder, error) from error
 
     def deserialize(buffer: Any, copy: bool = True) -> Any:
+        nonlocal view
         try:
             if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
-                return (decode if copy else codecs("<", VIEWING).decode)(buffer)
+                if not copy and view is None:
+                    view = codecs("<", VIEWING).decode
+                return (decode if copy else view)(buffer)
             return read(codecs, buffer, copy)
         except DecodeError:
             raise
@@ -251,8 +254,7 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
     """Return each message's bytes; raise ValidationError that names the message by its index."""
     if byteorder not in ORDERS:
         raise ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    encode = kind._codec_(ORDERS[byteorder]).encode
-    join = b"".join
+    encode, join = kind._codec_(ORDERS[byteorder]).encode, b"".join
     messages = list(messages)
     result: list[bytes] = []
     put = result.append
@@ -271,9 +273,7 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
 def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]:
     """Return the message of each buffer; raise DecodeError that names the buffer by its index."""
     if owner_of(kind) is not kind:
-        return [
-            _indexed(kind, buffer, copy, index) for index, buffer in enumerate(buffers)
-        ]
+        return [_indexed(kind, raw, copy, index) for index, raw in enumerate(buffers)]
     codecs = kind._codec_
     decode = codecs("<", READINGS[bytes.decode, copy]).decode
     result: list[Any] = []

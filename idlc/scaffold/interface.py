@@ -29,7 +29,7 @@ def check_interface_name(name: str) -> str:
     return name
 
 
-def interface_text(kind: str, fields: Sequence[str], comment: str = "") -> str:
+def interface_text(kind: str, fields: Sequence[str]) -> str:
     """Return the text of an interface file; without fields, all parts are empty.
 
     Raises ValueError for a wrong number of parts, and for a field that is more than one line.
@@ -52,10 +52,7 @@ def interface_text(kind: str, fields: Sequence[str], comment: str = "") -> str:
             f"a .{kind} file has {part_count} parts: add `---` before the fields of {rest}"
         )
     parts += [[] for _ in range(part_count - len(parts))]
-    head = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
-    gap = "\n" if head and parts[0] else ""
-    body = f"{SEPARATOR}\n".join("".join(f"{line}\n" for line in part) for part in parts)
-    return head + gap + body
+    return f"{SEPARATOR}\n".join("".join(f"{line}\n" for line in part) for part in parts)
 
 
 #: The first content of a new file.
@@ -81,7 +78,8 @@ def starter(word: str) -> tuple[str, str]:
             f"`{word}` is not an interface name; write `Drive`, `srv/Ask` or `action/Walk`"
         )
     path = f"{kind}/{check_interface_name(name)}.{kind}"
-    return path, interface_text(kind, _STARTERS[kind], "An example. Describe the interface here.")
+    head = ("# An example. Describe the interface here.", "")
+    return path, interface_text(kind, (*head, *_STARTERS[kind]))
 
 
 WHERE = "to the packages that rosidl_generate_interfaces() depends on, and find_package() it"
@@ -123,7 +121,6 @@ def interface(
     kind: ir.Kind,
     name: str,
     fields: Sequence[str],
-    comment: str,
     settings: Settings,
     report: Report,
 ) -> Result | None:
@@ -133,7 +130,7 @@ def interface(
         return None
     own = project.package
     path = f"{kind}/{name}.{kind}"
-    text = interface_text(kind, fields, comment)
+    text = interface_text(kind, fields)
     load_settings(settings.root, report)  # reports what is wrong with them
     source = Source(project.shown(path), text)
     named = [(ir.TypeName(own, kind, name), source)]

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -15,13 +17,15 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
+from idlc.diagnostics.terminal import counted
 from idlc.model.names import is_module_name, why_not_package
 from idlc.packaging.facts import home_of
+from idlc.packaging.layout import SETUPTOOLS, build_backend
 from idlc.project.files import entries, is_file
-from idlc.project.find import CLOSING, KIND_FOLDERS, list_files
+from idlc.project.find import CLOSING, KIND_FOLDERS, NOTHING, list_files
 from idlc.project.package_xml import declared_name, read_statements
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import SETTINGS_FILE, broken_toml, load_settings, toml
+from idlc.project.settings import SETTINGS_FILE, broken_toml, load_settings, scope, toml
 
 Kind: TypeAlias = Literal["ament_python", "ament_cmake", "library", "empty", "workspace"]
 
@@ -58,11 +62,10 @@ class Layout(NamedTuple):
                 sentence = f"{self.name} is an ament_cmake package with {interfaces}"
                 return f"{sentence}; CMake still builds it"
             case "library":
-                tool = self.backend.partition(".")[0]
-                where = f"in {self.home} (built with {_TOOLS.get(tool, tool)})"
+                where = f"in {self.home} (built with {tool_of(self.backend)})"
                 return f"{self.name} is a Python library {where} with {interfaces}"
             case "workspace":
-                return f"this is a workspace of {len(self.packages)} packages"
+                return f"this is a workspace of {counted(len(self.packages), 'package')}"
         return f"this folder has no package yet; idlc creates the ament_python package {self.name}"
 
 
@@ -82,14 +85,26 @@ def layout_of(root: Root, report: Report) -> Layout | None:
         return None
     tool = document.get("tool", {})
     is_poetry = isinstance(tool, dict) and "poetry" in tool
-    if "project" in document or "build-system" in document or is_poetry:
+    is_project = "project" in document or "build-system" in document or is_poetry
+    config = load_settings(root, Report())
+    exclude = scope(config).exclude if config.folder == folder else NOTHING
+    listing = list_files((".",), root, report, exclude)
+    is_outside = any(not _is_in(file.path, listing.packages) for file in listing.files)
+    is_set = bool(config.out) and config.folder == folder
+    # a library may contain packages for its tests, or beside its own interfaces
+    aside = [package.relative_to(folder).parts[0] in _NO_LIBRARY for package in listing.packages]
+    is_library = is_project and (is_outside or is_set or all(aside))
+    if listing.packages and not is_library:
+        return Layout("workspace", folder, packages=listing.packages)
+    if is_project:
         return _library(root, document, report)
     if is_file(folder / SETUP):
         return _library(root, {}, report)
-    packages = list_files((".",), root, report).packages
-    if packages:
-        return Layout("workspace", folder, packages=packages)
     return _empty(root, report)
+
+
+def _is_in(file: Path, packages: Iterable[Path]) -> bool:
+    return any(file.is_relative_to(package) for package in packages)
 
 
 def _of_manifest(root: Root, report: Report) -> Layout | None:
@@ -110,7 +125,7 @@ def _of_manifest(root: Root, report: Report) -> Layout | None:
     types = [each for each in types if each in ("ament_python", "ament_cmake")] or types
     if types == ["ament_python"]:
         home = home_of(folder, name, root).relative_to(folder).as_posix()
-        return Layout("ament_python", folder, name, home, backend="setuptools.build_meta")
+        return Layout("ament_python", folder, name, home, backend=_backend(root, report))
     if types in ([], ["ament_cmake"]) and is_file(folder / "CMakeLists.txt"):
         return Layout("ament_cmake", folder, name, f"build/{name}")
     kind = f"of the build type `{types[0]}`" if types else "without a build type"
@@ -118,6 +133,17 @@ def _of_manifest(root: Root, report: Report) -> Layout | None:
     hint = f"generate its classes with `idlc gen . -o build/{name}`"
     report.add(codes.CANNOT_EDIT.of(MANIFEST, message, hint=hint))
     return None
+
+
+def _backend(root: Root, report: Report) -> str:
+    """Return the build backend of an ament_python package; colcon runs a setup.py first."""
+    source = None
+    if is_file(root.base / SETTINGS_FILE) and not is_file(root.base / SETUP):
+        source = root.read_source(SETTINGS_FILE, SETTINGS_FILE, report)
+    document: dict[str, Any] = {}
+    with suppress(ValueError):  # the settings in it are reported later
+        document = toml(source.text) if source else {}
+    return build_backend(document)
 
 
 def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | None:
@@ -128,7 +154,7 @@ def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | N
         for key in ("build-system", "project")
     )
     backend = system.get("build-backend")
-    backend = backend if isinstance(backend, str) else "setuptools.build_meta"
+    backend = backend if isinstance(backend, str) else SETUPTOOLS
     if backend == "idlc.backend":
         message = f"`{backend}` builds ROS 2 packages, but there is no {MANIFEST}"
         hint = "`idlc scaffold package my_msgs --interfaces` creates a folder that you can build"
@@ -163,6 +189,12 @@ def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | N
     place = SETTINGS_FILE if document else SETUP
     report.add(codes.CANNOT_EDIT.of(place, message, hint=hint, detail=detail))
     return None
+
+
+def tool_of(backend: str) -> str:
+    """Return the name of the tool that a build backend belongs to."""
+    tool = backend.partition(".")[0]
+    return _TOOLS.get(tool, tool)
 
 
 def package_of(library: str) -> str:
@@ -207,5 +239,5 @@ def _empty(root: Root, report: Report) -> Layout | None:
         message = f"the folder's name is not a valid package name: `{name or folder.name}` {why}"
         report.add(codes.UNIMPORTABLE_PACKAGE.of("", message, hint=hint))
     else:
-        return Layout("empty", folder, name, name, backend="setuptools.build_meta")
+        return Layout("empty", folder, name, name, backend=SETUPTOOLS)
     return None

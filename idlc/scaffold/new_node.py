@@ -5,17 +5,22 @@ Everything is a function of the texts of the package's files.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.compiler.compiler import compile_package, stage
-from idlc.diagnostics.report import Report
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.source import Source
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.packaging import dependencies, entry_points, launch_py
-from idlc.packaging.facts import folders
+from idlc.packaging.facts import folders, home_of
+from idlc.packaging.layout import layout
 from idlc.packaging.outcome import Edited, Outcome, Refused, Script
+from idlc.packaging.setup_py import Setup
+from idlc.project.package_xml import statements
 from idlc.project.prefixes import distribution, python_folders
 from idlc.project.settings import load_settings
 from idlc.scaffold import changes, interface, spec
@@ -44,14 +49,17 @@ class Entry(NamedTuple):
     notes: tuple[tuple[str, str], ...] = ()
 
 
-def paths(package: str, launch_files: Iterable[str]) -> list[str]:
-    """Return the files of a package whose texts decide; `launch_files` are names in `launch/`."""
+def paths(package: str, launch_files: Iterable[str], home: str = "") -> list[str]:
+    """Return the files of a package whose texts decide; `launch_files` are names in `launch/`.
+
+    `home` is the folder of the Python package, by default that of its name.
+    """
     listed = [name for name in launch_files if name.endswith(LAUNCH_ENDING)]
     usual = [f"{package}_launch.py", f"{package}.launch.py"]
     chosen = listed if len(listed) == 1 else [name for name in usual if name in listed]
     launch_file = f"launch/{next(iter(chosen), usual[0])}"
     shared = [f"{folder}/conftest.py" for folder in (TESTS, ROBUST_TESTS)]
-    return [*SETUP_FILES, MANIFEST, *shared, f"{package}/__init__.py", launch_file]
+    return [*SETUP_FILES, MANIFEST, *shared, f"{home or package}/__init__.py", launch_file]
 
 
 def node_entry(
@@ -61,11 +69,13 @@ def node_entry(
     launch: bool = True,
     keys: Iterable[str] = (),
     folders: Mapping[str, bool] = MappingProxyType({}),
+    home: str = "",
 ) -> Entry:
     """Return the changes that add a node to a package, but for its own files.
 
     `texts` are those of the package's files that exist. A package with interfaces,
-    whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name.
+    whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name,
+    and `home` is that of the Python package.
     A launch file lists the node, unless it does one thing and ends: that is for the command line.
     """
     node = planned.node
@@ -83,14 +93,21 @@ def node_entry(
         executes=("launch", "launch_ros") if launch else (),
     )
     edits: dict[str, Outcome] = {path: outcome, MANIFEST: manifest}
+    start = f"{home or node.package}/__init__.py"
+    notes = list(_installed_package(node.package, start, texts, edits, folders))
     # files that nodes need beside them
-    added = {} if f"{node.package}/__init__.py" in texts else {f"{node.package}/__init__.py": ""}
+    added = {} if start in texts else {start: ""}
     conftest = f"{_tests(planned)}/conftest.py"
     if conftest not in texts:
         template = f"node/{'short/' if planned.short else ''}conftest.py.jinja"
         added[conftest] = rendered_for(node.package, template)
-    if not launch:
-        return Entry(added, edits)
+    entry = Entry(added, edits, tuple(notes))
+    return _with_launch(entry, node, texts) if launch else entry
+
+
+def _with_launch(entry: Entry, node: spec.Node, texts: Mapping[str, str]) -> Entry:
+    """Return an entry that also adds the node to a launch file, which setup.py installs."""
+    added, edits, notes = {**entry.added}, {**entry.edits}, [*entry.notes]
     file = next((name for name in texts if name.startswith("launch/")), "")
     template = "package/launch.py.jinja"
     old = texts[file] if file else rendered_for(node.package, template)
@@ -98,14 +115,44 @@ def node_entry(
     path = file or f"launch/{node.package}_launch.py"
     if isinstance(started, Refused):
         line = f"add this {started.where}: {started.line.rstrip(',')}"
-        note = (path, f"is not edited: {started.why}; {line}")
-        return Entry(added if file else {**added, path: old}, edits, (note,))
-    if file:
-        return Entry(added, {**edits, path: started})
+        notes.append((path, f"is not edited: {started.why}; {line}"))
+        added |= {} if file else {path: old}
+    elif file:
+        edits[path] = started
+    else:
+        added[path] = started.text
     before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
     if SETUP in texts and isinstance(before, Edited):
-        edits[SETUP] = entry_points.add_launch(before.text, node.package, path)
-    return Entry({**added, path: started.text}, edits)
+        text, line = entry_points.add_launch(before.text, node.package, path)
+        edits[SETUP] = Edited(text)
+        if line:
+            why = f"does not show whether it installs `{path}`"
+            notes.append((SETUP, f"{why}: if not, add {line} to `data_files`"))
+    return Entry(added, edits, tuple(notes))
+
+
+def _installed_package(
+    package: str,
+    start: str,
+    texts: Mapping[str, str],
+    edits: dict[str, Outcome],
+    folders: Mapping[str, bool],
+) -> Iterator[tuple[str, str]]:
+    """Have setup.py install the Python package of a node; yield what is to do by hand.
+
+    `start` is the file that makes the folder a package.
+    """
+    before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
+    if SETUP not in texts or not isinstance(before, Edited):
+        return
+    sources = [Source(name, texts[name]) if name in texts else None for name in SETUP_FILES]
+    home = start.rpartition("/")[0].replace("/", ".")
+    setup = Setup(Source(SETUP, before.text))
+    view = layout(setup, sources[1], sources[0], {**folders, home: True})
+    text, missing = entry_points.add_package(before.text, package, view)
+    edits[SETUP] = Edited(text)
+    if missing and start not in texts:
+        yield SETUP, f"may not install the node: {missing}"
 
 
 def _tests(planned: Plan) -> str:
@@ -119,6 +166,10 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     if project is None:
         return None
     own, name = project.package, requested.name
+    if _is_cmake(project):
+        report.add(_needs_python(project))
+        return None
+    home = home_of(project.path, own, settings.root).relative_to(project.path).as_posix()
     load_settings(settings.root, report)  # reports what is wrong with them
     planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
@@ -126,31 +177,52 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     entry = Entry({}, {})
     with stage("scaffold", name):
         files = {
-            f"{own}/{name}.py": render(planned),
+            f"{home}/{name}.py": render(planned),
             f"{_tests(planned)}/test_{name}.py": render_test(planned),
         }
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)
-        wanted = paths(own, project.names("launch"))
+        wanted = paths(own, project.names("launch"), home)
         texts = {path: content for path in wanted if (content := project.text(path)) is not None}
         keys, present = project.keys(), folders(project.path)
-        entry = node_entry(planned, texts, launch=settings.launch, keys=keys, folders=present)
+        entry = node_entry(
+            planned, texts, launch=settings.launch, keys=keys, folders=present, home=home
+        )
         entry = entry._replace(added={**files, **entry.added})
     edited = project.accepted(entry.edits)
     result = None if edited is None else project.write(entry.added, edited)
     if result is None:
         return None
+    notes = _notes(planned, entry, project)
+    used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
+    compiled = any(interface.package == own for interface in used_names)
+    missing = not project.has(f"{home}/_type_data.py")
+    after = project.generation() if missing and compiled else ()
+    return result._replace(notes=tuple(notes), following=after)
+
+
+def _notes(planned: Plan, entry: Entry, project: Project) -> list[str]:
+    """Return what is left to do by hand, and the packages that cannot be imported here."""
     notes = [f"`{project.shown(path)}` {text}" for path, text in entry.notes]
     absent = [package for package in planned.packages if not python_folders(package)]
     if absent and python_folders("rclpy"):
         listed = ", ".join(f"`{package}`" for package in absent)
         distro = BY_NAME.get(distribution().name, DEFAULT)
         notes.append(f"{listed} cannot be imported here: {distro.installing(absent)}")
-    used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
-    compiled = any(interface.package == own for interface in used_names)
-    missing = not project.has(f"{own}/_type_data.py")
-    after = project.generation() if missing and compiled else ()
-    return result._replace(notes=tuple(notes), following=after)
+    return notes
+
+
+def _is_cmake(project: Project) -> bool:
+    """Return whether CMake builds a package, which then has no console scripts."""
+    declared = statements(Source(MANIFEST, project.text(MANIFEST) or ""))
+    types = {each.text for each in declared if each.tag == "build_type"}
+    return types == {"ament_cmake"} or (not types and project.has("CMakeLists.txt"))
+
+
+def _needs_python(project: Project) -> Diagnostic:
+    message = f"CMake builds `{project.package}`, and installs no console scripts"
+    hint = f"create a package for nodes beside it: `idlc scaffold package {project.package}_nodes`"
+    return codes.CANNOT_EDIT.of(project.shown(MANIFEST), message, hint=hint)
 
 
 def _planned(requested: spec.Node, project: Project, report: Report) -> Plan | None:

@@ -146,19 +146,17 @@ _Choice: TypeAlias = tuple[str, Span, list[str], str]
 
 def package(
     requested: Package,
-    folder: str,
     settings: Settings,
     report: Report,
     starters: Mapping[str, str] | None = None,
     chosen: Collection[str] = (),
 ) -> Result | None:
-    """Write a new package below `folder`, with interfaces if it has none yet.
+    """Write a new package, with interfaces if it has none yet.
 
     `chosen` are the fields of `requested`, and `starters`, that the user chose. Reports IDL620
     where files that stay as they are contradict them.
     """
-    name = requested.name if folder in ("", ".") else f"{folder}/{requested.name}"
-    project = Project(name, settings, report)
+    project = Project(requested.name, settings, report)
     with stage("scaffold", requested.name):
         available = catalog.packages(scope(load_settings(settings.root, report)).distro)
         depends = tuple(name for name in requested.depends if name in available)  # Humble lacks one

@@ -2,29 +2,59 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import msgspec
 
+from idlc.api.recording import Recording
 from idlc.api.sources import read_source
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
+from idlc.project.find import is_address
 from idlc.project.settings import Scope
+from idlc.recordings.containers.source import RecordingError, is_local
+from idlc.recordings.lengths import WrongDefinitionError
+from idlc.recordings.load import OtherDefinitionWarning
 from idlc.recordings.packages import check_versions, contradicted
-from idlc.recordings.types import LocalTypes, recorded_types, versions
+from idlc.recordings.types import LocalTypes, damage_problems, recorded_types, versions
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
-    """Report problems in the type definitions stored in recordings."""
+    """Report damage of recordings, and problems in their type definitions."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read_source(path, scope.root, report, check=True)
+        recording = read_source(path, scope.root, report, check=True, verify=True)
         groups = versions(recording.topics) if recording else []
         for message, hint in recording.unread if recording else ():
             problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
             report.add(msgspec.structs.replace(problem, severity=Severity.WARNING))
+        report.extend(damage_problems(path, recording.damage) if recording else ())
         check_versions(groups, report)
         for version in groups:
             types = recorded_types(version, local, report)
             report.extend(contradicted(types))
             report.extend(types.errors)
+        if recording is not None and not is_address(path):
+            _check_lengths(path, scope, report)
+
+
+def _check_lengths(path: str, scope: Scope, report: Report) -> None:
+    """Report topics whose messages are of another version than their definition."""
+    distro = scope.distros[0].name if scope.distros else None
+    place = scope.root.path(path) if is_local(path) else path
+    with (
+        warnings.catch_warnings(record=True) as caught,
+        Recording(place, include=scope.include, distro=distro) as recording,
+    ):
+        warnings.simplefilter("always")
+        for topic in recording.definitions():
+            try:
+                topic.compare_lengths()
+            except WrongDefinitionError as error:
+                report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
+            except RecordingError:
+                continue  # its definition has problems, or its messages cannot be read
+    for warning in caught:
+        if isinstance(warning.message, OtherDefinitionWarning) and "bytes" in str(warning.message):
+            report.add(codes.RECORDED_HASH_DIFFERS.of(path, str(warning.message)))

@@ -25,7 +25,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model.ir import DUMMY_FIELD
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
-from idlc.recordings.types import BORROWED, NAMED
+from idlc.recordings.types import BORROWED, NAMED, damage_problems
 from idlc.tasks.preview import Preview
 
 if TYPE_CHECKING:
@@ -197,10 +197,13 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
     conditions: tuple[Condition, ...] = ()
     nested: bool = False
     datetimes: bool = True
-    check: bool = False
+    check: bool | None = None
+    strict: bool = False
     use_index: bool = True
     force: bool = False
     include: tuple[str, ...] = ()
+    distro: str | None = None
+    type_name: str | None = None
 
 
 class WrittenFile(NamedTuple):
@@ -234,10 +237,11 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
             paths[0] if len(paths) == 1 else paths,
             index=options.use_index,
             check=options.check,
+            strict=options.strict,
             include=options.include,
+            distro=options.distro,
         ) as recording,
     ):
-        report.notes += recording.notes
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             for job in _jobs(recording, options, report):
@@ -251,6 +255,8 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
         for problem, topics in missing.items():
             text = f"{first_few(topics, NAMED)}: {problem}"
             report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
+        report.notes += recording.notes
+        report.extend(damage_problems(", ".join(paths), recording.damage))
     return done
 
 
@@ -273,7 +279,8 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
     for name in names:
         # a topic that was not selected by name does not keep others from being written
         with nullcontext() if options.topics else _problems(options, report):
-            topics.append(recording[name].between(options.start, options.end))
+            topic = recording.topic(name, options.type_name)
+            topics.append(topic.between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
     if problem := _problem(jobs, options):
         message, hint = problem

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
@@ -21,6 +22,10 @@ from idlc.project.find import find, is_path
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
 from idlc.recordings.find import split_recordings
+
+if TYPE_CHECKING:
+    from idlc.recordings.definitions import RecordedDefinition
+    from idlc.recordings.types import LocalTypes
 
 
 def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
@@ -45,7 +50,7 @@ def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | N
     (model, names) = models[0]
     tops = [str(own.name) for own in model.own if str(own.name) in names] or names
     if len(models) > 1 or len(tops) > 1:
-        hint = f"choose one, for example with `idlc describe {tops[0]}`"
+        hint = f"choose one, for example with `idlc show {tops[0]} --format type-description`"
         message = f"`{target}` contains several interfaces"
         report.add(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
         return None
@@ -122,7 +127,8 @@ class TopicFacts(NamedTuple):
 
     `hash` is the recorded hash, or the hash of the recorded definition. `here` compares it with the
     local type of the same name: same, differs or unknown. `definition` is the encoding of the
-    recorded one.
+    recorded one. `rate` is in messages per second, `size` the bytes of the messages, `qos` the
+    profiles of the publishers in few words.
     """
 
     name: str
@@ -131,35 +137,118 @@ class TopicFacts(NamedTuple):
     hash: str | None
     here: str
     definition: str | None
+    rate: float | None = None
+    size: int | None = None
+    qos: str = ""
 
 
-def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
-    """Return the topics of a recording, sorted by name; empty after an error."""
+class RecordingFacts(NamedTuple):
+    """The summary of a recording; times are nanoseconds, the size is that of the files."""
+
+    start: int | None
+    end: int | None
+    size: int
+    messages: int
+    damage: list[str]
+
+
+#: Times of numpy and Arrow end here, in the year 2262.
+END_OF_TIME = 1 << 63
+#: The values of profiles; Humble wrote numbers.
+PROFILE = re.compile(r"^[-\s]*(reliability|durability|history|depth):\s*(\w+)\s*$", re.MULTILINE)
+NUMBERS = {
+    "reliability": {"1": "reliable", "2": "best_effort"},
+    "durability": {"1": "transient_local", "2": "volatile"},
+    "history": {"1": "keep_last", "2": "keep_all"},
+}
+#: A profile takes a few hundred bytes.
+MOST_OF_PROFILES = 1 << 16
+
+
+def qos_text(profiles: str) -> str:
+    """Return the profiles of publishers in few words, each once."""
+    texts: dict[str, None] = {}
+    for profile in re.split(r"(?m)^-", profiles[:MOST_OF_PROFILES]):
+        values = {
+            key: NUMBERS.get(key, {}).get(value, value) for key, value in PROFILE.findall(profile)
+        }
+        if not values:
+            continue
+        words = [values.get("reliability", "?")]
+        if values.get("durability") == "transient_local":
+            words.append("transient_local")
+        is_all = values.get("history") == "keep_all"
+        words.append("keep_all" if is_all else f"depth {values.get('depth', '?')}")
+        texts[" ".join(words)] = None
+    return ", ".join(texts)
+
+
+def _topic_facts(
+    recorded: RecordedDefinition,
+    compiled: str | None,
+    local: LocalTypes,
+    rate: float | None,
+    size: int | None,
+) -> TopicFacts:
+    """Return what is shown of a topic; `compiled` is the hash of its definition."""
+    topic = recorded.topic
+    hash_, here, local_hash = topic.hash or compiled, "unknown", None
+    if recorded.name and recorded.interface:
+        local_hash = local.hash(recorded.name, recorded.interface)
+    if local_hash and hash_:
+        here = "same" if local_hash == hash_ else "differs"
+    schema = topic.schema
+    if schema and schema.is_blank and not compiled:
+        schema = None
+    definition = None
+    if schema:
+        definition = schema.encoding or "unknown"
+    own = (topic.name, topic.type, topic.count, hash_, here, definition)
+    return TopicFacts(*own, rate, size, qos_text(topic.qos))
+
+
+def recording(
+    path: str, scope: Scope, report: Report
+) -> tuple[RecordingFacts | None, list[TopicFacts]]:
+    """Return the summary of a recording and its topics, sorted by name; nothing after an error."""
     from idlc.api.sources import read_source
-    from idlc.recordings.types import LocalTypes, recorded_types, versions
+    from idlc.recordings.types import (
+        LocalTypes,
+        Summary,
+        damage_problems,
+        recorded_types,
+        versions,
+    )
 
     recording = read_source(path, scope.root, report, check=True)
-    report.notes += [topic.message for topic in recording.unread] if recording else []
+    if recording is None:
+        return None, []
+    report.notes += [topic.message for topic in recording.unread]
+    report.extend(damage_problems(path, recording.damage))
     local = LocalTypes(scope, report)
     facts = []
-    for version in versions(recording.topics) if recording else ():
+    span, size, sizes = recording.summary or Summary(None, 0, {})
+    if span and span[1] >= END_OF_TIME:
+        report.notes.append(f"`{path}`: a time is after the year 2262, so its length is not known")
+        span = None
+    seconds = (span[1] - span[0]) / 1e9 if span else 0
+    for version in versions(recording.topics):
         types = recorded_types(version, local, Report())
         own = (typed for typed in types.topics if typed.interface in types.texts)
         # a name may stand for several topics, of different types
         hashes = {id(typed.recorded): types.hash(typed) for typed in own}
         for recorded in version.topics:
             topic, compiled = recorded.topic, hashes.get(id(recorded))
-            hash_, here, local_hash = topic.hash or compiled, "unknown", None
-            if recorded.name and recorded.interface:
-                local_hash = local.hash(recorded.name, recorded.interface)
-            if local_hash and hash_:
-                here = "same" if local_hash == hash_ else "differs"
-            schema = topic.schema
-            if schema and schema.is_blank and not compiled:
-                schema = None
-            definition = schema.encoding or "unknown" if schema else None
-            facts.append(TopicFacts(topic.name, topic.type, topic.count, hash_, here, definition))
-    return sorted(facts, key=lambda row: (row.name, row.type_name))
+            rate = (topic.count - 1) / seconds if seconds and topic.count > 1 else None
+            size_of_topic = sizes.get(topic.name)
+            facts.append(_topic_facts(recorded, compiled, local, rate, size_of_topic))
+    facts.sort(key=lambda row: (row.name, row.type_name))
+    if recording.summary is None:
+        return None, facts
+    messages = sum(row.messages or 0 for row in facts)
+    start, end = span or (None, None)
+    damage = [str(each) for each in recording.damage]
+    return RecordingFacts(start, end, size, messages, damage), facts
 
 
 def definitions(
@@ -169,6 +258,10 @@ def definitions(
     from idlc.api.sources import read_source
     from idlc.recordings.types import LocalTypes, recorded_types, topics_of, versions
 
+    if style in ("hash", "type-description"):
+        scope = _with_hashes(scope, report)
+        if not scope.distro.has_hashes:
+            return
     recorded = topics_of(read_source, [path], selected, scope.root, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
@@ -226,6 +319,9 @@ def _rows(message: ir.Message, model: Model, margin: str) -> Iterator[tuple[str,
 
 def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
     """Return the interfaces of a type name or path, each as text in a format."""
+    if style == "type-description":
+        description = describe(target, scope, report)
+        return [_description(description)] if description else []
     texts = []
     wholes: list[ir.TypeName] = []
     for model, names in list(requested_models((target,), scope, report)):
@@ -241,22 +337,32 @@ def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
     return texts
 
 
+def _description(content: dict[str, object]) -> str:
+    return json.dumps(content, indent=2) + "\n"
+
+
 def shown(interface: ir.Interface, model: Model, style: str) -> str:
     """Return an interface in a format."""
     from idlc.generate import schemas
     from idlc.model import idl_text
-    from idlc.recordings import definition_text
+    from idlc.recordings.definitions import mcap_text
 
+    name = str(interface.name)
     match style:
         case "json":
             return json.dumps(schemas.facts(interface, model)) + "\n"
+        case "hash":
+            names = derived_names(interface)
+            return "".join(f"{model.describer.hash(each)}  {each}\n" for each in names)
+        case "type-description":
+            return _description(model.describer.installed(name))
         case "ros2idl":
             return idl_text.idl(interface)
         case "jsonschema":
             return json.dumps(schemas.json_schema(interface, model), indent=2) + "\n"
         case "mcap":
-            return definition_text.mcap(interface, model)
+            return mcap_text(interface, model)
     has_hashes = model.distro.has_hashes
-    head = [f"# {model.describer.hash(str(interface.name))}"] if has_hashes else []
-    lines = (f"# {interface.name}", *head, "", *outline(interface, model))
+    head = [f"# {model.describer.hash(name)}"] if has_hashes else []
+    lines = (f"# {name}", *head, "", *outline(interface, model))
     return "".join(f"{line}\n" for line in lines)

@@ -12,6 +12,7 @@ from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.model.python_names import field as attribute
 from idlc.versions.changes import Pairing, pair, tighter
+from idlc.versions.constants import Renumbering, renumbered
 from idlc.versions.units import factor
 
 #: Returns the class of a type by its full name.
@@ -97,14 +98,20 @@ class Finding(NamedTuple):
     proposal: str = ""
 
 
+ElementChange: TypeAlias = Literal[
+    "as is", "float", "int", "number", "byte as float", "byte", "nested"
+]
+
+
 class Step(NamedTuple):
     """The way from an old value to a new one.
 
-    `element` says what is done with each element: `as is`, `float`, `int` (of a bool), `number` (of
-    a byte), `byte` (of a number) or `nested`. `wraps` makes an array of one value.
+    `element` says what is done with each element: `as is`, `float`, `int` (of a bool), `number` or
+    `byte as float` (of a byte), `byte` (of a number) or `nested`. `wraps` makes an array of one
+    value.
     """
 
-    element: Literal["as is", "float", "int", "number", "byte", "nested"] = "as is"
+    element: ElementChange = "as is"
     nested: Plan | None = None
     wraps: bool = False
     #: The bytes are the same, and so is the value in Python.
@@ -135,6 +142,10 @@ class RuleFile(Protocol):
     @property
     def units(self) -> Mapping[str, tuple[str, str]]:
         """The units that rules convert, by the field."""
+
+    @property
+    def constants(self) -> Mapping[str, tuple[str, str]]:
+        """The renumbered constants that rules convert, by the field."""
 
     @property
     def fields(self) -> frozenset[str]:
@@ -321,15 +332,22 @@ class _Planner:
             field.name for field in after.fields if rules and attribute(field.name) in rules.fields
         }
         fields: list[FieldPlan] = []
+        changes = renumbered(before, after)
         for field in after.fields:
             earlier = kept.get(field.name)
             is_moved = field.name in pairing.moved
             entry = self._field(old, new, field, earlier, is_moved=is_moved)
+            if field.name in changes and entry.step is not None:
+                entry = _renumbered_field(entry, changes[field.name])
             if earlier is None:
                 entry = self._without_counterpart(
                     entry, renamed.get(field.name), replaced.get(field.name)
                 )
-            covered = field.name in ruled and (old.key != new.key or _covers_unit(rules, entry))
+            covered = field.name in ruled and (
+                old.key != new.key
+                or _covers_unit(rules, entry)
+                or _covers_constants(rules, field.name, changes)
+            )
             if rules and covered:
                 reason = f"{entry.finding.reason or 'set'}, by the rule in {rules.path}"
                 finding = entry.finding._replace(fate="rule", reason=reason, proposal="")
@@ -350,7 +368,8 @@ class _Planner:
             if not (rules and replaced_by(field, replaced) & ruled)
         )
         plan.in_order = not (pairing.moved or pairing.added or pairing.removed or pairing.renamed)
-        plan.notes = tuple(_constants(before, after))
+        listed = {name for change in changes.values() for name in change.constants}
+        plan.notes = tuple(note for note in _constants(before, after) if note.field not in listed)
         return plan
 
     def _field(
@@ -466,16 +485,16 @@ class _Planner:
         return "the values are of another kind"
 
 
-_OCTETS = frozenset({"uint8", "char"})
+OCTETS = frozenset({"uint8", "char"})
 
 
 def _number(before: str, after: str) -> Step | str:
     """Return the way from one primitive to another, or the reason why values may not fit."""
-    if before == after or {before, after} <= _OCTETS:
+    if before == after or {before, after} <= OCTETS:
         return Step()
-    if before == "byte" and after in _OCTETS:
+    if before == "byte" and after in OCTETS:
         return Step("number", alike=False)
-    if after == "byte" and before in _OCTETS:
+    if after == "byte" and before in OCTETS:
         return Step("byte", alike=False)
     old, new = (ir.PRIMITIVES["uint8" if name == "byte" else name] for name in (before, after))
     changed = Step("number" if before == "byte" else "as is", same=False, alike=False)
@@ -491,7 +510,8 @@ def _number(before: str, after: str) -> Step | str:
     if new.low is None:
         # digits of the mantissa
         fits = old.high < 1 << (24 if new.size == 4 else 53)
-        return changed._replace(element="float") if fits else "not every number fits exactly"
+        element: ElementChange = "byte as float" if before == "byte" else "float"
+        return changed._replace(element=element) if fits else "not every number fits exactly"
     assert new.high is not None
     fits = new.low <= old.low and old.high <= new.high
     return changed if fits else "not every number fits"
@@ -500,6 +520,21 @@ def _number(before: str, after: str) -> Step | str:
 def _unit_changed(old: ir.Field, new: ir.Field) -> bool:
     units = old.unit, new.unit
     return all(unit and not ir.is_range(unit) for unit in units) and old.unit != new.unit
+
+
+def _renumbered_field(entry: FieldPlan, change: Renumbering) -> FieldPlan:
+    """Return the plan of a field whose values have another meaning in the new version."""
+    reason = f"`{entry.new.name}`: {change.reason}"
+    finding = entry.finding._replace(fate="needs a rule", reason=reason, proposal=change.proposal)
+    return FieldPlan(entry.new, entry.old, None, finding)
+
+
+def _covers_constants(
+    rules: RuleFile | None, field: str, changes: Mapping[str, Renumbering]
+) -> bool:
+    """Return whether rules between versions of one hash are about renumbered constants."""
+    pairs = [(change.old, change.new) for change in changes.values()]
+    return rules is not None and rules.constants.get(field) in pairs
 
 
 def _covers_unit(rules: RuleFile | None, entry: FieldPlan) -> bool:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy, deepcopy
 from operator import attrgetter
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 from idlc.model import ir
-from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import TopicType
 from idlc.runtime.checked import validate, validate_element
-from idlc.runtime.codec import FAILURES, maker
+from idlc.runtime.codec import maker
 from idlc.runtime.names import ValidationError, public_name, slot_name
 from idlc.runtime.typeinfo import FieldInfo, structure_of
 from idlc.versions.conversion import FieldPlan, Plan, Step, Version, is_list
@@ -52,29 +51,35 @@ class RuleError(ValueError):
         return f"{self.path}: the rule raised {words_of(self.error)}"
 
 
+def rule_result(name: str, rule: Function, old: Any) -> Any:
+    """Return what a rule returns for a message; raise RuleError if it raises."""
+    try:
+        result = rule(old)
+        return list(result) if hasattr(result, "__next__") else result
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # SystemExit would end idlc without a word
+        raise RuleError(name, error) from error
+
+
 class Converters:
-    """Makes the function of each plan, once.
+    """Makes the function of each plan, once; `functions` runs the rules of a file."""
 
-    `functions` runs the rules of a file. With `shares`, new messages may hold objects of the old
-    ones, of the old classes, where a codec writes them alike; they are for writing only.
-    """
-
-    def __init__(self, functions: RunRules, *, shares: bool) -> None:
+    def __init__(self, functions: RunRules) -> None:
         self._functions = functions
-        self._shares = shares
         self._made: dict[int, Function] = {}
 
     def message(self, plan: Plan) -> Function:
         """Return the function from an old message to a new one."""
         if id(plan) not in self._made:
             parts = [self.message(part) for part in plan.through]
-            self._made[id(plan)] = _chained(parts) if parts else self._direct(plan)
+            self._made[id(plan)] = chained(parts) if parts else self._direct(plan)
         return self._made[id(plan)]
 
     def _direct(self, plan: Plan) -> Function:
         kind = kind_of(plan.new)
-        if plan.alike and (self._shares or kind is kind_of(plan.old)):
-            return _same if self._shares else deepcopy
+        if plan.alike and kind is kind_of(plan.old):
+            return deepcopy
         make = maker(kind)
         ruled = [field for field in plan.fields if field.finding.fate == "rule"]
         names = {field.new.name for field in ruled}
@@ -99,18 +104,9 @@ class Converters:
         infos = {info.public: info for info in structure_of(kind).fields}
 
         def convert_by_rules(old: Any) -> Any:
-            new = make()
-            for slot, value in setters:
-                setattr(new, slot, value(old))
+            new = convert(old)
             for name, rule in rules:
-                try:
-                    result = rule(old)
-                    result = list(result) if hasattr(result, "__next__") else result
-                except KeyboardInterrupt:
-                    raise
-                except BaseException as error:  # SystemExit would end idlc without a word
-                    raise RuleError(name, error) from error
-                setattr(new, name, _adopted(result, infos[name]))
+                setattr(new, name, adopted(rule_result(name, rule, old), infos[name]))
             validate(new)
             return new
 
@@ -120,80 +116,74 @@ class Converters:
         """Return the function from the old message to the value of a field."""
         if field.old is None or field.step is None:
             value = getattr(default, slot_name(field.new.name))
-            if self._shares or isinstance(value, (bool, int, float, str, bytes)):
+            if isinstance(value, (bool, int, float, str, bytes)):
                 return lambda _: value
             return lambda _: deepcopy(value)
         get = attrgetter(slot_name(field.old.name))
-        change = self._step(field.step, field.new.type)
+        nested = field.step.nested
+        element = value_change(field.step) if nested is None else self.message(nested)
+        change = list_change(field.step, field.new.type, element, field.step.same)
+        if change is None and is_list(field.new.type):
+            change = copy
         if change is None:
             return get
-        if field.step.nested and field.step.nested.uses_rules:
+        if nested is not None and nested.uses_rules:
             mark = "[]" if is_list(field.new.type) and not field.step.wraps else ""
-            return _located(f"{field.new.name}{mark}", lambda old: change(get(old)))
+            return located(f"{field.new.name}{mark}", lambda old: change(get(old)))
         return lambda old: change(get(old))
 
-    def _step(self, step: Step, new: ir.FieldType) -> Function | None:
-        """Return the function from an old value to a new one; `None` for the value itself."""
-        element = self._element(step)
-        if not is_list(new):
-            return element
-        if step.wraps:
-            listed = _listing(new)
-            return lambda value: listed([element(value) if element else value])
-        numeric = _numeric(new)
-        if element is None and step.same:
-            return None if self._shares else copy
-        listed = _listing(new)
-        if numeric and step.element == "number":
-            return lambda values: listed(b"".join(values))
-        if element is None or (numeric and step.element != "nested"):
-            return listed
-        return lambda values: [element(value) for value in values]
 
-    def _element(self, step: Step) -> Function | None:
-        match step.element:
-            case "nested":
-                assert step.nested is not None
-                if step.nested.alike and self._shares:
-                    return None
-                return self.message(step.nested)
-            case "number":
-                return _first
-            case "byte":
-                return _byte
-            case "int":
-                return int
-            case "float":
-                return float
+def list_change(
+    step: Step, new: ir.FieldType, element: Function | None, is_same: bool
+) -> Function | None:
+    """Return the function from the old value of a field to the new one; `None` for the value.
+
+    `element` is the function of an element, and `is_same` says that lists are of the same kind.
+    """
+    if not is_list(new):
+        return element
+    listed = _listing(new)
+    if step.wraps:
+        return lambda value: listed([element(value) if element else value])
+    if element is None and is_same:
         return None
+    if _numeric(new) and step.element in ("number", "byte as float"):
+        return lambda values: listed(b"".join(values))
+    if element is None or (_numeric(new) and step.element != "nested"):
+        return listed
+    return lambda values: [element(value) for value in values]
 
 
-def _located(path: str, convert: Function) -> Function:
+def value_change(step: Step) -> Function | None:
+    """Return the function of an element that is no message; `None` for the element itself."""
+    return _CHANGES.get(step.element)
+
+
+def located(path: str, convert: Function) -> Function:
     """Return a function whose errors of rules lead to the field from the top."""
 
-    def located(message: Any) -> Any:
+    def at_path(message: Any) -> Any:
         try:
             return convert(message)
         except (RuleError, ValidationError) as error:
             error.path = f"{path}.{error.path}"
             raise
 
-    return located
+    return at_path
 
 
-def _same(message: Any) -> Any:
-    return message
+_CHANGES: dict[str, Function] = {
+    "number": lambda value: value[0],
+    "byte as float": lambda value: float(value[0]),
+    "byte": lambda value: bytes((value,)),
+    "int": int,
+    "float": float,
+}
 
 
-def _first(value: bytes) -> int:
-    return value[0]
+def chained(parts: Sequence[Function]) -> Function:
+    """Return a function that applies others, one after the other."""
 
-
-def _byte(value: int) -> bytes:
-    return bytes((value,))
-
-
-def _chained(parts: Sequence[Function]) -> Function:
     def convert(message: Any) -> Any:
         for part in parts:
             message = part(message)
@@ -227,7 +217,7 @@ def _listing(type_: ir.FieldType) -> Function:
     )
 
 
-def _adopted(value: Any, field: FieldInfo) -> Any:
+def adopted(value: Any, field: FieldInfo) -> Any:
     """Return what a rule returned, with messages of the new version's class."""
     name = field.public
     if field.is_list and (isinstance(value, (str, dict)) or not hasattr(value, "__iter__")):
@@ -254,43 +244,3 @@ def _adopted(value: Any, field: FieldInfo) -> Any:
     if field.is_list:
         return [adopt(message, f"{name}[{index}]") for index, message in enumerate(value)]
     return adopt(value, name)
-
-
-class Payloads(NamedTuple):
-    """The way of bytes: decode, convert, encode."""
-
-    kind: Any
-    new_kind: Any
-    convert: Function
-
-    @classmethod
-    def of(cls, plan: Plan, functions: RunRules) -> Payloads:
-        """Return the way that a plan describes."""
-        convert = Converters(functions, shares=True).message(plan)
-        return cls(kind_of(plan.old), kind_of(plan.new), convert)
-
-    def many(self, payloads: Iterable[Any], place: Callable[[int], str] = str) -> list[bytes]:
-        """Return new bytes; `place` says in errors which of them it was."""
-        decode = self.kind._codec_("<").decode
-        encode = self.new_kind._codec_("<").encode
-        convert, join = self.convert, b"".join
-        result: list[bytes] = []
-        put = result.append
-        for payload in payloads:
-            data = payload if type(payload) is bytes else bytes(payload)
-            try:
-                # the common case; the rest finds the words for what is wrong
-                if data[1] == 1 and not data[0]:
-                    put(encode(convert(decode(data)), join))
-                    continue
-            except (*FAILURES, TypeError, AttributeError):
-                pass
-            put(self._carefully(data, place(len(result))))
-        return result
-
-    def _carefully(self, data: bytes, place: str) -> bytes:
-        try:
-            encoded: bytes = self.convert(self.kind.deserialize(data)).serialize()
-        except ValueError as error:  # of this runtime, or of a package that has its own
-            raise RecordingError(f"{place}: {error}") from error
-        return encoded

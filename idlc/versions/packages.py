@@ -214,6 +214,7 @@ class BreakingSettings(msgspec.Struct, frozen=True):
 
     allow: TablesValue = ()
     against: TextValue = ""
+    levels: Annotated[tuple[Level, ...], Meta(title=f"a list of {', '.join(LEVELS)}")] = ()
 
 
 def _words(description: str) -> Meta:
@@ -250,6 +251,11 @@ def against(config: Config, report: Report) -> str | None:
     if place is not None:
         place.no_url("against", table.against, report)
     return table.against or None
+
+
+def levels(config: Config, report: Report) -> tuple[Level, ...]:
+    """Return the setting `levels`: the levels of changes that `idlc breaking` reports."""
+    return command_table(config, "breaking", BreakingSettings, report)[0].levels
 
 
 def allowances(config: Config, report: Report) -> tuple[Allowance, ...]:

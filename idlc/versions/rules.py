@@ -81,12 +81,20 @@ class Rules:
     @cached_property
     def units(self) -> Mapping[str, tuple[str, str]]:
         """The units that rules convert, by the field."""
-        value = self._value("UNITS")
+        return self._pairs("UNITS")
+
+    @cached_property
+    def constants(self) -> Mapping[str, tuple[str, str]]:
+        """The renumbered constants that rules convert, by the field."""
+        return self._pairs("CONSTANTS")
+
+    def _pairs(self, name: str) -> Mapping[str, tuple[str, str]]:
+        value = self._value(name)
         pairs = value.items() if isinstance(value, dict) else ()
         return {
-            name: units
-            for name, units in pairs
-            if isinstance(name, str) and isinstance(units, tuple) and len(units) == 2
+            field: pair
+            for field, pair in pairs
+            if isinstance(field, str) and isinstance(pair, tuple) and len(pair) == 2
         }
 
     @property

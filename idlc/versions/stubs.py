@@ -18,6 +18,7 @@ from idlc.project import write
 from idlc.project.root import Root
 from idlc.project.templates import Code, RenderedFile, Text, code
 from idlc.recordings.definitions import interface_of
+from idlc.versions.constants import renumbered
 from idlc.versions.conversion import FieldPlan, Key, Plan, Version, is_list
 from idlc.versions.rules import TYPES, Rules, read_rules
 
@@ -29,7 +30,9 @@ class _KeyView(NamedTuple):
     hash: Code
 
 
-class _UnitView(NamedTuple):
+class _PairView(NamedTuple):
+    """What a field had in both versions: a unit, or constants."""
+
     field: Code
     old: Code
     new: Code
@@ -93,10 +96,12 @@ def _file(plan: Plan) -> str:
     old, new = plan.old.key, plan.new.key
     functions = [_function(plan, field) for field in _open(plan)]
     lines = {_import(plan.old, plan.old), *(line for each in functions for line in each.imports)}
-    units = [
-        _UnitView(*(Code(string_literal(text)) for text in (name, *pair)))
+    units = [_pair_view(name, *pair) for field in _open(plan) for name, pair in _units(field)]
+    changes = renumbered(plan.old.message, plan.new.message)
+    constants = [
+        _pair_view(field.new.name, change.old, change.new)
         for field in _open(plan)
-        for name, pair in _units(field)
+        if (change := changes.get(field.new.name))
     ]
     view = {
         "title": Text(f"Rules from {old.short} to {new.short} of {new.type}."),
@@ -105,6 +110,7 @@ def _file(plan: Plan) -> str:
         "old": _key(old),
         "new": _key(new),
         "units": units,
+        "constants": constants,
         "class": Code(old.short),
         "functions": functions,
     }
@@ -124,6 +130,10 @@ def _completed(rules: Rules, plan: Plan) -> str:
 
 def _key(key: Key) -> _KeyView:
     return _KeyView(Code(string_literal(key.type)), Code(string_literal(key.hash)))
+
+
+def _pair_view(*texts: str) -> _PairView:
+    return _PairView(*(Code(string_literal(text)) for text in texts))
 
 
 def _units(field: FieldPlan) -> Iterator[tuple[str, tuple[str, str]]]:

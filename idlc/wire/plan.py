@@ -16,7 +16,7 @@ from idlc.model.python_names import Locals, slot
 from idlc.wire.layout import Messages
 
 
-class Place(msgspec.Struct, frozen=True):
+class Slot(msgspec.Struct, frozen=True):
     """The location of a value: a slot of the object in a local variable, of structure `type`.
 
     A value without an `owner` is only in its own variable. `path` has the names of all fields that
@@ -38,7 +38,7 @@ class Place(msgspec.Struct, frozen=True):
 class Number(msgspec.Struct, frozen=True):
     """A bool, byte, integer or float; `code` as in `struct`."""
 
-    place: Place
+    place: Slot
     code: str
     size: int
 
@@ -56,10 +56,10 @@ class Dummy(msgspec.Struct, frozen=True):
     size: int = 1
 
 
-class Block(msgspec.Struct, frozen=True):
+class NumberBlock(msgspec.Struct, frozen=True):
     """A fixed-size array of bools, bytes or numbers, moved as bytes."""
 
-    place: Place
+    place: Slot
     primitive: str
     count: int
 
@@ -85,17 +85,17 @@ class Block(msgspec.Struct, frozen=True):
         return self.size > LARGE
 
 
-class Text(msgspec.Struct, frozen=True):
+class StringStep(msgspec.Struct, frozen=True):
     """A string or wstring."""
 
-    place: Place
+    place: Slot
     wide: bool
 
 
-class Numbers(msgspec.Struct, frozen=True):
+class NumbersStep(msgspec.Struct, frozen=True):
     """A sequence of numbers, moved as one buffer."""
 
-    place: Place
+    place: Slot
     primitive: str
     bound: int | None
 
@@ -113,15 +113,15 @@ class Numbers(msgspec.Struct, frozen=True):
 class Bytes(msgspec.Struct, frozen=True):
     """A sequence of bools or bytes, a list in Python."""
 
-    place: Place
+    place: Slot
     primitive: str
     bound: int | None
 
 
-class Texts(msgspec.Struct, frozen=True):
+class StringsStep(msgspec.Struct, frozen=True):
     """An array (`size`) or sequence of strings."""
 
-    place: Place
+    place: Slot
     wide: bool
     size: int | None
     bound: int | None
@@ -130,15 +130,15 @@ class Texts(msgspec.Struct, frozen=True):
 class Enter(msgspec.Struct, frozen=True):
     """A nested structure begins; the steps after it use its variable `place.local`."""
 
-    place: Place
+    place: Slot
     type: ir.TypeName
     empty: bool
 
 
-class Items(msgspec.Struct, frozen=True):
+class StructuresStep(msgspec.Struct, frozen=True):
     """An array (`size`) or sequence of structures; `body` has the steps of one, in `item`."""
 
-    place: Place
+    place: Slot
     type: ir.TypeName
     item: str
     body: tuple[Step, ...]
@@ -147,8 +147,8 @@ class Items(msgspec.Struct, frozen=True):
 
 
 #: Steps whose size is fixed: `code` is their code in a Struct, they begin at a multiple of `unit`.
-Plain: TypeAlias = Number | Dummy | Block
-Step: TypeAlias = Plain | Text | Numbers | Bytes | Texts | Enter | Items
+Plain: TypeAlias = Number | Dummy | NumberBlock
+Step: TypeAlias = Plain | StringStep | NumbersStep | Bytes | StringsStep | Enter | StructuresStep
 
 #: The struct character where it is not the one of PRIMITIVES.
 CODES = {"bool": "?", "byte": "c"}
@@ -172,7 +172,7 @@ def steps(
     plan: list[Step] = []
     for field in message.fields:
         inner = f"{path}_{field.name}" if path else field.name
-        place = Place(owner, slot(field.name), inner, names.field(inner), message.name)
+        place = Slot(owner, slot(field.name), inner, names.field(inner), message.name)
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             plan.append(Enter(place, field.type.target, not nested.fields))
@@ -182,27 +182,27 @@ def steps(
     return tuple(plan)
 
 
-def step_of(type_: ir.FieldType, place: Place, messages: Messages, names: Locals) -> Step:
+def step_of(type_: ir.FieldType, place: Slot, messages: Messages, names: Locals) -> Step:
     """Return the step of a value that is not a single structure."""
     match type_:
         case ir.Primitive(name):
             return Number(place, CODES.get(name, type_.info.code), type_.info.size)
         case ir.String(wide):
-            return Text(place, wide)
+            return StringStep(place, wide)
         case ir.Array(ir.Primitive(name), size):
-            return Block(place, name, size)
+            return NumberBlock(place, name, size)
         case ir.Sequence(ir.Primitive(name), bound):
-            kind = Bytes if name in LIST_PRIMITIVES else Numbers
+            kind = Bytes if name in LIST_PRIMITIVES else NumbersStep
             return kind(place, name, bound)
         case ir.Array(element) | ir.Sequence(element):
             length = type_.size if isinstance(type_, ir.Array) else None
             bound = type_.bound if isinstance(type_, ir.Sequence) else None
             if isinstance(element, ir.String):
-                return Texts(place, element.wide, length, bound)
+                return StringsStep(place, element.wide, length, bound)
             if isinstance(element, ir.Ref):
                 item = names.new(f"{place.path}_item")
                 body = steps(messages[element.target], messages, names, item, item)
-                return Items(place, element.target, item, body, length, bound)
+                return StructuresStep(place, element.target, item, body, length, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
 
 
@@ -211,11 +211,11 @@ def smallest(body: tuple[Step, ...]) -> int:
     least = 0
     for step in body:
         match step:
-            case Number() | Dummy() | Block():
+            case Number() | Dummy() | NumberBlock():
                 least += step.size
-            case Texts(size=int(size)):
+            case StringsStep(size=int(size)):
                 least += 4 * size
-            case Items(size=int(size)):
+            case StructuresStep(size=int(size)):
                 least += size * smallest(step.body)
             case Enter():
                 pass
@@ -228,18 +228,22 @@ def walk(body: tuple[Step, ...]) -> Iterator[Step]:
     """Yield steps, each before those of its elements."""
     for step in body:
         yield step
-        if isinstance(step, Items):
+        if isinstance(step, StructuresStep):
             yield from walk(step.body)
 
 
 def widest(body: tuple[Step, ...]) -> int:
     """Return the widest alignment of all values, counts among them."""
-    units = {step.unit for step in walk(body) if isinstance(step, (Number, Block, Numbers))}
-    has_counts = any(not isinstance(step, (Number, Block, Dummy, Enter)) for step in walk(body))
+    units = {
+        step.unit for step in walk(body) if isinstance(step, (Number, NumberBlock, NumbersStep))
+    }
+    has_counts = any(
+        not isinstance(step, (Number, NumberBlock, Dummy, Enter)) for step in walk(body)
+    )
     return max(units | {4 if has_counts else 1})
 
 
-def is_many(step: Items) -> bool:
+def is_many(step: StructuresStep) -> bool:
     """Return whether there may be enough elements to make setup worth its cost."""
     most = step.bound if step.size is None else step.size
     return most is None or most > FEW
@@ -249,13 +253,13 @@ def is_text(body: tuple[Step, ...]) -> bool:
     """Return whether steps are strings, and structures of them, with only single bytes between."""
     for step in body:
         match step:
-            case Text(wide=False) | Number(size=1) | Enter():
+            case StringStep(wide=False) | Number(size=1) | Enter():
                 pass
-            case Items() if is_text(step.body):
+            case StructuresStep() if is_text(step.body):
                 pass
             case _:
                 return False
-    return any(isinstance(step, (Text, Items)) for step in body)
+    return any(isinstance(step, (StringStep, StructuresStep)) for step in body)
 
 
 class Fixed(msgspec.Struct, frozen=True):
@@ -277,7 +281,7 @@ def fixed(body: tuple[Step, ...]) -> Fixed | None:
     for step in body:
         if isinstance(step, Enter):
             continue
-        if not isinstance(step, (Number, Dummy, Block)):
+        if not isinstance(step, (Number, Dummy, NumberBlock)):
             return None
         first = first or step.unit
         align = max(align, step.unit)

@@ -9,13 +9,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 START = "docs/index.md"
+README = "README.md"
 #: Where documents outside of docs/ are on the site; the others keep their names, in lower case.
 PLACES = {
     START: "contents.md",
-    "README.md": "about.md",
+    README: "about.md",
     "examples/my_robot_controller/README.md": "tutorial.md",
 }
-RULES = "docs/rules.md"
+#: The pages of rules, which `maintenance.website.rules` makes.
+RULES = "idlc/diagnostics/explain"
 
 _CODE = re.compile(r"(?ms)^ *(```+).*?^ *\1$|`[^`\n]+`")
 _LINK = re.compile(r"(?<=\]\()([^)\s#]*)(#[^)\s]*)?(?=\))")
@@ -25,6 +27,8 @@ def place(path: str) -> str:
     """Return where a file of the repository is on the site."""
     if path == RULES:
         return "rules/index.md"
+    if path.startswith(f"{RULES}/"):
+        return f"rules/{path.removeprefix(f'{RULES}/')}"
     if path.startswith("docs/") and path != START:
         return path.removeprefix("docs/")
     if path.endswith(".md"):
@@ -35,7 +39,8 @@ def place(path: str) -> str:
 def files() -> dict[str, bytes]:
     """Return by its place every page, and every file that pages link to."""
     found: dict[str, bytes] = {}
-    wanted = [START]
+    readme = (ROOT / README).read_text(encoding="utf-8")  # its parts are on the home page
+    wanted = [START, *(path for path in links(README, readme) if not path.startswith(RULES))]
     seen = set(wanted)
     while wanted:
         path = wanted.pop()
@@ -44,7 +49,7 @@ def files() -> dict[str, bytes]:
             text = data.decode("utf-8")
             linked = [target for target in links(path, text) if target not in seen]
             seen.update(linked)
-            wanted += linked
+            wanted += (target for target in linked if not target.startswith(RULES))
             data = moved(path, text).encode("utf-8")
         found[place(path)] = data
     return found
@@ -65,8 +70,6 @@ def moved(path: str, text: str) -> str:
         if not target or ":" in target:
             return found[0]
         there = place(_resolved(path, target))
-        if there == place(RULES) and (code := re.match(r"#(idl\d+)", anchor)):
-            there, anchor = f"rules/{code[1].upper()}.md", ""
         return posixpath.relpath(there, posixpath.dirname(place(path))) + anchor
 
     return outside_code(text, lambda part: _LINK.sub(link, part))

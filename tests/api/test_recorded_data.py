@@ -1,4 +1,4 @@
-"""The programs of docs/recorded-data.md; parts, also on a cluster that loses a worker."""
+"""The programs of docs/recordings.md; parts, also on a cluster that loses a worker."""
 
 import json
 import os
@@ -14,7 +14,7 @@ import idlc
 from tests.support import recordings as made
 from tests.support.paths import DOCS, ROOT
 
-PAGE = (DOCS / "recorded-data.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "recordings.md").read_text(encoding="utf-8").partition("## List topics and types")[0]
 PROGRAMS = re.findall(r"^```python\n((?:.*\n)*?)```$", PAGE, re.MULTILINE)
 #: Those for Dask and Ray start processes; they run in the tests of these.
 (CLUSTER,) = [code for code in PROGRAMS if "from dask" in code]

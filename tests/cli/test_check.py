@@ -531,11 +531,6 @@ def test_many_problems_end_with_numbers(capsys):
     assert out.endswith(
         "\n13  IDL421 wide-string\n 1  IDL201 unknown-type\n1 error, 13 warnings in 2 files\n"
     )
-    status, out = check(capsys, "demo", "--statistics")
-    assert (status, out.splitlines()) == (
-        1,
-        ["13  IDL421 wide-string", " 1  IDL201 unknown-type", "1 error, 13 warnings in 2 files"],
-    )
 
 
 #: What nothing should be said about, although it looks like what something is said about.

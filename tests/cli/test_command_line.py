@@ -88,7 +88,7 @@ def test_the_example_in_each_help_works_as_pasted(command, capfd):
     example = text.partition("Example:\n\n")[2].partition("\n\n  ")[0]
     lines = [line.strip() for line in example.splitlines() if line.startswith("    ")]
     assert any(line.startswith("idlc ") for line in lines), text
-    if lines == ["idlc robot router"] or "tcp/robot:7447" in example:
+    if lines == ["idlc router"] or "tcp/robot:7447" in example:
         return  # it needs Ctrl-C or a robot: tests/robot/test_live.py has both
     script = f"set -e\nidlc() {{ '{sys.executable}' -m idlc \"$@\"; }}\n" + "\n".join(lines)
     # `idlc columns` without `-o` writes bytes to a pipe
@@ -120,13 +120,13 @@ def test_the_example_in_each_help_works_as_pasted(command, capfd):
         ("gen good -o out/demo --package class", 2),
         ("gen good -o out/demo --check", 1),
         ("gen good -o out/demo --check --force", 2),
-        ("hash good std_msgs/msg/Header", 0),
-        ("hash bad", 1),
-        ("hash std_msgs/msg/Nope", 2),
-        ("hash", 2),
-        ("describe std_srvs/srv/SetBool_Request", 0),
-        ("describe good/msg/A.msg --package good", 0),
-        ("describe nope", 2),
+        ("show good std_msgs/msg/Header --format hash", 0),
+        ("show bad --format hash", 1),
+        ("show std_msgs/msg/Nope --format hash", 2),
+        ("show", 2),
+        ("show std_srvs/srv/SetBool_Request --format type-description", 0),
+        ("show good/msg/A.msg --package good --format type-description", 0),
+        ("show nope --format type-description", 2),
         ("explain IDL201", 0),
         ("explain idl201", 0),
         ("explain unknown-type", 0),
@@ -322,7 +322,7 @@ def test_what_ci_systems_read_of_generated_code(style, capfd):
         ["--help"],
         ["gen", "--help"],
         ["gen", "demo/msg/B.msg", "-o", "out"],
-        ["hash", "demo/msg/B.msg"],
+        ["show", "demo/msg/B.msg", "--format", "hash"],
         ["list"],
         ["show", "demo/msg/B.msg"],
         ["doctor"],
@@ -354,7 +354,7 @@ def test_a_program_behind_a_pipe_prints_as_plainly(variables, colour):
 @pytest.mark.parametrize(
     ("words", "headings"),
     [
-        (["--help"], ("Usage:", "Options:", "Commands:", "Example:")),
+        (["--help"], ("Usage:", "Options:", "Start:", "Example:")),
         (["scaffold", "node", "--help"], ("Options:", "Example, within a package:")),
         (["explain"], ("Syntax", "Files and projects")),
     ],
@@ -370,7 +370,7 @@ def test_headings_are_bold(words, headings):
     [
         (["gne"], "no such command: `gne`", "did you mean `gen`?"),
         (["gen", "--wacth"], "no such option", "did you mean `--watch`?"),
-        (["hash"], "missing argument `PATH|TYPE...`", "`idlc hash --help` lists the arguments"),
+        (["show"], "missing argument `TYPE|PATH|REC`", "`idlc show --help` lists the arguments"),
         (
             ["check", "--format", "xml"],
             "invalid value for `--format`: `xml` is not",
@@ -404,7 +404,7 @@ def test_file_names_that_are_not_text():
 
 def test_a_closed_pipe_is_no_error():
     with subprocess.Popen(
-        [sys.executable, "-m", "idlc", "describe", "sensor_msgs/msg/Image"],
+        [sys.executable, "-m", "idlc", "show", "sensor_msgs/msg/Image"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     ) as process:
@@ -430,7 +430,9 @@ def test_a_full_disk_is_no_internal_error(words):
     ("closed", "printed"), [(">&-", ""), ("2>&-", "RIHS01_"), (">&- 2>&-", "")]
 )
 def test_a_closed_stream_is_no_error(closed, printed):
-    command = shlex.join([sys.executable, "-m", "idlc", "hash", "std_msgs/msg/Header"])
+    command = shlex.join(
+        [sys.executable, "-m", "idlc", "show", "std_msgs/Header", "--format", "hash"]
+    )
     done = subprocess.run(
         ["/bin/sh", "-c", f"{command} {closed}"], capture_output=True, text=True, check=False
     )
@@ -481,7 +483,7 @@ def test_messages_nested_deeper_than_pythons_stack():
     assert "IDL210" in done.stdout
     make(f"demo/msg/M{depth}.msg")
     assert idlc("check", "demo").returncode == 0
-    assert len(idlc("hash", "demo").stdout.splitlines()) == depth + 1
+    assert len(idlc("show", "demo", "--format", "hash").stdout.splitlines()) == depth + 1
 
 
 def test_a_name_longer_than_the_file_system_allows():
@@ -490,7 +492,7 @@ def test_a_name_longer_than_the_file_system_allows():
     done = idlc("check", "demo", "-I", "deps")
     assert done.returncode == 1
     assert done.stdout.count("error[IDL20") == 3
-    assert idlc("hash", f"std_msgs/msg/{'A' * 5000}").returncode == 2
+    assert idlc("show", f"std_msgs/msg/{'A' * 5000}").returncode == 2
 
 
 def test_a_working_folder_that_is_gone():

@@ -273,7 +273,7 @@ def test_several_in_settings(capsys):
 
 
 @pytest.mark.parametrize(
-    "words", [["gen", "demo", "-o", "out"], ["hash", "demo"], ["docs", "demo", "-o", "out"]]
+    "words", [["gen", "demo", "-o", "out"], ["show", "demo"], ["docs", "demo", "-o", "out"]]
 )
 def test_one_name_for_all_but_check(words, capsys):
     write({"demo/msg/A.msg": "int32 a\n"})
@@ -431,7 +431,7 @@ def test_it_changes_neither_hash_nor_idl(capsys):
     write({"a/demo/msg/A.msg": "@optional int32 a\n", "b/demo/msg/A.msg": "int32 a\n"})
     found = []
     for folder in "ab":
-        assert main(["hash", f"{folder}/demo", "--distro", "lyrical"]) == 0
+        assert main(["show", f"{folder}/demo", "--format", "hash", "--distro", "lyrical"]) == 0
         found.append(capsys.readouterr().out)
     assert found[0] == found[1]
     main(["show", "a/demo/msg/A.msg", "--format", "ros2idl", "--distro", "lyrical"])

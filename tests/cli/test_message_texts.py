@@ -57,3 +57,12 @@ def test_numbers_of_an_image_do_not_pass_through_the_yaml_library(monkeypatch):
     printed = text({"data": [7] * 100_000})
     assert printed.count("7") == 100_000
     assert len(dumped[0]) < 100
+
+
+def test_yaml_makes_no_class_for_each_message():
+    base = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    text({"data": 1})
+    count = len(base.__subclasses__())
+    for number in range(3):
+        assert text({"data": [number] * 40}).count(str(number)) == 40
+    assert len(base.__subclasses__()) == count

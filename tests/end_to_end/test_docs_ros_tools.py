@@ -1,4 +1,4 @@
-"""docs/ros-tools.md and docs/interface-packages.md: what can run here is run."""
+"""docs/ros-tools.md and docs/ship-messages.md: what can run here is run."""
 
 import importlib.util
 import os
@@ -14,7 +14,7 @@ from tests.support.paths import DOCS, ROOT
 from tests.support.programs import ended
 
 TOOLS = (DOCS / "ros-tools.md").read_text(encoding="utf-8")
-PACKAGES = (DOCS / "interface-packages.md").read_text(encoding="utf-8")
+PACKAGES = (DOCS / "ship-messages.md").read_text(encoding="utf-8").partition("## A package for")[2]
 #: Where pip and uv install for a test, with the idlc and hatchling of this environment.
 OFFLINE = {"PIP_NO_INDEX": "1", "PIP_NO_DEPS": "1", "PIP_NO_BUILD_ISOLATION": "0"}
 
@@ -66,7 +66,7 @@ def test_commands_are_commands():
 
 
 def test_a_package_is_found_as_is_said(tmp_path):
-    (commands,) = blocks(TOOLS, "sh")
+    (commands,) = blocks(TOOLS.partition("## Let tools find")[2], "sh")
     prefix = tmp_path / "prefix"
     # this environment cannot be installed into: the prefix is another one
     commands = commands.replace("$(python -c 'import sys; print(sys.prefix)')", str(prefix))

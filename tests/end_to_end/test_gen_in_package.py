@@ -118,8 +118,8 @@ def test_names_of_packages_are_suggested(capsys):
 
 def test_hashes_are_those_of_the_first_distribution_that_has_any(capsys):
     write_all({"pyproject.toml": '[tool.idlc]\ndistro = ["humble", "jazzy"]\n'})
-    assert main(["hash", "std_msgs/msg/Header"]) == 0
-    assert main(["hash", "std_msgs/msg/Header", "--distro", "humble"]) == 2
+    assert main(["show", "std_msgs/Header", "--format", "hash"]) == 0
+    assert main(["show", "std_msgs/Header", "--format", "hash", "--distro", "humble"]) == 2
 
 
 @pytest.mark.parametrize(

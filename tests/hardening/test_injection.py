@@ -290,7 +290,7 @@ def commands(position):
         ["fmt", "--check", paths],
         ["fmt", paths],
         ["gen", paths, "-o", "out/demo"],
-        ["hash", paths],
+        ["show", paths, "--format", "hash"],
         ["breaking", paths, "--against", paths],
     ]
 

@@ -142,7 +142,7 @@ def test_checking_is_linear(what):
     assert_linear({**MANY, **MANY_PROBLEMS}[what], lambda folder: ["check", folder])
 
 
-@pytest.mark.parametrize("command", [["check"], ["hash"], ["breaking", "--against", "ws"]])
+@pytest.mark.parametrize("command", [["check"], ["show"], ["breaking", "--against", "ws"]])
 def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command, monkeypatch):
     make(Path("ws"), {**chain_of_packages(30), "q/msg/B.msg": "p0/A a\np7/A b\n"})
     lowered, read = Counter(), Counter()
@@ -190,7 +190,7 @@ def test_showing_is_linear(what):
 
 @pytest.mark.parametrize("what", ["files", "used files", "actions"])
 def test_hashing_is_linear(what):
-    assert_linear(MANY[what], lambda folder: ["hash", folder])
+    assert_linear(MANY[what], lambda folder: ["show", folder, "--format", "hash"])
 
 
 @pytest.mark.parametrize("what", ["fields", "messages", "constants", "units", "files", "actions"])
@@ -408,17 +408,17 @@ def test_what_is_too_large_is_refused_in_plain_words(what, here):
 @pytest.mark.long
 def test_ten_thousand_files(here):
     make(here / "pkg", numbered_files(10_000))
-    commands = [["check", "pkg"], ["fmt", "--check", "pkg"], ["hash", "pkg"]]
+    commands = [["check", "pkg"], ["fmt", "--check", "pkg"], ["show", "pkg", "--format", "hash"]]
     said = limited([*commands, ["breaking", "pkg", "--against", "pkg"]])
     assert [status for status, _ in said.values()] == [0, 0, 0, 0]
-    assert said["hash pkg"][1].count("RIHS01_") == 10_000
+    assert said["show pkg --format hash"][1].count("RIHS01_") == 10_000
 
 
 def test_a_chain_of_a_thousand_dependencies(here):
     make(here / "pkg", chain(1000))
     for words, expected in (
         (["check", "pkg"], 0),
-        (["hash", "pkg"], 0),
+        (["show", "pkg", "--format", "hash"], 0),
         (["gen", "pkg", "-o", "out/pkg"], 2),
         (["breaking", "pkg", "--against", "pkg"], 2),
     ):

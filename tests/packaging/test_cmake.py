@@ -252,7 +252,7 @@ def test_fixes_keep_the_layout(cmake, capsys):
 )
 def test_hostile_scripts_take_linear_time(text, capsys):
     start = time.process_time()
-    check(text, capsys, "--statistics", B="uint8 b\n")
+    check(text, capsys, B="uint8 b\n")
     assert time.process_time() - start < 10
 
 

@@ -232,14 +232,32 @@ def test_what_is_refused_outside_of_setup_py(files, path):
     assert "demo.talker:main" in outcome.line
 
 
-def test_a_launch_file_is_installed_if_none_was():
-    text = SETUP.replace("setup(", "setup(data_files=[('share/demo', ['package.xml'])], ")
-    after = text_of(entry_points.add_launch(text, "demo", "launch/demo_launch.py"))
-    assert "('share/demo/launch', ['launch/demo_launch.py'])]" in after
-    assert entry_points.add_launch(after, "demo", "launch/demo_launch.py") == Edited(after)
-    assert entry_points.add_launch(SETUP, "demo", "launch/demo_launch.py") == Edited(SETUP)
-    computed = SETUP.replace("setup(", "setup(data_files=files(), ")
-    assert isinstance(entry_points.add_launch(computed, "demo", "launch/demo_launch.py"), Refused)
+LAUNCH_FILE = "launch/demo_launch.py"
+#: What installs data files, and whether the launch file is among them; `None` if nobody can see.
+DATA_FILES = {
+    "[('share/demo', ['package.xml'])]": False,
+    "[('share/demo/launch', glob('launch/*.launch.py'))]": False,
+    "[('share/demo/launch', ['launch/other_launch.py'])]": False,
+    "[('share/demo', ['package.xml'])], tests_require=['launch-pytest']": False,
+    "[('share/demo/launch', glob('launch/*'))]": True,
+    "[('share/demo/launch', sorted(glob('./launch/*launch.py')))]": True,
+    "[('share/demo/launch', files())]": True,
+    "files()": None,
+    "[*files('launch')]": None,
+}
+
+
+@pytest.mark.parametrize("data_files", DATA_FILES)
+def test_a_launch_file_is_installed(data_files):
+    is_installed = DATA_FILES[data_files]
+    text = SETUP.replace("setup(", f"setup(data_files={data_files}, ")
+    after, line = entry_points.add_launch(text, "demo", LAUNCH_FILE)
+    element = f"('share/demo/launch', ['{LAUNCH_FILE}'])"
+    assert (after == text) == (is_installed is not False)
+    assert line == (element if is_installed is None else "")
+    assert (element in after) == (is_installed is False)
+    assert entry_points.add_launch(after, "demo", LAUNCH_FILE) == (after, line)
+    assert entry_points.add_launch(SETUP, "demo", LAUNCH_FILE) == (SETUP, element)
 
 
 CLASSIC = """\

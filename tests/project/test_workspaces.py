@@ -14,7 +14,7 @@ from idlc.cli.main import main
 from idlc.project.find import exclusion
 from tests.support.files import write
 
-COMMANDS = ("check", "hash", "gen", "docs", "breaking", "fmt")
+COMMANDS = ("check", "show", "gen", "docs", "breaking", "fmt")
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +41,7 @@ def idlc(*words):
 
 
 def hashes(*words):
-    lines = idlc("hash", *words)[1].splitlines()
+    lines = idlc("show", *words, "--format", "hash")[1].splitlines()
     return {name: value for value, name in (line.split() for line in lines)}
 
 
@@ -103,7 +103,7 @@ def test_the_name_of_what_was_generated_is_known_to_all_commands():
     write("src/robo/interfaces/msg/P.msg", "int8 a\n")
     assert (
         "note: without a package.xml, the package name is `interfaces`"
-        in idlc("hash", "src/robo/interfaces")[2]
+        in idlc("show", "src/robo/interfaces", "--format", "hash")[2]
     )
     for out, told in (("src/robo/ifaces", False), ("elsewhere", False), ("far/away/pkg", True)):
         status, _, said = idlc("gen", "src/robo/interfaces", "-o", out)
@@ -114,7 +114,7 @@ def test_the_name_of_what_was_generated_is_known_to_all_commands():
         path.unlink() if path.is_file() else None
     assert hashes("src/robo/interfaces") == generated("src/robo")
     assert hashes("src/robo/interfaces/msg/P.msg") == generated("src/robo")
-    assert "note" not in idlc("hash", "src/robo/interfaces")[2]
+    assert "note" not in idlc("show", "src/robo/interfaces", "--format", "hash")[2]
     assert idlc("show", "src/robo/interfaces")[1].startswith("# ifaces/msg/P\n")
     write("src/robo/interfaces/msg/P.msg", "int16 a\n")  # of other content
     assert set(hashes("src/robo/interfaces")) == {"interfaces/msg/P"}

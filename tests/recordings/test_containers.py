@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+import zstandard
 
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.source import RecordingError
@@ -107,8 +108,8 @@ def test_a_truncated_file_is_read_to_its_last_whole_chunk_and_says_so(compressio
     [
         (b"", "is empty"),
         (b"\x89MC", "is not an MCAP or .db3 recording"),
-        (b"#ROSBAG V2.0\n", "is not an MCAP or .db3 recording"),
-        (b"\x28\xb5\x2f\xfd....", "is not an MCAP or .db3 recording"),
+        (b"#ROSBAG V2.0\n", "is a recording of ROS 1"),
+        (zstandard.compress(b"...."), "is not an MCAP or .db3 recording"),
         (b"SQLite format 3\0", "cannot be read"),
         (b"hello", "is not an MCAP or .db3 recording"),
     ],
@@ -243,7 +244,7 @@ def test_metadata_that_is_odd(text, note, tmp_path):
     with open_recording(path.parent) as container:
         names = [Path(one.name).name for one in container.files]
         assert names == NAMES[: 3 if "shared" in text else 4]
-        assert note in " ".join(container.notes)
+        assert note in " ".join((*container.notes, *map(str, container.damage)))
 
 
 def test_metadata_of_aliases_of_aliases_costs_nothing(tmp_path):

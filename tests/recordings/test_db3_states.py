@@ -8,7 +8,7 @@ import os
 import shutil
 import sqlite3
 import struct
-from contextlib import closing
+from contextlib import closing, suppress
 
 import numpy as np
 import pytest
@@ -89,6 +89,18 @@ def recovered(path):
         except sqlite3.Error:
             return None
     return [struct.unpack_from("<d", data, 4)[0] for (data,) in rows]
+
+
+def readable(path):
+    """Return the values that SQLite reads before it stops, other than from a page that is cut."""
+    values = []
+    with closing(sqlite3.connect(path)) as database, suppress(sqlite3.Error):
+        database.execute("PRAGMA synchronous=OFF")
+        for (data,) in database.execute("SELECT data FROM messages ORDER BY rowid"):
+            if not data:
+                break
+            values.append(struct.unpack_from("<d", data, 4)[0])
+    return values if path.stat().st_size % 1024 == 0 else values[:-1]
 
 
 def read(path):
@@ -207,10 +219,18 @@ def test_a_log_that_was_not_copied_is_told_of(tmp_path, capsys):
     with closing(create(tmp_path / "a.db3", journal="WAL")) as database:
         database.execute("PRAGMA wal_checkpoint")
         path = copied(tmp_path / "a.db3", tmp_path / "copy", ("-wal", "-shm"))
+    main(["show", str(path)])
+    assert not capsys.readouterr().err
+    metadata = path.with_name("metadata.yaml")
+    for count, note in ((60, ""), (0, ""), (61, "may be in `a.db3-wal`, which is missing")):
+        metadata.write_text(f"rosbag2_bagfile_information: {{message_count: {count}}}")
+        main(["show", str(path.parent)])
+        assert note in (error := capsys.readouterr().err)
+        assert bool(note) == bool(error)
+    metadata.unlink()
     for mode in (0o700, 0o500):
         path.parent.chmod(mode)
         main(["show", str(path)])
-        assert "`a.db3-wal`" in capsys.readouterr().err
         assert list(path.parent.iterdir()) == [path]
     path.parent.chmod(0o700)
 
@@ -241,7 +261,10 @@ def test_a_database_that_is_cut_off(journal, auto_vacuum, tmp_path):
         for one in (path, other):
             one.write_bytes(data[:size])
         found = read(path)
-        assert isinstance(found, RecordingError) or found == recovered(other)
+        if not isinstance(found, RecordingError):
+            assert set(found) >= set(readable(other))
+            assert found == sorted(found)
+            assert set(found) <= set(range(12))
 
 
 def test_times_before_1970_are_read(tmp_path):
@@ -255,5 +278,6 @@ def test_times_before_1970_are_read(tmp_path):
         assert len(topic.to_columns()) == 5
         assert topic.between(-5, 5).to_columns()["log_time"].tolist() == [-5, 0]
         assert len(topic.between(-(1 << 70), 1 << 70).to_columns()) == 5
-        assert len(topic.between(1 << 63, None).to_columns()) == 0
-        assert len(topic.between(None, -(1 << 70)).to_columns()) == 0
+        for window in ((1 << 63, None), (None, -(1 << 70))):
+            with pytest.raises(RecordingError, match="no message is in the range of times"):
+                topic.between(*window)

@@ -17,8 +17,7 @@ from idlc.model.lowering.lower import lower
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
-from idlc.recordings.definition_text import mcap
-from idlc.recordings.definitions import read_definition, type_name
+from idlc.recordings.definitions import mcap_text, read_definition, type_name
 from idlc.recordings.types import LocalTypes, contradictions, recorded_types, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
@@ -149,7 +148,7 @@ def test_what_idlc_writes_has_its_hash_in_both_languages():
             name.package, [lower(parse(catalog.source(name)), name, Report())], catalog, Report()
         )
         expected = model.describer.hash(str(name))
-        as_msg = topic(str(name), mcap(model.interfaces[name], model))
+        as_msg = topic(str(name), mcap_text(model.interfaces[name], model))
         parts = [f"{LINE}IDL: {one.name}\n{idl(one)}" for one in model.interfaces.values()]
         as_idl = topic(str(name), "\n".join(parts), "ros2idl")
         for one in (as_msg, as_idl):
@@ -276,7 +275,7 @@ def test_a_db3_has_the_definition_of_a_service_by_the_service(tmp_path, capsys):
             """
         )
     db.close()
-    assert main(["hash", str(path)]) == 0
+    assert main(["show", str(path), "--format", "hash"]) == 0
     assert "a_srvs/srv/Ask_Event" in capsys.readouterr().out
 
 

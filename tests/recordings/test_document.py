@@ -1,4 +1,4 @@
-"""The examples of docs/recordings.md, as pasted into a shell."""
+"""The examples of docs/recordings.md about types, as pasted into a shell."""
 
 import os
 import re
@@ -10,7 +10,7 @@ import pytest
 from tests.support import recorded_text
 from tests.support.paths import DOCS, ROOT
 
-PAGE = (DOCS / "recordings.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "recordings.md").read_text(encoding="utf-8").partition("## List topics and types")[2]
 EXAMPLES = re.findall(r"^```console\n\$ (.*)\n((?:.*\n)*?)```$", PAGE, re.MULTILINE)
 DEFINITION = "{0}[4] speed  # forward [m/s]\n"
 DRIVE = f"@ /wheels demo_msgs/msg/Wheels\n{DEFINITION.format('float64')}"

@@ -63,9 +63,9 @@ def mutated(data, rng):
     return bytes(raw)
 
 
-def read(path, index):
+def read(path, index, strict=False):
     """Read all there is; return how many bytes of messages there are."""
-    with open_recording(path, index=index) as container:
+    with open_recording(path, index=index, strict=strict) as container:
         found = [one for topic in container.topics for one in container.messages(topic, ALWAYS)]
         return sum(len(view) for one in found for view in one.views())
 
@@ -138,7 +138,7 @@ def test_a_bomb_does_not_go_off(tmp_path):
         f"most = before + {MOST_IN_A_CHUNK} + (64 << 20)\n"
         "resource.setrlimit(resource.RLIMIT_AS, (most, most))\n"
         "for path in sys.argv[1:]:\n"
-        "    try:\n        read(path, True)\n"
+        "    try:\n        read(path, True, True)\n"
         "    except RecordingError as error:\n        print(error)\n"
     )
     done = subprocess.run(
@@ -158,5 +158,8 @@ def test_a_checksum_that_is_wrong_is_an_error_on_wish(tmp_path):
     path.write_bytes(data)
     with idlc.Recording(path) as recording:
         assert sum(topic.to_arrow().num_rows for topic in recording.values()) == len(SMALL)
-    with idlc.Recording(path, check=True) as recording, pytest.raises(RecordingError, match="sum"):
+    with (
+        idlc.Recording(path, check=True, strict=True) as recording,
+        pytest.raises(RecordingError, match="sum"),
+    ):
         recording[SMALL[-1].topic].to_arrow()

@@ -158,10 +158,9 @@ def test_an_index_that_leaves_messages_out_is_a_lie(tmp_path):
     (told,) = unpack_from("<Q", chunk.content, at)
     chunk.content[at : at + 8] = pack("<Q", told - 16)
     path.write_bytes(mcap_mutations.joined(parts, up_to_date=True))
-    for window in ((None, None), (None, made.START), (made.START, None)):
-        what = "the index lists 20 messages of `/imu`, but the file has 19"
-        with pytest.raises(RecordingError, match=what):
-            read(path, "/imu", window)
+    for window in ((None, None), (None, made.START + 1), (made.START, None)):
+        expected = recorded("/imu")[:1] if window[1] else recorded("/imu")
+        assert read(path, "/imu", window) == expected
     assert read(path, "/imu", index=False) == recorded("/imu")
     assert read(path, "/joints") == recorded("/joints")
 
@@ -246,7 +245,7 @@ def test_a_lying_file_is_refused(lie, tmp_path):
     change(data)
     path.write_bytes(data)
     with pytest.raises(RecordingError, match=message) as caught:
-        read(path, "/imu", check="checksum" in message)
+        read(path, "/imu", check="checksum" in message, strict=True)
     assert str(path) in caught.value.message
 
 
@@ -260,7 +259,8 @@ def test_a_chunk_that_holds_another_size_is_refused(compression, declared, tmp_p
     data[at : at + 8] = pack("<Q", size + declared)
     path.write_bytes(data)
     with pytest.raises(RecordingError, match=r"declares [\d,]+ bytes and holds"):
-        read(path, "/imu")
+        read(path, "/imu", strict=True)
+    assert read(path, "/imu") == recorded("/imu")  # as the checksum proves
 
 
 def test_a_chunk_that_cannot_be_decompressed_is_refused(tmp_path):
@@ -284,14 +284,14 @@ def test_chunks_that_a_summary_names_twice_are_read_once(tmp_path):
     assert read(path, "/imu") == recorded("/imu")
 
 
-def test_a_wrong_checksum_of_the_summary_is_seen_on_wish(tmp_path):
+def test_a_wrong_checksum_of_the_summary_is_seen(tmp_path):
     path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, "", chunk_size=SMALL)
     data = bytearray(path.read_bytes())
     assert data[-12:-8] != bytes(4)
     data[-12] ^= 1
     path.write_bytes(data)
     assert read(path, "/imu") == recorded("/imu")
-    with open_recording(path, check=True) as container:
+    with open_recording(path) as container:
         assert "checksum of its summary is wrong" in container.notes[0]
 
 
@@ -302,5 +302,6 @@ def test_a_row_without_a_time_is_lost_in_no_window(time, window, tmp_path):
     with closing(sqlite3.connect(path)) as database:
         database.execute(f"UPDATE messages SET timestamp = {time} WHERE id = 7")  # noqa: S608
         database.commit()
-    with pytest.raises(RecordingError, match="values of other types"):
-        read(path, MESSAGES[6].topic, window)
+    with pytest.raises(RecordingError, match="row 7 has values of other types"):
+        read(path, MESSAGES[6].topic, window, strict=True)
+    assert len(read(path, MESSAGES[6].topic)) == 19

@@ -132,7 +132,7 @@ def test_all_that_is_not_of_a_changed_topic_stays(
     written(source, random.Random(seed), TOPICS, compression, options, count)
     before = source.read_bytes()
     conversions = dict.fromkeys(mine, NEW._replace(convert=convert))
-    fate = rewrite(str(source), str(target), conversions)
+    fate = rewrite(str(source), str(target), conversions).topics
     assert source.read_bytes() == before
     check(source, target, conversions, fate)
     if not mine and options["use_chunking"]:
@@ -299,7 +299,7 @@ def test_a_checksum_of_a_chunk_that_changes_must_be_right(tmp_path):
     data[data.index(made.messages(1)[0].data) + 9] ^= 1
     source.write_bytes(data)
     with pytest.raises(RecordingError, match="checksum of the chunk"):
-        rewrite(str(source), str(tmp_path / "b.mcap"), {"/imu": CONVERTED})
+        rewrite(str(source), str(tmp_path / "b.mcap"), {"/imu": CONVERTED}, strict=True)
 
 
 def test_convert_gets_few_messages_of_one_topic_at_a_time(tmp_path, monkeypatch):

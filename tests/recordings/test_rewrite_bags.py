@@ -3,11 +3,13 @@
 import os
 import shutil
 import sqlite3
-from contextlib import closing
+from contextlib import closing, suppress
 from struct import pack, unpack_from
 
 import pytest
 import yaml
+import zstandard
+from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 import idlc
@@ -24,18 +26,14 @@ JOINTS = Conversion(
 NEW = Conversion("new_msgs/msg/New", "ros2msg", "float64 data\n", "RIHS01_new")
 
 
-def tables(path):
-    """Return the rows of all tables, and what SQLite has written of them."""
-    with closing(sqlite3.connect(path)) as database:
-        schema = database.execute("SELECT * FROM sqlite_master ORDER BY name").fetchall()
-        names = [name for kind, name, *_ in schema if kind == "table"]
-        assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
-        assert database.execute("PRAGMA journal_mode").fetchall() == [("delete",)]
-        found = {
-            name: database.execute(f"SELECT rowid, * FROM {name} ORDER BY rowid").fetchall()  # noqa: S608
-            for name in names
-        }
-        return found, [(kind, name, text) for kind, name, _, _, text in schema]
+def content(path):
+    """Return what the public library reads of an MCAP file."""
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        return [
+            (schema.name, schema.data.decode(), channel, message.log_time, message.data)
+            for schema, channel, message in reader.iter_messages(log_time_order=False)
+        ]
 
 
 @pytest.mark.parametrize("storage", ["db3", "mcap"])
@@ -46,7 +44,7 @@ def test_bags_as_rosbags_reads_them(storage, compression, tmp_path):
     (source / "folder").mkdir()
     (source / "folder" / "link").symlink_to("../notes.txt")
     before = {path: path.read_bytes() for path in source.rglob("*.*")}
-    fate = rewrite(str(source), str(tmp_path / "target"), {"/imu": JOINTS})
+    fate = rewrite(str(source), str(tmp_path / "target"), {"/imu": JOINTS}).topics
     assert {path: path.read_bytes() for path in source.rglob("*.*")} == before
     assert fate["/imu"].converted
     assert [one.messages for one in fate.values()] == [20, 20, 20]
@@ -76,6 +74,11 @@ def test_bags_as_rosbags_reads_them(storage, compression, tmp_path):
         if topic["topic_metadata"]["name"] == "/imu":
             topic["topic_metadata"]["type"] = JOINTS.type
             topic["topic_metadata"]["type_description_hash"] = JOINTS.type_hash
+    if storage == "db3":
+        name = {"path": "source.mcap"}
+        old |= {"storage_identifier": "mcap", "relative_file_paths": ["source.mcap"]}
+        old |= {"compression_format": "", "compression_mode": ""}
+        old["files"] = [{**file, **name} for file in old["files"]]
     assert new == old
     assert sorted(path.name for path in tmp_path.iterdir()) == ["source", "target"]
 
@@ -96,50 +99,58 @@ def test_split_bags_keep_their_files(tmp_path):
     ]
 
 
-def test_all_other_rows_of_a_database_stay(tmp_path):
+def test_a_database_becomes_a_file_with_all_that_rosbag2_reads(tmp_path):
+    """Order, times, profiles, hashes, definitions and metadata."""
     source = made.by_rosbags(tmp_path / "bag", MESSAGES, "db3") / "bag.db3"
+    qos = "- history: 1\n  depth: 7\n"
+    metadata = "version: 9\nstorage_identifier: sqlite3\nrelative_file_paths:\n  - bag.db3\n"
     with closing(sqlite3.connect(source)) as database, database:
-        database.execute("CREATE TABLE mine(a, b BLOB DEFAULT (randomblob(9)))")
-        database.execute("INSERT INTO mine VALUES('x', x'00ff')")
+        database.execute("UPDATE topics SET offered_qos_profiles = ?", (qos,))
+        database.execute("DELETE FROM metadata")
+        database.execute("INSERT INTO metadata VALUES(1, 9, ?)", (metadata,))
         database.execute("DELETE FROM messages WHERE rowid % 7 = 0")
-    rewrite(str(source), str(tmp_path / "new.db3"), {"/imu": JOINTS})
-    (old, schema), (new, new_schema) = tables(source), tables(tmp_path / "new.db3")
-    assert new_schema == schema
-    (imu,) = (row[1] for row in old["topics"] if "/imu" in row)
-    for name in old.keys() - {"messages", "topics", "message_definitions"}:
-        assert new[name] == old[name]
-    expected = [
-        tuple(MESSAGES[1].data if imu == row[2] and value == row[-1] else value for value in row)
-        for row in old["messages"]
-    ]
-    assert new["messages"] == expected
-    types = {made.IMU: JOINTS.type, made.STORE.hash_rihs01(made.IMU): JOINTS.type_hash}
-    assert new["topics"] == [
-        tuple(types.get(value, value) for value in row) for row in old["topics"]
-    ]
-    definitions = [row for row in old["message_definitions"] if made.IMU not in row]
-    assert new["message_definitions"] == definitions
-
-
-def test_a_definition_stays_while_a_topic_has_the_type(tmp_path):
-    found = [*MESSAGES, *(one._replace(topic="/other") for one in MESSAGES if one.topic == "/imu")]
-    source = made.by_rosbags(tmp_path / "bag", found, "db3") / "bag.db3"
-    rewrite(str(source), str(tmp_path / "a.db3"), {"/imu": NEW})
-    assert {made.IMU, NEW.type} < {
-        row[2] for row in tables(tmp_path / "a.db3")[0]["message_definitions"]
-    }
-    rewrite(str(source), str(tmp_path / "b.db3"), {"/imu": NEW, "/other": NEW})
-    kinds = [row[2] for row in tables(tmp_path / "b.db3")[0]["message_definitions"]]
-    assert sorted(kinds) == sorted([made.JOINTS, made.IMAGE, NEW.type])
-    changed = NEW._replace(type=made.IMU)
-    for conversions, why in (
-        ({"/imu": changed}, "`/other` keeps the old one"),
-        ({"/imu": changed, "/other": changed._replace(definition="int8 a\n")}, "not two"),
+        query = "SELECT t.name, timestamp, data FROM messages JOIN topics t ON t.id = topic_id"
+        rows = database.execute(f"{query} ORDER BY messages.id").fetchall()
+    rewrite(str(source), str(tmp_path / "new.mcap"), {"/imu": JOINTS})
+    for row, (name, text, channel, time, data) in zip(
+        rows, content(tmp_path / "new.mcap"), strict=True
     ):
-        with pytest.raises(RecordingError, match=why):
-            rewrite(str(source), str(tmp_path / "c.db3"), conversions)
-    rewrite(str(source), str(tmp_path / "c.db3"), {"/imu": changed, "/other": changed})
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.db3", "b.db3", "bag", "c.db3"]
+        is_new = row[0] == "/imu"
+        kind = JOINTS.type if is_new else {"/joints": made.JOINTS}.get(row[0], made.IMAGE)
+        assert (channel.topic, time, name) == (row[0], row[1], kind)
+        assert data == (MESSAGES[1].data if is_new else row[2])
+        assert text == JOINTS.definition if is_new else text.strip()
+        assert channel.metadata["offered_qos_profiles"] == qos
+        assert channel.metadata["topic_type_hash"] == made.STORE.hash_rihs01(kind)
+    with (tmp_path / "new.mcap").open("rb") as file:
+        (record,) = make_reader(file).iter_metadata()
+    expected = metadata.replace("sqlite3", "mcap").replace(".db3", ".mcap")
+    assert (record.name, record.metadata) == ("rosbag2", {"serialized_metadata": expected})
+
+
+def test_a_time_that_no_mcap_file_has_is_an_error(tmp_path):
+    with closing(create(tmp_path / "a.db3")) as database, database:
+        database.execute("UPDATE messages SET timestamp = -1 WHERE rowid = 3")
+    with pytest.raises(RecordingError, match="before 1970"):
+        rewrite(str(tmp_path / "a.db3"), str(tmp_path / "b.mcap"), {})
+    assert not (tmp_path / "b.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    ("column", "value"), [("timestamp", "x"), ("data", "x"), ("data", b"\x28\xb5\x2f\xfd")]
+)
+def test_damaged_rows_are_left_out(column, value, tmp_path):
+    with closing(create(tmp_path / "a.db3")) as database, database:
+        change = "UPDATE messages SET timestamp = ?", "UPDATE messages SET data = ?"
+        database.execute(f"{change[column == 'data']} WHERE rowid = 3", (value,))
+        query = "SELECT timestamp, data FROM messages WHERE rowid != 3 ORDER BY timestamp"
+        rows = database.execute(query).fetchall()
+    with pytest.raises(RecordingError, match="row 3"):
+        rewrite(str(tmp_path / "a.db3"), str(tmp_path / "b.mcap"), {}, strict=True)
+    (damage,) = rewrite(str(tmp_path / "a.db3"), str(tmp_path / "b.mcap"), {}).damage
+    assert damage.messages == 1
+    assert damage.problem.startswith("row 3")
+    assert [(each[-2], each[-1]) for each in content(tmp_path / "b.mcap")] == rows
 
 
 @pytest.mark.parametrize("journal", JOURNALS)
@@ -152,7 +163,7 @@ def test_a_database_in_any_state_its_writer_left_it_in(journal, tmp_path):
     with closing(create(tmp_path / "a.db3", journal=journal)) as database:
         for index, _ in enumerate(steps(database)):
             mine = copied(tmp_path / "a.db3", tmp_path / str(index))
-            target = tmp_path / f"{index}.db3"
+            target = tmp_path / f"{index}.mcap"
             try:
                 with idlc.Recording(mine) as recording:
                     expected = recording["/x"].to_columns()["data"].tolist()
@@ -163,8 +174,7 @@ def test_a_database_in_any_state_its_writer_left_it_in(journal, tmp_path):
                 refused += 1
                 continue
             rewrite(str(mine), str(target), {"/x": double})
-            rows = tables(target)[0]
-            assert [number(row[-1]) for row in rows["messages"]] == [2 * one for one in expected]
+            assert [number(row[-1]) for row in content(target)] == [2 * one for one in expected]
             whole += 1
     assert whole
     assert refused or journal == "WAL"
@@ -181,14 +191,14 @@ def test_a_database_that_its_writer_has_locked_is_an_error(tmp_path, monkeypatch
     with closing(create(path)) as database:
         database.execute("BEGIN EXCLUSIVE")
         with pytest.raises(RecordingError, match="is locked by the program"):
-            rewrite(str(path), str(tmp_path / "b.db3"), {})
-    assert not (tmp_path / "b.db3").exists()
+            rewrite(str(path), str(tmp_path / "b.mcap"), {})
+    assert not (tmp_path / "b.mcap").exists()
 
 
 @pytest.mark.parametrize("what", ["change", "lock"])
 def test_a_database_that_is_written_meanwhile_is_an_error(what, tmp_path, monkeypatch):
     monkeypatch.setattr("idlc.recordings.containers.db3.PATIENCE", 0.01)
-    monkeypatch.setattr("idlc.recordings.containers.db3.PAGES", 5)
+    monkeypatch.setattr("idlc.recordings.containers.db3.GROUP", 100)
     path = tmp_path / "a.db3"
     with closing(create(path)) as database:
 
@@ -201,39 +211,20 @@ def test_a_database_that_is_written_meanwhile_is_an_error(what, tmp_path, monkey
 
         why = "was changed while" if what == "change" else "is locked by"
         with pytest.raises(RecordingError, match=why):
-            rewrite(str(path), str(tmp_path / "b.db3"), {}, progress)
-    assert not (tmp_path / "b.db3").exists()
+            rewrite(str(path), str(tmp_path / "b.mcap"), {}, progress)
+    assert not (tmp_path / "b.mcap").exists()
 
 
-def test_computed_indexes_and_defaults_are_not_computed(tmp_path):
-    for number, (statement, why) in enumerate(
-        [
-            ("CREATE INDEX i ON messages(hex(data))", "computed"),
-            ("CREATE INDEX i ON messages(data) WHERE length(data) > 3", "computed"),
-            ("CREATE INDEX i ON messages(timestamp)", None),
-            ("ALTER TABLE message_definitions ADD COLUMN x DEFAULT (1)", None),
-        ]
-    ):
-        path, target = tmp_path / f"{number}.db3", tmp_path / f"{number}-new.db3"
-        with closing(create(path)) as database:
-            database.execute("UPDATE topics SET type = 'x/msg/Y'")
-            database.execute(statement.replace("DEFAULT (1)", ""))
-        if why:
-            with pytest.raises(RecordingError, match=why):
-                rewrite(str(path), str(target), {"/x": NEW})
-            assert not target.exists()
-        else:
-            rewrite(str(path), str(target), {"/x": NEW})
-            assert tables(target)[0]["message_definitions"][-1][1] == NEW.type
-
-
-def test_databases_of_humble_have_no_definitions_to_change(tmp_path):
+def test_databases_of_humble_get_definitions(tmp_path):
     path = tmp_path / "a.db3"
     with closing(create(path)) as database:
         database.execute("DROP TABLE message_definitions")
         database.execute("ALTER TABLE topics DROP COLUMN type_description_hash")
-    rewrite(str(path), str(tmp_path / "b.db3"), {"/x": NEW})
-    assert tables(tmp_path / "b.db3")[0]["topics"] == [(1, 1, "/x", NEW.type, "cdr")]
+    rewrite(str(path), str(tmp_path / "b.mcap"), {"/x": NEW})
+    with idlc.Recording(tmp_path / "b.mcap") as recording:
+        (topic,) = recording.topics
+        assert (topic.type, topic.hash) == (NEW.type, NEW.type_hash)
+        assert topic.schema.text == NEW.definition
 
 
 def test_metadata_keeps_its_text_but_for_the_types(tmp_path):
@@ -270,21 +261,41 @@ def test_metadata_keeps_its_text_but_for_the_types(tmp_path):
         assert (tmp_path / "new/metadata.yaml").read_bytes() == broken
 
 
-@pytest.mark.parametrize("name", ["a.mcap.zstd", "pipe"])
-def test_folders_with_what_cannot_be_rewritten_are_an_error(name, tmp_path):
+def test_a_folder_with_what_cannot_be_rewritten_is_an_error(tmp_path):
     source = tmp_path / "source"
     source.mkdir()
     made.by_mcap(source / "a.mcap", MESSAGES, "")
-    if name == "pipe":
-        os.mkfifo(source / name)
-    else:
-        (source / name).write_bytes(b"\x28\xb5\x2f\xfd")
-    with pytest.raises(RecordingError, match=name):
+    os.mkfifo(source / "pipe")
+    with pytest.raises(RecordingError, match="pipe"):
         rewrite(str(source), str(tmp_path / "target"), {})
     assert list(tmp_path.iterdir()) == [source]
 
 
+@pytest.mark.parametrize("suffix", ["mcap", "db3"])
+def test_files_that_are_compressed_as_a_whole_become_plain_ones(suffix, tmp_path):
+    source = made.by_rosbags(tmp_path / "bag", MESSAGES, suffix)
+    (plain,) = source.glob(f"*.{suffix}")
+    rewrite(str(plain), str(tmp_path / "expected.mcap"), {})
+    packed = source / f"{plain.name}.zstd"
+    packed.write_bytes(zstandard.ZstdCompressor().compress(plain.read_bytes()))
+    plain.unlink()
+    metadata = source / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace(plain.name, packed.name))
+    assert rewrite(str(source), str(tmp_path / "new"), {}).damage == ()
+    (written,) = (tmp_path / "new").glob("*.mcap*")
+    assert content(written) == content(tmp_path / "expected.mcap")
+    text = (tmp_path / "new/metadata.yaml").read_text()
+    assert f"- {written.name}" in text.replace("'", "")
+    assert "zstd" not in text
+    (source / packed.name).write_bytes(packed.read_bytes()[:-9])
+    with pytest.raises(RecordingError, match=packed.name):
+        rewrite(str(source), str(tmp_path / "strict"), {}, strict=True)
+    (tmp_path / "damaged").parent.mkdir(exist_ok=True)
+    with suppress(RecordingError):
+        assert packed.name in str(rewrite(str(source), str(tmp_path / "damaged"), {}).damage)
+
+
 def test_a_hot_journal_is_an_error(tmp_path):
     with pytest.raises(RecordingError, match="its writer stopped within a transaction"):
-        rewrite(str(hot(tmp_path)), str(tmp_path / "b.db3"), {"/x": NEW})
-    assert not (tmp_path / "b.db3").exists()
+        rewrite(str(hot(tmp_path)), str(tmp_path / "b.mcap"), {"/x": NEW})
+    assert not (tmp_path / "b.mcap").exists()

@@ -60,9 +60,11 @@ def without_idl(text):
     return before + empty + after[after.index("=" * 80, 80) :] if empty else text
 
 
-def test_the_same_interfaces_break_nothing(said):
-    for level in ((), ("--level", "hash")):
-        words = ["breaking", FOLDER / "kit_msgs", "--package", "kit_msgs", "--against", BAG, *level]
+def test_the_same_interfaces_break_nothing(said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for levels in ("", 'levels = ["hash"]\n'):
+        (tmp_path / "pyproject.toml").write_text(f"[tool.idlc.breaking]\n{levels}")
+        words = ["breaking", FOLDER / "kit_msgs", "--package", "kit_msgs", "--against", BAG]
         status, text = said(*words)
         assert status == 0, text
         assert "no breaking changes" in text

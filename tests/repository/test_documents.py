@@ -39,12 +39,12 @@ def test_the_commands_are_as_their_help_says():
     assert current == text
 
 
-# an upgrade
+# a new version
 
 
-def test_an_upgrade_is_as_described(tmp_path, monkeypatch):
+def test_a_new_version_is_as_described(tmp_path, monkeypatch):
     """The commands run one after the other, for a package whose copy of the runtime is older."""
-    text = (DOCS / "upgrading.md").read_text(encoding="utf-8")
+    text = (DOCS / "versioning.md").read_text(encoding="utf-8")
     write(tmp_path / "pyproject.toml", '[tool.idlc]\npaths = ["demo"]\nout = "out/demo"\n')
     write(tmp_path / "demo/package.xml", "<package><name>demo</name></package>\n")
     write(tmp_path / "demo/msg/Drive.msg", "float64 speed\n")

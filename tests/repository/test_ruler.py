@@ -12,11 +12,7 @@ MOST_DECISIONS = 20
 ABOVE = {
     "idlc/check/cmake_lists.py",
     "idlc/check/installation.py",
-    "idlc/cli/breaking.py",
-    "idlc/cli/direct.py",
-    "idlc/cli/gen.py",
     "idlc/cli/init.py",
-    "idlc/cli/scaffold_package.py",
     "idlc/packaging/facts.py",
     "idlc/packaging/layout.py",
     "idlc/packaging/setup_edits.py",

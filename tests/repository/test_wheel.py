@@ -138,7 +138,9 @@ def test_a_clean_environment_needs_only_the_wheel(distributions, tmp_path):
     }
     assert len(versions) == 1
     known = json.loads((ROOT / "golden/spec/catalog_hashes.json").read_text(encoding="utf-8"))
-    hashes = run(environment.bin / "idlc", "hash", "std_msgs/msg/Header", cwd=tmp_path)
+    hashes = run(
+        environment.bin / "idlc", "show", "std_msgs/Header", "--format", "hash", cwd=tmp_path
+    )
     assert hashes.split() == [known["std_msgs/msg/Header"], "std_msgs/msg/Header"]
 
 

@@ -80,11 +80,11 @@ def standard(name):
 class Robot:
     """A node `/driver` in a session of its own; `close` ends it."""
 
-    def __init__(self, endpoint, node="driver", files=FILES):
-        self.session = open_session(endpoint, domain=0, environ={})
+    def __init__(self, endpoint, node="driver", files=FILES, domain=0):
+        self.session = open_session(endpoint, domain=domain, environ={})
         self.transport = self.session.transport
         # another session, so that a test begins when the router knows what the robot announced
-        self.observer = open_session(endpoint, domain=0, environ={})
+        self.observer = open_session(endpoint, domain=domain, environ={})
         self.files = files
         self.node = node
         self.requests = []
@@ -97,7 +97,7 @@ class Robot:
         if hash_ is None:
             hash_ = described(type_, tuple(self.files.items()))[0] if type_ else ""
         entity = Entity(
-            domain=0,
+            domain=self.session.domain,
             session=self.session.id,
             node_id=self.node_id,
             id=self.node_id if kind is Kind.NODE else self.session.next_id(),

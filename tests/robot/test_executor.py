@@ -1,6 +1,8 @@
 """The executor, futures, tasks, timers, clocks, arguments and loggers, without a network."""
 
 import sys
+import threading
+import time
 
 import pytest
 
@@ -12,6 +14,8 @@ from idlc.robot import (
     Executor,
     ExternalShutdownException,
     Future,
+    GuardCondition,
+    MultiThreadedExecutor,
     MutuallyExclusiveCallbackGroup,
     RobotError,
     Time,
@@ -23,6 +27,7 @@ from idlc.robot.nodes.arguments import Arguments, parse_arguments
 from idlc.robot.nodes.endpoints import MOST_QUEUED, Bounded
 from idlc.robot.nodes.logger import LoggingSeverity
 from idlc.robot.qos import HistoryPolicy, QoSProfile
+from tests.support.waiting import LIMIT
 
 SECOND = 10**9
 HOUR = 3600
@@ -201,6 +206,50 @@ def test_waits_end(executor):
         executor.spin_once()
     executor.shutdown()
     executor.spin_once()
+
+
+# threads
+
+
+def test_threads_run_callbacks_that_wait_for_each_other():
+    """One thread cannot; a mutually exclusive group has one callback at a time all the same."""
+    context, barrier, running, most = Context(), threading.Barrier(2), [], []
+    context.init([])
+    group = MutuallyExclusiveCallbackGroup()
+
+    def exclusive():
+        running.append(1)
+        most.append(len(running))
+        time.sleep(0.001)
+        running.pop()
+
+    with context, MultiThreadedExecutor(2, context=context) as executor:
+        tasks = [executor.create_task(barrier.wait, LIMIT) for _ in range(2)]
+        for task in tasks:
+            executor.spin_until_future_complete(task, LIMIT)
+        assert sorted(task.result() for task in tasks) == [0, 1]
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        executor.add_node(Timers(*(Timer(exclusive, group, 0, clock) for _ in range(3))))
+        while len(most) < 20:
+            executor.spin_once(timeout_sec=LIMIT)
+        assert set(most) == {1}
+        executor.create_task(int, "x")
+        with pytest.raises(ValueError, match="invalid literal"):
+            executor.spin()
+
+
+def test_a_condition_calls_back_once_for_triggers_from_any_thread(executor):
+    calls = []
+    condition = GuardCondition(lambda: calls.append(1), None, Clock())
+    executor.add_node(Timers(condition))
+    executor.spin_once(timeout_sec=0)
+    assert calls == []
+    for count in (1, 2):
+        for _ in range(2):
+            threading.Thread(target=condition.trigger).run()
+        executor.spin_once(timeout_sec=LIMIT)
+        executor.spin_once(timeout_sec=0)
+        assert len(calls) == count
 
 
 # timers and clocks

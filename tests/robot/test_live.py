@@ -140,7 +140,7 @@ def test_messages_are_printed_and_malformed_ones_counted(robot, router, capsys, 
     publish(b"\0\1\0\0\xff\xff")
     for word in ("one", "two"):
         publish(string(data=word))
-    assert main(["echo", router, "words", "--count", "2", "--format", style]) == 0
+    assert main(["echo", router, "words", "--count", "3", "--format", style]) == 0
     out, err = capsys.readouterr()
     expected = {
         "yaml": "{data: one}\n---\n{data: two}\n---\n",

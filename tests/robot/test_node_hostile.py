@@ -3,6 +3,7 @@
 import gc
 import random
 import sys
+import threading
 
 import pytest
 
@@ -103,6 +104,16 @@ def test_a_flood_is_bounded(node):
     node.destroy_service(service)
     node.destroy_subscription(subscription)
     assert sum(each.dropped for each in requests) == 100
+
+
+def test_a_response_ends_spin_once(node):
+    """As in the loop of ROS 2's own examples; that no service answers is a response, too."""
+    future = node.create_client(SetBool, "nowhere").call_async(SetBool.Request())
+    thread = threading.Thread(target=node.executor.spin_once, daemon=True)
+    thread.start()
+    thread.join(LONG)
+    assert not thread.is_alive()
+    assert future.done()
 
 
 def test_a_service_that_replies_for_ever_is_cut_short(node, router):

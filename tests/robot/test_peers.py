@@ -110,7 +110,7 @@ def network(tmp_path_factory):
             stack.callback(process.kill)
             return process
 
-        router = start("router", "-m", "idlc", "robot", "router", "--listen", endpoint)
+        router = start("router", "-m", "idlc", "router", "--listen", endpoint)
 
         def listens():
             assert router.poll() is None, logs["router"].read_text()

@@ -48,15 +48,10 @@ def test_choices_of_the_middleware_are_filled_in():
 
 def test_a_number_is_a_depth_and_a_duration_has_nanoseconds():
     assert qos_profile(7) == QoSProfile(depth=7)
-    assert qos_profile(qos_profile_sensor_data) is qos_profile_sensor_data
+    assert qos_profile(qos_profile_sensor_data) == qos_profile_sensor_data
+    assert qos_profile(qos_profile_sensor_data) is not qos_profile_sensor_data
     assert QoSProfile(depth=1, deadline=Duration()).deadline == 7
     assert QoSProfile(depth=1, reliability=2).reliability is ReliabilityPolicy.BEST_EFFORT
-
-
-def test_a_profile_does_not_change():
-    with pytest.raises(AttributeError):
-        qos_profile_sensor_data.depth = 1
-    assert hash(QoSProfile(depth=1)) == hash(QoSProfile(depth=1))
 
 
 @pytest.mark.parametrize(
@@ -99,3 +94,16 @@ def test_a_publisher_offers_at_least_what_is_requested(policy, weak, strong):
         assert incompatible_policies(offered, requested) == ()
     for profile in (less, more):
         assert incompatible_policies(profile, BEST_AVAILABLE) == ()
+
+
+def test_a_profile_can_be_changed():
+    profile = QoSProfile(depth=3)
+    copy = qos_profile(profile)
+    profile.reliability = ReliabilityPolicy.BEST_EFFORT
+    profile.history = 2
+    assert profile == QoSProfile(depth=3, reliability=2, history=HistoryPolicy.KEEP_ALL)
+    assert (copy, len({profile, copy, QoSProfile(depth=3)})) == (QoSProfile(depth=3), 2)
+    for name, value in (("depth", -1), ("reliability", 9)):
+        with pytest.raises(ValueError, match=str(value)):
+            setattr(profile, name, value)
+    assert profile.depth == 3

@@ -347,7 +347,7 @@ def test_two_routers_cannot_have_one_port(router):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_router_command_runs_until_it_is_stopped(number):
     endpoint = free_endpoint()
-    command = [sys.executable, "-m", "idlc", "robot", "router", "--listen", endpoint]
+    command = [sys.executable, "-m", "idlc", "router", "--listen", endpoint]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert read_line(process.stdout) == f"listening on {endpoint}; press Ctrl-C to stop\n"
@@ -359,7 +359,7 @@ def test_the_router_command_runs_until_it_is_stopped(number):
 
 
 def test_the_router_command_reports_a_bad_endpoint(capsys):
-    assert main(["robot", "router", "--listen", "tcp/robot"]) == 2
+    assert main(["router", "--listen", "tcp/robot"]) == 2
     assert capsys.readouterr().err == (
         "error: `tcp/robot` is not an endpoint\n  = hint: write `tcp/robot:7447`\n"
     )

@@ -70,7 +70,7 @@ def scaffolded(tmp_path_factory):
 
 def hashes(package):
     """Return the hashes that the interfaces of a package have now."""
-    lines = idlc("hash", ".", cwd=package).splitlines()
+    lines = idlc("show", ".", "--format", "hash", cwd=package).splitlines()
     found = {name: digest for digest, name in map(str.split, lines)}
     return {name: found[name] for name in MESSAGES}
 

@@ -1,4 +1,4 @@
-"""`idlc describe` prints what ROS 2 installs, for every interface of the installed wheels."""
+"""Type descriptions are what ROS 2 installs, for every interface of the installed wheels."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""docs/publish.md: its library is built, checked, and installed with ROS 2 and without it."""
+"""docs/ship-messages.md: its library is built, checked, and installed with ROS 2 and without it."""
 
 import os
 import re
@@ -17,7 +17,7 @@ from tests.support.paths import DOCS
 pytestmark = pytest.mark.long
 __all__ = ["distributions"]  # a fixture
 
-PAGE = (DOCS / "publish.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "ship-messages.md").read_text(encoding="utf-8").partition("## A package for")[0]
 FENCES = re.findall(r"^```(\S*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 FILES = {info: text for info, text in FENCES if "." in info}
 PROJECT = {path: text for path, text in FILES.items() if path not in ("show.py", "node.py")}

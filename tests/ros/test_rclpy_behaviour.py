@@ -23,6 +23,7 @@ QUIET = [
     "nothing_is_loaded_before_rclpy_asks",
     "rclpy_accepts_the_classes",
     "raw_latched_and_waited_for",
+    "readers_take_raw_messages",
     "wrong_values_raise_where_they_are_published",
     "garbage_is_dropped",
     "received_garbage_is_dropped",
@@ -73,7 +74,13 @@ def light(tmp_path_factory) -> str:
 
 
 @pytest.mark.parametrize(
-    "behaviour", ["rclpy_accepts_the_classes", "raw_latched_and_waited_for", "many_threads"]
+    "behaviour",
+    [
+        "rclpy_accepts_the_classes",
+        "raw_latched_and_waited_for",
+        "readers_take_raw_messages",
+        "many_threads",
+    ],
 )
 def test_behaviour_with_an_installed_runtime(behaviour, start, light):
     assert finish(start(behaviour, path=light)) == ("", "")

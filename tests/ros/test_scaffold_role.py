@@ -1,4 +1,4 @@
-"""docs/contributing/add-a-role.md holds: what it lists is all that a new role takes."""
+"""docs/contributing/add.md holds for roles: what it lists is all that a new role takes."""
 
 import os
 import re
@@ -15,12 +15,12 @@ from tests.support.tools import tool
 
 pytestmark = pytest.mark.long
 
-GUIDE = DOCS / "contributing" / "add-a-role.md"
+GUIDE = DOCS / "contributing" / "add.md"
 
 
 def blocks() -> dict[str, str]:
     """Return the guide's blocks of code by what they are marked with."""
-    text = GUIDE.read_text(encoding="utf-8")
+    text = GUIDE.read_text(encoding="utf-8").split("## Add a role\n")[1].split("\n## ")[0]
     found = re.findall(r"^   ```(\S+)\n(.*?)^   ```$", text, re.MULTILINE | re.DOTALL)
     return {head: re.sub(r"(?m)^ {3}", "", body) for head, body in found}
 

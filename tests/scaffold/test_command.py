@@ -196,7 +196,6 @@ def test_files_keep_their_mode(package):
         (["package", "Demo"], "is not a package name\n  = hint: use lower-case letters"),
         (["package", "test"], "is the name of a folder or module"),
         (["package", "launch"], "is the name of a folder or module"),
-        (["package", "x", "--interfaces-only", "--build-type", "ament_python"], "needs ament_cm"),
     ],
 )
 def test_wrong_words_are_explained_and_change_nothing(package, capsys, words, said):

@@ -1,11 +1,15 @@
 """What entering a node makes of the texts of a package's files."""
 
+from pathlib import Path
+
 import pytest
 
+from idlc.cli.main import main
 from idlc.packaging.outcome import Edited, Refused
 from idlc.scaffold import new_node, spec
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.spec import Plan, plan
+from tests.support.files import write_all
 
 SETUP = """\
 from setuptools import setup
@@ -89,3 +93,76 @@ def test_a_file_that_is_there_stays():
 )
 def test_the_launch_file_of_the_package_is_chosen(names, expected):
     assert expected in new_node.paths("demo", names)
+
+
+#: The `packages` of a setup.py whose own ones are elsewhere, and what they become; or a note.
+PACKAGES = {
+    "['helm']": "['helm', 'demo']",
+    "('helm',)": "('helm',)",
+    "find_packages(include=['helm'])": "find_packages(include=['helm']) + ['demo']",
+    "find_packages(exclude=['demo*'])": "find_packages(exclude=['demo*']) + ['demo']",
+    "find_packages()": "find_packages()",
+    "computed()": "computed()",
+}
+
+
+@pytest.mark.parametrize("packages", PACKAGES)
+def test_a_new_python_package_is_installed_or_named(packages):
+    setup = SETUP.replace("    name='demo',", f"    name='demo',\n    packages={packages},")
+    entry = entered({**TEXTS, "setup.py": setup})
+    after = entry.edits["setup.py"]
+    assert isinstance(after, Edited)
+    assert f"packages={PACKAGES[packages]},\n" in after.text
+    notes = [note for path, note in entry.notes if path == "setup.py"]
+    assert len(notes) == (packages in ("('helm',)", "computed()"))
+    again = entered({**TEXTS, "setup.py": after.text, "demo/__init__.py": ""})
+    assert again.edits["setup.py"] == after
+
+
+def manifest(build_type):
+    export = f"<export><build_type>{build_type}</build_type></export>" if build_type else ""
+    return f'<package format="3">\n  <name>demo</name>\n  {export}\n</package>\n'
+
+
+#: A package, and where its node is entered, or what is said instead.
+BUILDS = {
+    "ament_cmake": ({"package.xml": manifest("ament_cmake"), "CMakeLists.txt": ""}, "CMake builds"),
+    "with a setup.py": (
+        {"package.xml": manifest("ament_cmake"), "CMakeLists.txt": "", "setup.py": SETUP},
+        "CMake builds",
+    ),
+    "no type": ({"package.xml": manifest(""), "CMakeLists.txt": ""}, "CMake builds"),
+    "poetry": (
+        {
+            "package.xml": manifest("ament_python"),
+            "pyproject.toml": '[tool.poetry]\nname = "demo"\n',
+        },
+        "pyproject.toml:[tool.poetry.scripts]\nheart = ",
+    ),
+    "hatchling": (
+        {"package.xml": manifest("ament_python"), "pyproject.toml": '[project]\nname = "demo"\n'},
+        "pyproject.toml:[project.scripts]\nheart = ",
+    ),
+    "src": (
+        {
+            "package.xml": manifest("ament_python"),
+            "setup.py": SETUP.replace(
+                "    name=", "    packages=['demo'], package_dir={'': 'src'},\n    name="
+            ),
+        },
+        "src/demo/heart.py:def main(",
+    ),
+}
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("build", BUILDS)
+def test_a_node_is_entered_where_its_build_looks_or_refused(build, capsys):
+    files, expected = BUILDS[build]
+    write_all(files)
+    status = main(["scaffold", "node", "heart", "--timer", "1"])
+    said = "".join(capsys.readouterr())
+    path, _, text = expected.partition(":")
+    assert (status == 0) == bool(text), said
+    assert text in Path(path).read_text() if text else expected in said
+    assert bool(text) or not Path("demo").exists()

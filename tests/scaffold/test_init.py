@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from idlc.cli.main import main
+from idlc.project.settings import toml
 from idlc.scaffold.proof import Proof, missing_tool
 from tests.support.files import write, write_all
 from tests.support.paths import DOCS, ROOT
@@ -49,6 +50,7 @@ def project(here, monkeypatch):
 def unproved(monkeypatch):
     """Skip the proof, which takes seconds, where it has nothing to do with the tested files."""
     monkeypatch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
+    monkeypatch.setattr("idlc.scaffold.proof.installed_files", lambda *_: frozenset())
 
 
 def tree(folder):
@@ -108,7 +110,7 @@ def follow_hints(printed, cwd):
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_every_kind_of_package_is_set_up_once(name, project, capsys):
+def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys):
     sample = SAMPLES[name]
     write_all(sample.files)
     before = tree(project)
@@ -124,6 +126,7 @@ def test_every_kind_of_package_is_set_up_once(name, project, capsys):
     assert re.search(r"^test passed: .* 1? ?\w* ?class", printed, re.MULTILINE)
     assert "next: idlc gen\n" in printed
     after = tree(project)
+    monkeypatch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
     assert main(["init", "--yes"]) == 0
     assert "nothing to do\n" in capsys.readouterr().out
     assert tree(project) == after
@@ -759,3 +762,85 @@ def test_gen_in_a_workspace_names_a_command_for_all_packages(project, capsys):
     run("sh", "-c", command, cwd=project)
     assert Path("src/bot/bot/srv/__init__.py").is_file()
     assert Path("src/field_msgs/build/field_msgs/msg/__init__.py").is_file()
+
+
+def of_ros(name, *depends, build="ament_cmake"):
+    """Return the files of a package in a folder of its name, whose message uses others."""
+    export = f"<export><build_type>{build}</build_type></export>"
+    fields = "".join(f"{each}/A {each}\n" for each in depends)
+    return {
+        f"{name}/package.xml": f"<package><name>{name.rpartition('/')[2]}</name>{export}</package>",
+        f"{name}/msg/A.msg": f"int8 a\n{fields}",
+        f"{name}/CMakeLists.txt": "",
+    }
+
+
+#: Packages beside each other, and the `include` of some.
+SIBLINGS = {
+    "flat": (of_ros("b_msgs") | of_ros("a_msgs", "b_msgs"), {"a_msgs": ["../b_msgs"]}),
+    "nested": (
+        of_ros("x/c_msgs") | of_ros("b_msgs", "c_msgs") | of_ros("y/z/a_msgs", "b_msgs"),
+        {"y/z/a_msgs": ["../../../b_msgs", "../../../x/c_msgs"], "b_msgs": ["../x/c_msgs"]},
+    ),
+    "standard": (of_ros("std_msgs") | of_ros("a_msgs", "std_msgs"), {"a_msgs": None}),
+}
+
+
+@pytest.mark.parametrize("case", SIBLINGS)
+@pytest.mark.usefixtures("unproved")
+def test_a_package_includes_those_beside_it_whose_messages_it_uses(case, project, capsys):
+    files, includes = SIBLINGS[case]
+    write_all({**files, ".git/HEAD": ""})
+    main(["init", "--yes"])
+    printed, problems = capsys.readouterr()
+    assert f"this is a workspace of {len(files) // 3} packages\n" in printed
+    assert ("nothing was written" in problems) == (case == "standard"), problems
+    for folder, include in includes.items():
+        path = Path(folder, "pyproject.toml")
+        table = toml(path.read_text()) if path.exists() else {"tool": {"idlc": {}}}
+        assert table["tool"]["idlc"].get("include") == include
+
+
+PROJECT = '[project]\nname = "kit"\nversion = "1"\n'
+#: A root with a pyproject.toml, and what it is.
+ROOTS = {
+    "uv": ({"pyproject.toml": PROJECT}, "this is a workspace of 1 package\n"),
+    "poetry": (
+        {"pyproject.toml": '[tool.poetry]\nname = "x"\n'},
+        "this is a workspace of 1 package",
+    ),
+    "a helper": (
+        {"pyproject.toml": PROJECT, "kit/__init__.py": ""},
+        "this is a workspace of 1 package\n",
+    ),
+    "a library": (
+        {"pyproject.toml": PROJECT, "kit/__init__.py": "", "interfaces/msg/A.msg": ""},
+        "kit is a Python library in kit",
+    ),
+}
+
+
+@pytest.mark.parametrize("root", ROOTS)
+@pytest.mark.usefixtures("unproved")
+def test_a_folder_of_packages_is_a_workspace_whatever_its_root_lists(root, project, capsys):
+    files, words = ROOTS[root]
+    write_all({**files, **of_ros("a_msgs")})
+    main(["init"])
+    assert words in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize("tool", ["hatchling.build", "flit_core.buildapi", "poetry"])
+@pytest.mark.usefixtures("unproved")
+def test_a_package_of_another_backend_gets_no_setup_py(tool, project, capsys):
+    text = f'[project]\nname = "bot"\nversion = "1"\n[build-system]\nbuild-backend = "{tool}"\n'
+    text = '[tool.poetry]\nname = "bot"\n' if tool == "poetry" else text
+    files = of_ros(".", build="ament_python") | {"bot/__init__.py": "", "pyproject.toml": text}
+    write_all({**files, "package.xml": files["./package.xml"].replace("<name>.", "<name>bot")})
+    Path("CMakeLists.txt").unlink()
+    assert main(["init", "--yes"]) == 0
+    printed = capsys.readouterr().out
+    assert "builds the package, so idlc writes no setup.py" in printed
+    assert not Path("setup.py").exists()
+    assert Path("bot/msg/__init__.py").exists()
+    assert main(["check", "--select", "package", "--ignore", "IDL453,IDL454"]) == 0
+    assert "no problems" in capsys.readouterr().out

@@ -12,6 +12,8 @@ from idlc.cli.app import app
 from tests.support.paths import DOCS
 
 PAGE = DOCS / "command-line.md"
+#: The options that the page describes once. Some commands have another option of such a name.
+COMMON = ("--package", "--include", "--exclude", "--distro", "--format")
 _PART = re.compile(r"(?<=<!-- commands -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
@@ -45,18 +47,28 @@ def _section(command: click.Command, context: click.Context) -> Iterator[str]:
     yield f"    {' '.join([context.command_path, '[OPTIONS]', *words])}"
     yield ""
     yield from _prose(command.help or "")
-    options = [param for param in command.params if isinstance(param, click.Option)]
-    rows = [_row(option.get_help_record(context)) for option in options]
-    yield "| option | |"
-    yield "|---|---|"
-    yield from filter(None, rows)
-    yield ""
+    records = [param.get_help_record(context) for param in command.params if _is_option(param)]
+    common = [record for record in records if record and _is_common(*record)]
+    rows = [_row(record) for record in records if record and record not in common]
+    if rows:
+        yield from ("| option | |", "|---|---|", *rows, "")
+    if common:
+        names = ", ".join(f"`{names}`" for names, _ in common)
+        yield f"[Common options](#common-options): {names}."
+        yield ""
     yield from _prose(command.epilog or "")
 
 
-def _row(record: tuple[str, str] | None) -> str:
-    if record is None:
-        return ""
+def _is_option(param: click.Parameter) -> bool:
+    return isinstance(param, click.Option)
+
+
+def _is_common(names: str, text: str) -> bool:
+    name = names.rpartition(", ")[2].split()[0]
+    return name in COMMON and (name != "--format" or text.startswith("Output format.  ["))
+
+
+def _row(record: tuple[str, str]) -> str:
     names, help_ = (" ".join(text.split()).replace("|", r"\|") for text in record)
     return f"| `{names}` | {help_} |"
 

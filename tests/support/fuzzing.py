@@ -62,7 +62,7 @@ def interface(data: bytes, folder: Path, kind: str) -> None:
     named = ("--package", "demo")
     verdict = idlc("check", here, *named)
     assert idlc("gen", here, "-o", f"{here}/out/demo", *named) == verdict
-    assert idlc("hash", here, *named) == verdict
+    assert idlc("show", here, *named, "--format", "hash") == verdict
     assert idlc("breaking", here, "--against", here, *named) == verdict
     idlc("fmt", here)
     assert idlc("check", here, *named) == verdict

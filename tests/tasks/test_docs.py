@@ -92,7 +92,7 @@ def test_what_is_searched_is_there(site):
 
 def test_a_page_says_what_there_is_to_say(site, capsys):
     text = read(site, "demo/msg-Drive.html")
-    assert main(["hash", "demo/msg/Drive.msg"]) == 0
+    assert main(["show", "demo/msg/Drive.msg", "--format", "hash"]) == 0
     assert capsys.readouterr().out.split()[-2] in text
     for part in ("How to drive.", "STOP", "halt", ">m/s<", "0.5", "Part</a>[&lt;=2]", "Used by"):
         assert part in text

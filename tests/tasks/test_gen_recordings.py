@@ -103,7 +103,7 @@ def test_topics_narrow_it_down(recorded, tmp_path):
 def test_all_that_topics_can_be_is_the_same_for_every_container(recorded, capsys):
     outputs = set()
     for path in recorded[1].values():
-        assert main(["hash", str(path)]) == 0
+        assert main(["show", str(path), "--format", "hash"]) == 0
         outputs.add(capsys.readouterr().out)
     (output,) = outputs
     for type_, _ in MAKERS.values():

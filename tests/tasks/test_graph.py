@@ -253,8 +253,10 @@ def test_files_here_are_a_version(say, tmp_path):
     status, said = say(graph, "demo")
     assert status == 1
     assert "field `gear` was added (`/old` → your files)\n --> demo/msg/Drive.msg:2:6" in said
-    status, said = say(graph, "demo", "--level", "behaviour")
+    (tmp_path / "pyproject.toml").write_text('[tool.idlc.breaking]\nlevels = ["behaviour"]\n')
+    status, said = say(graph, "demo")
     assert status == 0
+    (tmp_path / "pyproject.toml").unlink()
     status, said = say(RecordedGraph(ends(new=[("/new", "publisher")])), "demo")
     assert status == 0
 

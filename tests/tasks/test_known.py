@@ -1,4 +1,4 @@
-"""Types and packages by name, as people write them: `show`, `hash`, `describe`, `list`."""
+"""Types and packages by name, as people write them: `show` and `list`."""
 
 import json
 from pathlib import Path
@@ -25,8 +25,8 @@ def workspace(tmp_path, monkeypatch):
 
 
 def hashed(capsys, *words):
-    """Return the first name that `idlc hash` prints."""
-    assert main(["hash", *words]) == 0, capsys.readouterr().err
+    """Return the first name that `idlc show --format hash` prints."""
+    assert main(["show", *words, "--format", "hash"]) == 0, capsys.readouterr().err
     return capsys.readouterr().out.split()[1]
 
 
@@ -53,7 +53,7 @@ def test_a_name_that_means_one_type_is_that_type(text, name, folder, monkeypatch
     if "_" not in name.rpartition("/")[2]:
         assert main(["show", text]) == 0
         assert capsys.readouterr().out.startswith(f"# {name}\n")
-    assert main(["describe", text]) == 0
+    assert main(["show", text, "--format", "type-description"]) == 0
     assert f'"type_name": "{name}"' in capsys.readouterr().out
 
 
@@ -78,8 +78,8 @@ def test_a_name_that_means_one_type_is_that_type(text, name, folder, monkeypatch
     ],
 )
 def test_what_means_none_or_several_leads_on(text, hints, capsys):
-    for command in ("show", "hash", "describe"):
-        assert main([command, text]) == 2
+    for style in ("text", "hash", "type-description"):
+        assert main(["show", text, "--format", style]) == 2
         said = capsys.readouterr().err
         assert "error[IDL618]" in said
         for hint in hints:
@@ -88,7 +88,7 @@ def test_what_means_none_or_several_leads_on(text, hints, capsys):
 
 def test_the_package_around_wins_over_what_is_installed(monkeypatch, capsys):
     monkeypatch.chdir("src/greenhouse")
-    assert main(["hash", "Twist"]) == 2
+    assert main(["show", "Twist", "--format", "hash"]) == 2
     assert "`geometry_msgs/msg/Twist`, `greenhouse_msgs/msg/Twist`" in capsys.readouterr().err
     write("package.xml", MANIFEST.format("geometry_msgs"))
     assert main(["show", "geometry_msgs/Twist"]) == 0
@@ -98,7 +98,7 @@ def test_the_package_around_wins_over_what_is_installed(monkeypatch, capsys):
 def test_a_package_means_all_that_it_holds(capsys):
     assert main(["show", "std_srvs"]) == 0
     assert capsys.readouterr().out.count("# std_srvs/srv/") == 3
-    assert main(["hash", "greenhouse_msgs", "Header"]) == 0
+    assert main(["show", "greenhouse_msgs", "Header", "--format", "hash"]) == 0
     names = capsys.readouterr().out.split()[1::2]
     assert {"greenhouse_msgs/msg/Twist", "std_msgs/msg/Header"} < set(names)
 

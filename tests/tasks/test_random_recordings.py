@@ -9,6 +9,7 @@ from contextlib import closing
 
 import pytest
 import zstandard
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
@@ -132,8 +133,9 @@ def upgraded(source, versions):
     out = source.parent / "out"
     assert main(["upgrade", str(source), "--to", versions.target, "-o", str(out)]) == 0
     assert contents(source) == before
-    assert [path.name for path in out.iterdir()] == [source.name]
-    return out / source.name
+    name = source.name.replace(".db3", ".mcap")
+    assert [path.name for path in out.iterdir()] == [name]
+    return out / name
 
 
 def contents(path):
@@ -178,32 +180,27 @@ def test_databases(tmp_path_factory, is_bag, data, mode):
     target = upgraded(source, versions)
     if is_bag:
         assert (target / "notes.txt").read_text(encoding="utf-8") == "mine"
-        source, target = source / "bag.db3", target / "bag.db3"
-    old, new = rows(source), rows(target)
-    conversions = versions.conversions
-    topics = {number: name for number, name, *_ in old["topics"]}
-    for was, now in zip(old["messages"], new["messages"], strict=True):
-        assert now[:-1] == was[:-1]
-        conversion = conversions.get(topics[was[1]])
+        source, target = source / "bag.db3", target / "bag.mcap"
+    old, conversions = rows(source), versions.conversions
+    topics = {number: (name, *rest) for number, name, *rest in old["topics"]}
+    texts = {type_: text for _, type_, _, text, *_ in old["message_definitions"]}
+    with target.open("rb") as file:
+        new = list(make_reader(file).iter_messages(log_time_order=False))
+    for (_, topic, time, data_before), (schema, channel, message) in zip(
+        old["messages"], new, strict=True
+    ):
+        name, type_, _, profiles, digest = topics[topic]
+        before, conversion = plain(data_before), conversions.get(name)
+        assert (channel.topic, message.log_time, message.publish_time) == (name, time, time)
+        assert channel.metadata["offered_qos_profiles"] == profiles
         if conversion is None:
-            assert now == was
+            assert message.data == before
+            assert (schema.name, schema.data.decode()) == (type_, texts[type_])
+            assert channel.metadata["topic_type_hash"] == digest
         else:
-            before, after = map(plain, (was[-1], now[-1]))
-            assert [after] == conversion.convert([before], [0])
-            assert (before is was[-1]) == (after is now[-1])
-    for was, now in zip(old["topics"], new["topics"], strict=True):
-        conversion = conversions.get(was[1])
-        wanted = (*was[:-1], conversion.type_hash) if conversion else was
-        assert now == wanted
-    texts = {type_: text for _, type_, _, text, *_ in new["message_definitions"]}
-    assert len(texts) == len(new["message_definitions"]) == len(old["message_definitions"])
-    for conversion in conversions.values():
-        assert texts.pop(conversion.type) == conversion.definition
-    for _, type_, _, text, *_ in old["message_definitions"]:
-        assert texts.get(type_, text) == text
-    assert {name: new[name] for name in ("schema", "metadata")} == {
-        name: old[name] for name in ("schema", "metadata")
-    }
+            assert [message.data] == conversion.convert([before], [0])
+            assert (schema.name, schema.data.decode()) == conversion[:1] + conversion[2:3]
+            assert channel.metadata["topic_type_hash"] == conversion.type_hash
 
 
 def plain(data):

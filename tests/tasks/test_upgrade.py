@@ -446,3 +446,64 @@ def test_sections_of_services_and_actions_are_converted(tmp_path):
     assert goal.message(old.Go.Goal(goal=3)) == new.Go.Goal(goal=3, soon=True)
     with pytest.raises(UpgradeError, match=r"Ask_Response.* needs rules .*: count: "):
         idlc.upgrade(new.Ask.Response, old.Ask.Response)
+
+
+GATE = "uint8 OPEN=0\nuint8 CLOSED=1\nuint8 state\nuint8 zone 3\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "field", "values"),
+    [
+        (GATE, GATE.replace("OPEN=0", "OPEN=1").replace("CLOSED=1", "CLOSED=0"), "state", [1, 0]),
+        (
+            "uint8 zone\nuint8 MODE_A=1\nuint8 MODE_B=2\nuint8[] mode # idlc: enum\n",
+            "uint8 zone\nuint8 MODE_A=5\nuint8 MODE_B=2\nuint8[] mode # idlc: enum\n",
+            "mode",
+            [[1, 2, 9], [5, 2, 9]],
+        ),
+        (
+            'string LEFT="l"\nstring side\n',
+            'string LEFT="left"\nstring side\nuint8 more\n',
+            "side",
+            ["l", "left"],
+        ),
+        ("In i\n", "In i\n", "i", [0, 1]),
+    ],
+)
+def test_renumbered_constants_need_a_rule(
+    before, after, field, values, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    inner = [GATE, GATE.replace("OPEN=0", "OPEN=1").replace("CLOSED=1", "CLOSED=0")]
+    kinds = []
+    for side, text, nested in zip(("old", "new"), (before, after), inner, strict=True):
+        texts = {"Gate": text, **({"In": nested} if field == "i" else {})}
+        kinds.append(idlc.load(write_package(tmp_path / side, texts)))
+    old, new = kinds
+    first = old.Gate(i=old.In(state=values[0])) if field == "i" else old.Gate(**{field: values[0]})
+    write_recording(tmp_path / "a.mcap", old.Gate, [first])
+    command = ["upgrade", "a.mcap", "--to", "new/drive_msgs"]
+    assert main([*command, "-o", "out"]) == 1
+    assert "constants changed from" in capsys.readouterr().err
+    with pytest.raises(UpgradeError, match="constants changed"):
+        list(idlc.Recording("a.mcap", as_=new.Gate)["/drive"].messages())
+    assert main([*command, "--write-rules", "rules"]) == 0
+    again = [*command, "--rules", "rules", "-o"]
+    assert main([*again, "out"]) == 0
+    assert main(["upgrade", "out/a.mcap", *again[2:], "twice"]) == 0
+    for folder in ("out", "twice"):  # a second run changes nothing
+        (message,) = messages_of(tmp_path / folder / "a.mcap", new.Gate)
+        value = message.i.state if field == "i" else getattr(message, field)
+        assert (list(value) if isinstance(values[1], list) else value) == values[1]
+
+
+def test_constants_of_no_field_need_no_rule(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = "uint16 VERSION={}\nfloat32 LIMIT={}\nfloat32 speed\n"
+    old, _ = (
+        idlc.load(write_package(tmp_path / side, {"Gate": text.format(n, n)}))
+        for n, side in enumerate(("old", "new"))
+    )
+    write_recording(tmp_path / "a.mcap", old.Gate, [old.Gate(speed=1)])
+    assert main(["upgrade", "a.mcap", "--to", "new/drive_msgs", "-o", "out"]) == 0
+    assert "copied under the new definition" in capsys.readouterr().out

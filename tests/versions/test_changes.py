@@ -282,8 +282,10 @@ def test_excluded_files_are_so_in_both_versions(capsys):
 @pytest.mark.usefixtures("repository")
 def test_the_level_decides_what_counts(capsys):
     write("src/top/msg/Near.msg", "int32 y\n")
-    assert run(capsys, "src", "--against", "git:v1", "--level", "wire") == (0, [])
-    assert run(capsys, "src", "--against", "git:v1", "--level", "source") == (
+    write("pyproject.toml", '[tool.idlc.breaking]\nlevels = ["wire"]\n')
+    assert run(capsys, "src", "--against", "git:v1") == (0, [])
+    write("pyproject.toml", '[tool.idlc.breaking]\nlevels = ["source"]\n')
+    assert run(capsys, "src", "--against", "git:v1") == (
         1,
         [("IDL504", "src/top/msg/Near.msg")],
     )

@@ -118,7 +118,7 @@ def test_nothing_is_wider_than_the_window(light, dark):
 @pytest.mark.parametrize("pattern", ["*", "contributing/*", "rules/*", "interfaces/**/*"])
 def test_no_page_is_wider_than_a_phone(site, pattern):
     pages = sorted(path.relative_to(site).as_posix() for path in site.glob(f"{pattern}.html"))
-    assert len(pages) > 5
+    assert len(pages) > 4
     for page in browser.measured(site, pages, [PHONE], MEASURE):
         assert page["scroll"] <= page["client"] == PHONE, page
         assert page["over"] == [], page["page"]
@@ -169,4 +169,4 @@ def test_the_search_works_on_a_folder(site, tmp_path):
     page = copy / "index.html"
     text = page.read_text(encoding="utf-8")
     page.write_text(text.replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
-    assert "record.html" in browser.dumped(page)
+    assert "ros-tools.html" in browser.dumped(page)

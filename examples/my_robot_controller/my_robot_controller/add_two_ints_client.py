@@ -28,7 +28,7 @@ class AddTwoIntsClient(Node):
 def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
-        a, b = map(int, sys.argv[1:3] or [2, 3])
+        a, b = map(int, sys.argv[1:3] or ['2', '3'])
         node = AddTwoIntsClient()
         node.call_add_two_ints(AddTwoInts.Request(a=a, b=b))
     except (KeyboardInterrupt, ExternalShutdownException):

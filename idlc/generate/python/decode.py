@@ -12,7 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias
 
-from idlc.generate.python.lines import Block, Comprehension, Group, Line, Statement, call
+from idlc.generate.python.lines import (
+    CodeStatement,
+    CompoundStatement,
+    Comprehension,
+    Group,
+    PlainStatement,
+    call,
+)
 from idlc.generate.python.positions import Builder, Cursor, NamedExpressions, ValueRun
 from idlc.model import ir
 from idlc.model.names import snake_case
@@ -22,9 +29,9 @@ from idlc.wire.layout import multiple_of
 #: Functions or classes by the types that they are of.
 Names: TypeAlias = Mapping[ir.TypeName, str]
 
-TOO_SHORT = (Line('raise ValueError("too short")'),)
-TOO_MANY = (Line('raise ValueError("too many elements")'),)
-UNENDED = (Line('raise ValueError("text without end")'),)
+TOO_SHORT = (PlainStatement('raise ValueError("too short")'),)
+TOO_MANY = (PlainStatement('raise ValueError("too many elements")'),)
+UNENDED = (PlainStatement('raise ValueError("text without end")'),)
 
 
 class ReadRun(ValueRun):
@@ -33,7 +40,7 @@ class ReadRun(ValueRun):
     def __init__(self) -> None:
         super().__init__()
         self.sizes: list[tuple[int, int]] = []
-        self.after: list[Statement] = []
+        self.after: list[CodeStatement] = []
 
     def skipped(self, cursor: Cursor) -> Cursor:
         """Return the position after the values, of which the first is at `cursor`."""
@@ -43,9 +50,13 @@ class ReadRun(ValueRun):
             cursor = cursor.aligned(align).skip(size)
         return cursor
 
-    def assignment(self, value: str) -> Line:
+    def assignment(self, value: str) -> PlainStatement:
         """Return the statement that reads the values."""
-        return Line(value, Group("", tuple(self.values))) if self.values else Line(value)
+        return (
+            PlainStatement(value, Group("", tuple(self.values)))
+            if self.values
+            else PlainStatement(value)
+        )
 
 
 def slice_of(start: str, end: str = "end") -> str:
@@ -58,14 +69,14 @@ def slice_of(start: str, end: str = "end") -> str:
 def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
     """Return whether a structure holds numeric buffers, which are read through a memoryview."""
     return any(
-        isinstance(step, plan.Numbers) or (isinstance(step, plan.Block) and step.is_large)
+        isinstance(step, plan.NumbersStep) or (isinstance(step, plan.NumberBlock) and step.is_large)
         for step in plan.walk(steps)
     )
 
 
 def decode(
     steps: tuple[plan.Step, ...], tables: NamedExpressions, own: str, makers: Names, foreign: Names
-) -> tuple[Statement, ...]:
+) -> tuple[CodeStatement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
     `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
@@ -81,11 +92,11 @@ def decode(
         decoder.short_if(f"{decoder.position.text()} > limit")
     first = []
     if decoder.limited or bulk:
-        first.append(Line("len(data)", "limit"))
+        first.append(PlainStatement("len(data)", "limit"))
     if bulk:
         small = tables.define("small", "reading.small")
-        first.append(Line(f"data if limit < {small} else memoryview(data)", "view"))
-    return (*first, *decoder.body, Line("return message"))
+        first.append(PlainStatement(f"data if limit < {small} else memoryview(data)", "view"))
+    return (*first, *decoder.body, PlainStatement("return message"))
 
 
 class Decoder(Builder):
@@ -158,7 +169,7 @@ class Decoder(Builder):
         """Read the count of a sequence and check its upper limit."""
         self.number("count", path)
         if bound is not None:
-            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
+            self.body.append(CompoundStatement(f"if count > {bound}:", TOO_MANY))
         return "count"
 
     def start(self) -> str:
@@ -180,7 +191,9 @@ class Decoder(Builder):
         """Move after `count` elements, and return the position of the first."""
         if not self.position.alignment.is_at(align):
             self.store_position("at")
-            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
+            self.body.append(
+                CompoundStatement(f"if {count}:", (PlainStatement("(at + 3 & -8) + 4", "at"),))
+            )
             self.position = self.position.with_alignment(multiple_of(4))
         start = self.start()
         self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
@@ -190,27 +203,27 @@ class Decoder(Builder):
     def short_if(self, condition: str) -> None:
         """Emit a check that the buffer is long enough."""
         self.limited = True
-        self.body.append(Block(f"if {condition}:", TOO_SHORT))
+        self.body.append(CompoundStatement(f"if {condition}:", TOO_SHORT))
 
     def step(self, step: plan.Step) -> None:
         """Emit one step."""
         match step:
-            case plan.Block() if step.is_large:
+            case plan.NumberBlock() if step.is_large:
                 self.block(step)
-            case plan.Number() | plan.Dummy() | plan.Block():
+            case plan.Number() | plan.Dummy() | plan.NumberBlock():
                 self.fixed(step, self.run)
             case plan.Enter(place, type_):
                 self.body += self.make_nested(place, type_)
-            case plan.Text(place, wide):
+            case plan.StringStep(place, wide):
                 self.line(self.wide_text(place) if wide else self.text(place), place.text)
             case plan.Bytes(place, primitive, bound):
                 raw = self.buffer(self.count(bound, place.path), 1, 1, self.source)
                 self.line(call(self.list_reader(primitive), raw), place.text)
-            case plan.Numbers():
+            case plan.NumbersStep():
                 self.numbers(step)
-            case plan.Texts():
+            case plan.StringsStep():
                 self.texts(step)
-            case plan.Items():
+            case plan.StructuresStep():
                 self.items(step)
 
     # Values of fixed size.
@@ -224,10 +237,10 @@ class Decoder(Builder):
         else:
             run.add(step.code, step.unit, step.place.local, step.place.path)
             reader = self.block_reader(step)
-            run.after.append(Line(call(reader, step.place.local), step.place.text))
+            run.after.append(PlainStatement(call(reader, step.place.local), step.place.text))
         run.sizes.append((step.unit, step.size))
 
-    def block_reader(self, step: plan.Block) -> str:
+    def block_reader(self, step: plan.NumberBlock) -> str:
         """Return the function that turns bytes into a fixed-size array."""
         if step.primitive in plan.LIST_PRIMITIVES:
             return self.list_reader(step.primitive)
@@ -238,13 +251,16 @@ class Decoder(Builder):
         kind = plan.LIST_PRIMITIVES[primitive]
         return self.tables.function(f"list_of_{kind}", f"read_{kind}")
 
-    def make_nested(self, place: plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
+    def make_nested(self, place: plan.Slot, type_: ir.TypeName) -> tuple[CodeStatement, ...]:
         """Return the statements that make a nested object."""
-        return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
+        return (
+            PlainStatement(f"{self.makers[type_]}()", place.local),
+            PlainStatement(place.local, place.text),
+        )
 
     # Values of variable size.
 
-    def text(self, place: plan.Place) -> str:
+    def text(self, place: plan.Slot) -> str:
         """Read the size of a string; return the expression that reads the string.
 
         The last byte must be zero; reading it checks the bounds.
@@ -259,19 +275,19 @@ class Decoder(Builder):
             self.number(size, place.path)
             start = self.start()
         self.line(f"{self.position.text(-1)} + {size}", "end")
-        self.body.append(Block("if data[end]:", UNENDED))
+        self.body.append(CompoundStatement("if data[end]:", UNENDED))
         self.position = Cursor("end", 1, multiple_of(1))
         if self.worded:
             return call("to_str", f"chars{slice_of(start)}")
         return call(self.tables.define("text", "reading.text"), f"data{slice_of(start)}")
 
-    def wide_text(self, place: plan.Place) -> str:
+    def wide_text(self, place: plan.Slot) -> str:
         """Read the size of a wstring; return the expression that reads the wstring."""
         self.number("count", place.path)
         raw = self.buffer("count", 4, 4, "data")
         return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
 
-    def numbers(self, step: plan.Numbers) -> None:
+    def numbers(self, step: plan.NumbersStep) -> None:
         """Read a numeric sequence as one buffer."""
         raw = self.buffer(self.count(step.bound, step.place.path), step.unit, step.unit, "view")
         name, reading = step.info.dtype, "reading"
@@ -281,7 +297,7 @@ class Decoder(Builder):
         reader = self.tables.function(f"sequence_of_{name}", function)
         self.line(call(reader, raw), step.place.text)
 
-    def block(self, step: plan.Block) -> None:
+    def block(self, step: plan.NumberBlock) -> None:
         """Read a large array of fixed size as one buffer."""
         self.flush()
         self.align(step.unit)
@@ -291,14 +307,14 @@ class Decoder(Builder):
         reader = self.block_reader(step)
         self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
 
-    def begin(self, step: plan.Texts | plan.Items) -> str:
+    def begin(self, step: plan.StringsStep | plan.StructuresStep) -> str:
         """Read the count, or return the size."""
         if step.size is None:
             return self.count(step.bound, step.place.path)
         self.flush()
         return str(step.size)
 
-    def texts(self, step: plan.Texts) -> None:
+    def texts(self, step: plan.StringsStep) -> None:
         """Read an array or sequence of strings."""
         count = self.begin(step)
         self.align(4)
@@ -311,7 +327,7 @@ class Decoder(Builder):
         self.line(texts, f"{step.place.text}, end")
         self.position = Cursor("end", 0, multiple_of(4 if step.wide else 1))
 
-    def items(self, step: plan.Items) -> None:
+    def items(self, step: plan.StructuresStep) -> None:
         """Read an array or sequence of structures."""
         repeat = plan.fixed(step.body)
         if repeat is not None and repeat.stride == repeat.size:
@@ -345,7 +361,7 @@ class Decoder(Builder):
         self.unchecked |= unchecked  # there may be no element
         self.worded = worded
 
-    def rows(self, step: plan.Items, repeat: plan.Fixed) -> None:
+    def rows(self, step: plan.StructuresStep, repeat: plan.Fixed) -> None:
         """Read structures of constant size: one Struct yields the values of each."""
         count = self.begin(step)
         self.line("[]", f"{step.place.local}: list[Any]")
@@ -353,21 +369,21 @@ class Decoder(Builder):
         if step.size is not None:
             self.align(repeat.align)
         run = ReadRun()
-        entered: list[Statement] = []
+        entered: list[CodeStatement] = []
         for part in step.body:
             if isinstance(part, plan.Enter):
                 entered += self.make_nested(part.place, part.type)
-            elif isinstance(part, (plan.Number, plan.Dummy, plan.Block)):
+            elif isinstance(part, (plan.Number, plan.Dummy, plan.NumberBlock)):
                 self.fixed(part, run)
         reader = self.tables.struct("read", step.item, run.fields, 4, "iter_unpack")
         values = self.tables.local(f"{step.item}_values") if run.values else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
         stored = [run.assignment(values)] if run.values else []
         body = (
-            Line(f"{self.makers[step.type]}()", step.item),
-            Line(call(f"{step.place.local}.append", step.item)),
+            PlainStatement(f"{self.makers[step.type]}()", step.item),
+            PlainStatement(call(f"{step.place.local}.append", step.item)),
             *entered,
             *stored,
             *run.after,
         )
-        self.body.append(Block(f"for {values} in {reader}({rows}):", body))
+        self.body.append(CompoundStatement(f"for {values} in {reader}({rows}):", body))

@@ -14,14 +14,14 @@ from itertools import accumulate
 from msgspec.structs import replace
 
 from idlc.generate.python.lines import (
-    Block,
+    CodeStatement,
+    CompoundStatement,
     Comprehension,
+    Expression,
     Group,
-    Line,
-    Node,
     Note,
+    PlainStatement,
     Put,
-    Statement,
     call,
     flat,
 )
@@ -30,7 +30,7 @@ from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
 
-def encode(steps: tuple[plan.Step, ...], tables: NamedExpressions) -> tuple[Statement, ...]:
+def encode(steps: tuple[plan.Step, ...], tables: NamedExpressions) -> tuple[CodeStatement, ...]:
     """Return the statements that write a message; what they use is defined in `tables`."""
     encoder = _Encoder(tables, Alignment(), 8)
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"), "head")
@@ -42,12 +42,14 @@ def encode(steps: tuple[plan.Step, ...], tables: NamedExpressions) -> tuple[Stat
     return _joined(_pruned(tuple(encoder.body), live=False)[0], tuple(encoder.again))
 
 
-def _pruned(body: tuple[Statement, ...], *, live: bool) -> tuple[tuple[Statement, ...], bool]:
+def _pruned(
+    body: tuple[CodeStatement, ...], *, live: bool
+) -> tuple[tuple[CodeStatement, ...], bool]:
     """Return the statements without the notes that nothing reads, and whether they read `at`.
 
     `live`: it is read afterwards.
     """
-    kept: list[Statement] = []
+    kept: list[CodeStatement] = []
     for statement in reversed(body):
         match statement:
             case Note(_, reads):
@@ -56,38 +58,38 @@ def _pruned(body: tuple[Statement, ...], *, live: bool) -> tuple[tuple[Statement
                 live = reads
             case Put(_, reads):
                 live |= reads
-            case Block(head, inner):
+            case CompoundStatement(head, inner):
                 remaining, before = _pruned(inner, live=live)
                 if before and not live:  # one round of a loop reads what another notes
                     live = True
                     remaining, _ = _pruned(inner, live=True)
                 if not remaining:
                     continue
-                statement = Block(head, remaining)
-            case Line():
+                statement = CompoundStatement(head, remaining)
+            case PlainStatement():
                 pass
         kept.append(statement)
     return tuple(reversed(kept)), live
 
 
-def _interferes(statement: Statement, waiting: list[Put]) -> bool:
+def _interferes(statement: CodeStatement, waiting: list[Put]) -> bool:
     """Return whether a statement must not run before the parts that wait to be put."""
     match statement:
         case Note():
             return any(put.reads for put in waiting)
-        case Block(_, inner):
+        case CompoundStatement(_, inner):
             return any(isinstance(s, Put) or _interferes(s, waiting) for s in inner)
         case _:
             return False
 
 
-def _joined(body: tuple[Statement, ...], again: tuple[str, ...]) -> tuple[Statement, ...]:
+def _joined(body: tuple[CodeStatement, ...], again: tuple[str, ...]) -> tuple[CodeStatement, ...]:
     """Return the statements of a function that returns the result of `join` for the parts.
 
     Parts are collected as long as no position that they read changes. If one of the conditions
     of `again` is true in the end, the function begins anew.
     """
-    result: list[Statement] = []
+    result: list[CodeStatement] = []
     waiting: list[Put] = []
     begun = False
     for statement in body:
@@ -95,24 +97,24 @@ def _joined(body: tuple[Statement, ...], again: tuple[str, ...]) -> tuple[Statem
             waiting.append(statement)
             continue
         if _interferes(statement, waiting):
-            result += waiting if begun else [Line(_listed(waiting), "parts"), _BEGUN]
+            result += waiting if begun else [PlainStatement(_listed(waiting), "parts"), _BEGUN]
             waiting, begun = [], True
         result.append(statement)
     if not begun and not again:
-        return (*result, Line(Group("return join", (_listed(waiting),))))
-    result += waiting if begun else [Line(_listed(waiting), "parts")]
+        return (*result, PlainStatement(Group("return join", (_listed(waiting),))))
+    result += waiting if begun else [PlainStatement(_listed(waiting), "parts")]
     if not again:
-        return (*result, Line("return join(parts)"))
-    once_more = (Line("return encode(message, join)"),)
-    blocks = [Block(f"if {condition}:", once_more) for condition in again]
-    return (*result, Line("join(parts)", "raw"), *blocks, Line("return raw"))
+        return (*result, PlainStatement("return join(parts)"))
+    once_more = (PlainStatement("return encode(message, join)"),)
+    blocks = [CompoundStatement(f"if {condition}:", once_more) for condition in again]
+    return (*result, PlainStatement("join(parts)", "raw"), *blocks, PlainStatement("return raw"))
 
 
 def _listed(parts: list[Put]) -> Group:
     return Group("", tuple(put.part for put in parts), brackets="[]")
 
 
-_BEGUN = Line("parts.append", "put")
+_BEGUN = PlainStatement("parts.append", "put")
 
 
 class _Encoder(Builder):
@@ -131,14 +133,14 @@ class _Encoder(Builder):
     def step(self, step: plan.Step) -> None:
         """Emit one step."""
         match step:
-            case plan.Block() if step.is_large:
+            case plan.NumberBlock() if step.is_large:
                 self.block(step)
-            case plan.Number() | plan.Dummy() | plan.Block():
+            case plan.Number() | plan.Dummy() | plan.NumberBlock():
                 self.fixed(step)
             case plan.Enter(place):
                 if not step.empty:
                     self.line(place.text, place.local)
-            case plan.Text(place, wide):
+            case plan.StringStep(place, wide):
                 if wide:
                     writer = self.tables.function("wide_text", "wide_text(order)")
                     self.buffer(place, call(writer, place.text), 4)
@@ -148,11 +150,11 @@ class _Encoder(Builder):
                 function = plan.LIST_PRIMITIVES[primitive]
                 writer = self.tables.function(f"{function}_of", function)
                 self.buffer(place, call(writer, place.text), 1, bound)
-            case plan.Numbers():
+            case plan.NumbersStep():
                 self.numbers(step)
-            case plan.Texts():
+            case plan.StringsStep():
                 self.texts(step)
-            case plan.Items():
+            case plan.StructuresStep():
                 self.items(step)
 
     # Values of fixed size, and texts, are parts of a Struct.
@@ -164,18 +166,18 @@ class _Encoder(Builder):
             path, value = step.place.path, step.place.text
         if step.code == "?":
             value = f"{self.tables.function('truths', 'TRUTHS')}[{value}]"
-        elif isinstance(step, plan.Block):
+        elif isinstance(step, plan.NumberBlock):
             value = call(self.block_writer(step, "bytes_of", "array_writer"), value)
         self.field(step.code, step.unit, step.size, value, path)
 
-    def block_writer(self, step: plan.Block, stem: str, function: str) -> str:
+    def block_writer(self, step: plan.NumberBlock, stem: str, function: str) -> str:
         """Return the function that turns a fixed-size array into bytes."""
         if step.primitive in plan.LIST_PRIMITIVES:
             kind = plan.LIST_PRIMITIVES[step.primitive]
             return self.tables.function(f"{kind}_{step.count}", f"{kind}_writer({step.count})")
         return self.tables.array(stem, function, step)
 
-    def field(self, code: str, align: int, size: int, value: Node, path: str) -> None:
+    def field(self, code: str, align: int, size: int, value: Expression, path: str) -> None:
         """Add a value to the run, which begins with it if it is empty."""
         if not self.run.fields:
             self.note_position()
@@ -183,7 +185,7 @@ class _Encoder(Builder):
         self.run.add(code, align, value, path)
         self.position = self.position.aligned(align).skip(size)
 
-    def text(self, place: plan.Place) -> None:
+    def text(self, place: plan.Slot) -> None:
         """Add a string to the run, which has at most one."""
         if "*" in self.run.fields:
             self.flush(4)
@@ -242,7 +244,7 @@ class _Encoder(Builder):
         self.body.append(Put(part))
         self.position = self.position.skip_by(size, modulus)
 
-    def block(self, step: plan.Block) -> None:
+    def block(self, step: plan.NumberBlock) -> None:
         """Emit a large array of fixed size."""
         self.flush(step.unit)
         self.pad(step.unit)
@@ -252,8 +254,8 @@ class _Encoder(Builder):
 
     def check(self, condition: str, problem: str) -> None:
         """Emit a check; `validate` finds the field and the words afterwards."""
-        raised = Line(f'raise ValueError("{problem}")')
-        self.body.append(Block(f"if {condition}:", (raised,)))
+        raised = PlainStatement(f'raise ValueError("{problem}")')
+        self.body.append(CompoundStatement(f"if {condition}:", (raised,)))
 
     def count(self, size: int | None, bound: int | None, count: str, path: str) -> None:
         """Emit the check of a size or bound, and the count of a sequence."""
@@ -265,7 +267,7 @@ class _Encoder(Builder):
             self.field("I", 4, 4, count, path)
             self.flush(1)
 
-    def buffer(self, place: plan.Place, value: str, unit: int, bound: int | None = None) -> None:
+    def buffer(self, place: plan.Slot, value: str, unit: int, bound: int | None = None) -> None:
         """Emit the count of a buffer's units, and the buffer."""
         local = place.local
         self.line(value, local)
@@ -273,7 +275,7 @@ class _Encoder(Builder):
         self.count(None, bound, count, place.path)
         self.put(local, f"len({local})", unit)
 
-    def numbers(self, step: plan.Numbers) -> None:
+    def numbers(self, step: plan.NumbersStep) -> None:
         """Emit a numeric sequence."""
         local, value = step.place.local, step.place.text
         count = self.tables.local(f"{step.place.path}_count")
@@ -286,14 +288,14 @@ class _Encoder(Builder):
             self.line(value, local)
             writer = self.tables.function(f"array_of_{dtype}", f"sequence_writer({arguments})")
             array = self.tables.function("array", "array_of(order)")
-            converted = Line(call(writer, local), local)
-            self.body.append(Block(f"if type({local}) is not {array}:", (converted,)))
+            converted = PlainStatement(call(writer, local), local)
+            self.body.append(CompoundStatement(f"if type({local}) is not {array}:", (converted,)))
             self.line(f"len({local})", count)
             self.again.append(f"len({local}) != {count}")
         self.count(None, step.bound, count, step.place.path)
         self.elements(local, count, plan.Fixed(step.unit, step.unit, step.unit), unless=count)
 
-    def texts(self, step: plan.Texts) -> None:
+    def texts(self, step: plan.StringsStep) -> None:
         """Emit an array or sequence of strings, its count included."""
         local, path = step.place.local, step.place.path
         self.flush(4)
@@ -307,40 +309,40 @@ class _Encoder(Builder):
         self.line(call(self.tables.function(f"write_{path}", function), step.place.text), local)
         self.put(local, f"len({local})", 4 if step.wide else 1)
 
-    def rows(self, step: plan.Items) -> None:
+    def rows(self, step: plan.StructuresStep) -> None:
         """Emit structures of strings: sizes and ends are looked up, all is encoded once."""
         local = step.place.local
         path = step.place.path
         rows, block = self.tables.local(f"{path}_rows"), self.tables.local(f"{path}_block")
         sized = self.tables.function("sized", "sizes(order)")
         ended = self.tables.function("ended", "ENDS")
-        places = [part.place for part in step.body if isinstance(part, plan.Text)]
+        places = [part.place for part in step.body if isinstance(part, plan.StringStep)]
         parts = [
             part
             for name in (place.local for place in places)
             for part in (f"{sized}[len({name})]", name, f"{ended}[len({name})]")
         ]
-        lines = [Line(place.text, place.local) for place in places]
-        lines.append(Line(Group("", tuple(parts)), rows, "+="))
+        lines = [PlainStatement(place.text, place.local) for place in places]
+        lines.append(PlainStatement(Group("", tuple(parts)), rows, "+="))
         loop = f"for {step.item} in {local}"
         values = flat(Group("", tuple(place.text for place in places)))
         texts = Comprehension("each", (loop, f"for each in {values}"))
         unsized = call(self.tables.function("unsized", "unsized"), flat(texts))
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
-        attempt = Block("try:", (Block(f"{loop}:", tuple(lines)),))
-        instead = Block("except IndexError:", (Line(unsized, rows),))
-        self.body.append(Block(f"if len({local}):", (attempt, instead)))
+        attempt = CompoundStatement("try:", (CompoundStatement(f"{loop}:", tuple(lines)),))
+        instead = CompoundStatement("except IndexError:", (PlainStatement(unsized, rows),))
+        self.body.append(CompoundStatement(f"if len({local}):", (attempt, instead)))
         self.count(step.size, step.bound, f"len({rows}) // {len(parts)}", path)
         self.flush(4)
         self.pad(4)
         self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
         self.put(block, f"len({block})", 1)
 
-    def items(self, step: plan.Items) -> None:
+    def items(self, step: plan.StructuresStep) -> None:
         """Emit an array or sequence of structures, as many as there are at one moment."""
         repeat = plan.fixed(step.body)
-        only_texts = all(isinstance(part, plan.Text) and not part.wide for part in step.body)
+        only_texts = all(isinstance(part, plan.StringStep) and not part.wide for part in step.body)
         if only_texts and plan.is_many(step):
             self.rows(step)
             return
@@ -359,7 +361,7 @@ class _Encoder(Builder):
         else:
             self.fused(step, repeat)
 
-    def fused(self, step: plan.Items, repeat: plan.Fixed) -> None:
+    def fused(self, step: plan.StructuresStep, repeat: plan.Fixed) -> None:
         """Emit structures of constant size: one Struct, one join."""
         local = step.place.local
         self.flush(repeat.align)
@@ -368,7 +370,7 @@ class _Encoder(Builder):
         for part in step.body:
             if isinstance(part, plan.Enter):
                 paths[part.place.local] = f"{paths[part.place.owner]}.{part.place.slot}"
-            elif isinstance(part, (plan.Number, plan.Block)):
+            elif isinstance(part, (plan.Number, plan.NumberBlock)):
                 # a comprehension has attribute chains instead of variables
                 place = replace(part.place, owner=paths[part.place.owner])
                 inner.fixed(replace(part, place=place))
@@ -396,5 +398,5 @@ class _Encoder(Builder):
         self.body.append(Put(part))
         self.store_position("at")
         end = self.position.aligned(repeat.align).skip_by(size, 1)
-        self.body.append(Block(f"if {unless}:", (Note(end.text(), reads=True),)))
+        self.body.append(CompoundStatement(f"if {unless}:", (Note(end.text(), reads=True),)))
         self.position = self.position.with_alignment(multiple_of(4).modulo(modulus))

@@ -14,32 +14,32 @@ class Group(msgspec.Struct, frozen=True):
     """
 
     before: str
-    items: tuple[Node, ...]
+    items: tuple[Expression, ...]
     brackets: str = "()"
 
 
 class Comprehension(msgspec.Struct, frozen=True):
     """A list comprehension: its element, and each `for` that follows."""
 
-    element: Node
+    element: Expression
     clauses: tuple[str, ...]
 
 
-Node: TypeAlias = str | Group | Comprehension
+Expression: TypeAlias = str | Group | Comprehension
 
 
-class Line(msgspec.Struct, frozen=True):
+class PlainStatement(msgspec.Struct, frozen=True):
     """A statement without effect on the position: `target = value`, or `value` alone."""
 
-    value: Node
-    target: Node = ""
+    value: Expression
+    target: Expression = ""
     operator: str = "="
 
 
 class Put(msgspec.Struct, frozen=True):
     """A part of the message; `reads` tells that its bytes depend on `at`."""
 
-    part: Node
+    part: Expression
     reads: bool = False
 
 
@@ -51,14 +51,14 @@ class Note(msgspec.Struct, frozen=True):
     target: str = "at"
 
 
-class Block(msgspec.Struct, frozen=True):
+class CompoundStatement(msgspec.Struct, frozen=True):
     """A compound statement; a loop runs any number of times, a branch at most once."""
 
     head: str
-    body: tuple[Statement, ...]
+    body: tuple[CodeStatement, ...]
 
 
-Statement: TypeAlias = Line | Put | Note | Block
+CodeStatement: TypeAlias = PlainStatement | Put | Note | CompoundStatement
 
 
 def call(function: str, *arguments: str) -> str:
@@ -66,7 +66,7 @@ def call(function: str, *arguments: str) -> str:
     return f"{function}({', '.join(arguments)})"
 
 
-def is_flat(node: Node) -> bool:
+def is_flat(node: Expression) -> bool:
     """Return whether a node is on one line."""
     match node:
         case Group(_, items):
@@ -77,7 +77,7 @@ def is_flat(node: Node) -> bool:
             return True
 
 
-def flat(node: Node) -> str:
+def flat(node: Expression) -> str:
     """Return a node on one line."""
     match node:
         case Group(before, items, brackets):
@@ -89,7 +89,7 @@ def flat(node: Node) -> str:
             return node
 
 
-def layout_lines(node: Node, indent: int, before: str = "", after: str = "") -> list[str]:
+def layout_lines(node: Expression, indent: int, before: str = "", after: str = "") -> list[str]:
     """Return `before`, the node and `after` as lines, indented by `indent` columns."""
     margin = " " * indent
     if isinstance(node, str) or is_flat(node):
@@ -105,20 +105,20 @@ def layout_lines(node: Node, indent: int, before: str = "", after: str = "") -> 
     return [opening, *inner, f"{margin}{node.brackets[1]}{after}"]
 
 
-def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
+def text_of(body: tuple[CodeStatement, ...], indent: int) -> list[str]:
     """Return statements as lines, each part of a message appended by `put`."""
     lines: list[str] = []
     for statement in body:
         match statement:
-            case Line(value, "", _):
+            case PlainStatement(value, "", _):
                 lines += layout_lines(value, indent)
-            case Line(value, target, operator):
+            case PlainStatement(value, target, operator):
                 *targets, last = layout_lines(target, indent)
                 lines += [*targets, *layout_lines(value, indent, f"{last.strip()} {operator} ")]
             case Note(value, _, target):
-                lines += text_of((Line(value, target),), indent)
+                lines += text_of((PlainStatement(value, target),), indent)
             case Put(part):
                 lines += layout_lines(Group("put", (part,)), indent)
-            case Block(head, inner):
+            case CompoundStatement(head, inner):
                 lines += [" " * indent + head, *text_of(inner, indent + 4)]
     return lines

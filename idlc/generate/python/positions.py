@@ -7,7 +7,14 @@ from collections.abc import Callable
 import msgspec
 from msgspec.structs import replace
 
-from idlc.generate.python.lines import Block, Line, Node, Note, Statement, call
+from idlc.generate.python.lines import (
+    CodeStatement,
+    CompoundStatement,
+    Expression,
+    Note,
+    PlainStatement,
+    call,
+)
 from idlc.model import ir, python_names
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
@@ -72,10 +79,10 @@ class ValueRun:
     def __init__(self) -> None:
         self.path = ""
         self.fields: list[str] = []
-        self.values: list[Node] = []
+        self.values: list[Expression] = []
         self.widest = 1
 
-    def add(self, code: str, align: int, value: Node, path: str) -> None:
+    def add(self, code: str, align: int, value: Expression, path: str) -> None:
         """Add a value, unless that is empty."""
         self.path = self.path or path
         self.fields.append(code)
@@ -90,12 +97,12 @@ class Builder:
     def __init__(self, tables: NamedExpressions, position: Cursor) -> None:
         self.tables = tables
         self.position = position
-        self.body: list[Statement] = []
+        self.body: list[CodeStatement] = []
         self.looping = False
 
-    def line(self, value: Node, target: Node = "") -> None:
+    def line(self, value: Expression, target: Expression = "") -> None:
         """Emit a statement without effect on the position."""
-        self.body.append(Line(value, target))
+        self.body.append(PlainStatement(value, target))
 
     def store_position(self, base: str, offset: int = 0) -> None:
         """Store the position in the variable `base`, as `base + offset`."""
@@ -123,7 +130,7 @@ class Builder:
                 break
             first = again
             self.tables.reset(mark)
-        loop, self.body = Block(head, tuple(self.body)), outside
+        loop, self.body = CompoundStatement(head, tuple(self.body)), outside
         self.looping, self.position = looping, entry
         self.store_position(first.base, first.offset)
         self.body.append(loop)
@@ -143,9 +150,9 @@ class NamedExpressions:
         self.has_texts = False
 
     @property
-    def definitions(self) -> tuple[Statement, ...]:
+    def definitions(self) -> tuple[CodeStatement, ...]:
         """Assignments of the expressions to their names, in order of first use."""
-        return tuple(Line(value, name) for (_, value), name in self._definitions.items())
+        return tuple(PlainStatement(value, name) for (_, value), name in self._definitions.items())
 
     def local(self, name: str) -> str:
         """Return a free local variable."""
@@ -203,7 +210,7 @@ class NamedExpressions:
             return self.function(name, call("Texts", *arguments))
         return self.function(name, f"{call('layout', *arguments)}.{method}")
 
-    def array(self, stem: str, function: str, step: plan.Block, *more: str) -> str:
+    def array(self, stem: str, function: str, step: plan.NumberBlock, *more: str) -> str:
         """Return a function of the runtime for fixed-size arrays of numbers."""
         self.has_arrays = True
         dtype = ir.PRIMITIVES[step.primitive].dtype

@@ -1,21 +1,20 @@
-"""From the values that are wanted of a message to the function that reads them.
+"""From paths to a function that reads the values at them from a serialized message.
 
 What is in front of a value is passed over by its sizes and not judged, and what is behind all of
-them is not looked at. Nothing is kept between two messages. The codec's own statements read what
-is wanted, but strings and structures stand in variables instead of in a message.
+them is not looked at. Nothing is kept between two messages. The codec's own statements read the
+values, but into variables instead of into a message.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from functools import partial
-
-import msgspec
+from typing import NamedTuple
 
 from idlc.diagnostics.text import did_you_mean
-from idlc.generate.python.decode import UNENDED, Decoder, ReadRun, slice_of
-from idlc.generate.python.lines import Block, Group, Line, call, text_of
+from idlc.generate.python.decode import UNENDED, Decoder, slice_of
+from idlc.generate.python.lines import CompoundStatement, Group, PlainStatement, call, text_of
 from idlc.generate.python.positions import Cursor, NamedExpressions
 from idlc.model import ir
 from idlc.model.python_names import Locals
@@ -32,76 +31,78 @@ class PathError(ValueError):
     """Paths that a structure does not have; the text has a line for each."""
 
 
-class Wanted(msgspec.Struct):
-    """The values to read in a value.
+class PathStep(NamedTuple):
+    """A field, and the index of the element in it that a path leads to, or `*`."""
 
-    `numbers` are those of the paths that end here, `type` is the value's. Elements are by their
-    index, or by None if all of them are wanted.
-    """
+    name: str
+    place: int | str | None
 
+
+class Path(NamedTuple):
+    """The way to a value of a type, or with a `*` to many; `next` is that to the next field."""
+
+    text: str
+    parts: tuple[PathStep, ...]
     type: ir.FieldType
-    numbers: list[int] = []
-    fields: dict[str, Wanted] = {}
-    elements: dict[int | None, Wanted] = {}
+    next: str
 
-    def all_numbers(self) -> list[int]:
-        """Return the numbers of all paths that lead here or further."""
-        inner = (*self.fields.values(), *self.elements.values())
-        return [*self.numbers, *(number for node in inner for number in node.all_numbers())]
+    @property
+    def has_many(self) -> bool:
+        """Return whether it leads to the values of all elements of a list."""
+        return any(part.place == "*" for part in self.parts)
 
 
-def wanted_values(paths: Iterable[str], message: ir.Message, messages: Messages) -> Wanted:
-    """Return the tree of what paths lead to; raise PathError if some lead nowhere."""
-    top = Wanted(ir.Ref(message.name))
-    problems = []
-    for number, path in enumerate(paths):
+def paths_of(texts: Sequence[str], message: ir.Message, messages: Messages) -> tuple[Path, ...]:
+    """Return what texts mean in a structure; raise PathError if some lead nowhere."""
+    paths, problems = [], []
+    for text in texts:
         try:
-            _add(top, path, number, messages)
+            paths.append(_path(text, message, messages))
         except PathError as error:
             problems.append(str(error))
     if problems:
         raise PathError("\n".join(problems))
-    return top
+    return tuple(paths)
 
 
-def _add(node: Wanted, path: str, number: int, messages: Messages) -> None:
-    for part in path.split("."):
-        match = _PART.fullmatch(part)
+def _path(text: str, message: ir.Message, messages: Messages) -> Path:
+    type_: ir.FieldType = ir.Ref(message.name)
+    parts = []
+    for word in text.split("."):
+        match = _PART.fullmatch(word)
         if match is None:
             hint = "a path is written as in `header.stamp`, `position[3]` or `name[*]`"
-            raise PathError(f"`{path}` is not a path: {hint}")
+            raise PathError(f"`{text}` is not a path: {hint}")
         name, index = match.groups()
-        if not isinstance(node.type, ir.Ref):
-            raise PathError(f"`{path}`: {_problem(node.type, name)}")
-        fields = {field.name: field.type for field in messages[node.type.target].fields}
+        if not isinstance(type_, ir.Ref):
+            problem = f"there is no `{name}` in a {ir.spell(type_)}"
+            if isinstance(type_, (ir.Array, ir.Sequence)):
+                hint = "add an index such as `[0]`, or `[*]`"
+                problem = f"`{name}` is in the elements of a list: {hint}"
+            raise PathError(f"`{text}`: {problem}")
+        fields = {field.name: field.type for field in messages[type_.target].fields}
         if name not in fields:
             hint = did_you_mean(name, fields) or f"it has {', '.join(fields) or 'none'}"
-            raise PathError(f"`{path}`: {node.type.target} has no field `{name}`; {hint}")
-        node = node.fields.setdefault(name, Wanted(fields[name]))
-        if index is not None:
-            node = _element(node, path, name, None if index == "*" else int(index))
-    node.numbers.append(number)
+            raise PathError(f"`{text}`: {type_.target} has no field `{name}`; {hint}")
+        part = PathStep(name, int(index) if index not in (None, "*") else index)
+        type_ = fields[name] if index is None else _element(text, part, fields[name])
+        parts.append(part)
+    following = [*fields, "", ""][[*fields].index(name) + 1]
+    before = text.removesuffix(word)
+    return Path(text, tuple(parts), type_, f"{before}{following}" if index is None else "")
 
 
-def _problem(type_: ir.FieldType, name: str) -> str:
-    if isinstance(type_, (ir.Array, ir.Sequence)):
-        return f"`{name}` is in the elements of a list: add an index such as `[0]`, or `[*]`"
-    return f"there is no `{name}` in a {ir.spell(type_)}"
-
-
-def _element(node: Wanted, path: str, name: str, index: int | None) -> Wanted:
-    if not isinstance(node.type, (ir.Array, ir.Sequence)):
-        raise PathError(f"`{path}`: `{name}` is not a list, so it has no index")
-    most = node.type.size if isinstance(node.type, ir.Array) else node.type.bound
-    if index is not None and most is not None and not -most <= index < most:
-        raise PathError(f"`{path}`: `{name}` has at most {most} elements")
-    return node.elements.setdefault(index, Wanted(node.type.element))
+def _element(text: str, part: PathStep, type_: ir.FieldType) -> ir.FieldType:
+    if not isinstance(type_, (ir.Array, ir.Sequence)):
+        raise PathError(f"`{text}`: `{part.name}` is not a list, so it has no index")
+    most = type_.size if isinstance(type_, ir.Array) else type_.bound
+    if isinstance(part.place, int) and most is not None and not -most <= part.place < most:
+        raise PathError(f"`{text}`: `{part.name}` has at most {most} elements")
+    return type_.element
 
 
 # readers
 
-#: The expression of each path's value, by the number of the path.
-Results = dict[int, str]
 #: Types that can be read as nanoseconds, and their fields: a recording may define others so.
 TIMES = {
     ir.TypeName("builtin_interfaces", "msg", "Time"),
@@ -124,21 +125,18 @@ def make(order, mark, other, slow):
 
     return read
 """
-_CHECK_ORDER = Block("if head != mark:", (Line("return other(data)"),))
+_CHECK_ORDER = CompoundStatement("if head != mark:", (PlainStatement("return other(data)"),))
 #: What slices of a buffer need: Structs alone take any.
 _SLICED = (
-    Block(
-        "if type(data) is not bytes:", (Line('memoryview(data).cast("B").toreadonly()', "data"),)
+    CompoundStatement(
+        "if type(data) is not bytes:",
+        (PlainStatement('memoryview(data).cast("B").toreadonly()', "data"),),
     ),
-    Line("data", "view"),
-    Line("len(data)", "limit"),
+    PlainStatement("data", "view"),
+    PlainStatement("len(data)", "limit"),
 )
-_SLICES = re.compile(r"\b(data|view|words)\[|\b(frombuffer|limit)\b")
-#: The words of a buffer, among which are the sizes of strings.
-_WORDS = (
-    Line('memoryview(data)[: limit & -4].cast("I")', "words"),
-    Block("if order != NATIVE:", (Line("swapped(words)", "words"),)),
-)
+_SLICES = re.compile(r"\b(data|view)\[|\b(words|frombuffer|limit)\b")
+_WORDS = PlainStatement("words_of(data, limit, order)", "words")
 
 
 def is_time(type_: ir.FieldType, messages: Messages) -> bool:
@@ -149,35 +147,59 @@ def is_time(type_: ir.FieldType, messages: Messages) -> bool:
 
 
 def reader_source(
-    wanted: Wanted, count: int, messages: Messages, *, nanoseconds: bool, positions: bool
+    top: ir.TypeName,
+    paths: Sequence[Path],
+    messages: Messages,
+    *,
+    nanoseconds: bool,
+    positions: bool,
 ) -> str:
-    """Return the text of a function that makes readers of `count` values, for one byte order.
+    """Return the text of a function that makes readers of a structure, for one byte order.
 
-    With `positions`, it reads where the values are instead. A single value is returned as it is,
-    several as a tuple.
+    A single value is returned as it is, several as a tuple. With `positions`, a tuple says where
+    the values are instead.
     """
-    reader = _FieldReader(messages, nanoseconds, positions)
-    results = reader.value(wanted, rest=False)
+    reader = _FieldReader(messages, nanoseconds, positions, len(paths) > 1)
+    values: list[str] = []
+    for number, path in enumerate(paths):
+        if number and path.text == paths[number - 1].next and not path.has_many:
+            values.append(reader.read(path.type))
+            continue
+        reader.flush()
+        reader.number_of_path, reader.position = number, Cursor("", 4, multiple_of(8))
+        values.append(reader.value(ir.Ref(top), path.parts, ()))
     reader.flush(last=True)
-    values = [results[number] for number in range(count)]
-    result = values[0] if count == 1 else f"({', '.join(values)})"
+    is_single = len(values) == 1 and not positions
+    result = values[0] if is_single else f"({', '.join(values)},)"
     reader.line(f"return {result}")
     if not reader.headed:
         head = reader.tables.struct("read", "head", ["H"], 0, "unpack_from")
-        reader.body[:0] = [Line(call(head, "data"), "(head,)"), _CHECK_ORDER]
+        reader.body[:0] = [PlainStatement(call(head, "data"), "(head,)"), _CHECK_ORDER]
     body = "\n".join(text_of(tuple(reader.body), 12))
     first = _SLICED if _SLICES.search(body) else ()
-    words = _WORDS if "words[" in body else ()
+    words = (_WORDS,) if "words" in body else ()
     body = "\n".join([*text_of((*first, *words), 12), body])
     definitions = "\n".join(text_of(reader.tables.definitions, 4))
     return _HEAD.format(definitions=definitions, body=body)
 
 
-def texts_of(body: tuple[plan.Step, ...]) -> int:
+def _texts_of(body: tuple[plan.Step, ...]) -> int:
     """Return how many strings an element consists of, or 0 if there is anything else in it."""
     parts = [step for step in body if not isinstance(step, plan.Enter)]
-    are_texts = all(isinstance(step, plan.Text) and not step.wide for step in parts)
+    are_texts = all(isinstance(step, plan.StringStep) and not step.wide for step in parts)
     return len(parts) if are_texts else 0
+
+
+def _repeated(step: plan.Step) -> plan.Fixed | None:
+    """Return how the elements of a list repeat, or None if that depends on their values."""
+    match step:
+        case plan.NumbersStep() | plan.NumberBlock():
+            return plan.Fixed(step.unit, step.unit, step.unit)
+        case plan.Bytes():
+            return plan.Fixed(1, 1, 1)
+        case plan.StructuresStep():
+            return plan.fixed(step.body)
+    return None
 
 
 class _Makers(dict[ir.TypeName, str]):
@@ -192,24 +214,30 @@ class _Makers(dict[ir.TypeName, str]):
 
 
 class _FieldReader(Decoder):
-    """Emits statements that read the wanted values and pass over others."""
+    """Emits statements that read values and pass over others; `shares`: for several paths."""
 
-    def __init__(self, messages: Messages, nanoseconds: bool, positions: bool) -> None:
+    def __init__(
+        self, messages: Messages, nanoseconds: bool, positions: bool, shares: bool
+    ) -> None:
         self.names = Locals()
         tables = NamedExpressions(self.names)
         super().__init__(tables, _Makers(tables), {}, "view")
         self.messages = messages
         self.nanoseconds = nanoseconds
         self.positions = positions
+        self.shares = shares
         self.headed = False
+        self.number_of_path = 0
+        #: The positions after fields, by the way to them.
+        self.known: dict[tuple[object, ...], Cursor] = {}
 
     def flush(self, *, last: bool = False) -> None:
         """Emit the run; the first one begins with the header, which tells the byte order."""
         run = self.run
-        if self.headed or self.position.base or not run.fields:
+        if self.headed or self.body or self.position.base or not run.fields:
             super().flush(last=last)
             return
-        self.headed, self.run, self.unchecked = True, ReadRun(), False
+        self.headed, self.run, self.unchecked = True, type(run)(), False
         start = self.position.aligned(run.sizes[0][0]).offset
         fields = ["H", f"{start - 2}x", *run.fields]
         reader = self.tables.struct("read", run.path, fields, 0, "unpack_from")
@@ -217,84 +245,106 @@ class _FieldReader(Decoder):
         self.body += [_CHECK_ORDER, *run.after]
         self.position = run.skipped(self.position)
 
-    def value(self, wanted: Wanted, *, rest: bool) -> Results:
-        """Read what is wanted of a value; with `rest`, go to its end."""
-        tasks: list[Callable[[bool], Results]] = []
-        if wanted.numbers:
-            tasks.append(partial(self.whole, wanted))
-        if wanted.fields:
-            tasks.append(partial(self.fields, wanted))
-        for index, element in wanted.elements.items():
-            tasks.append(partial(self.elements, wanted.type, index, element))
-        if rest and any(index is not None for index in wanted.elements):
-            tasks.append(partial(self.passed, wanted.type))
-        if len(tasks) == 1:
-            return tasks[0](rest)
-        start, results = self.marked(), Results()
-        for number, task in enumerate(tasks):
-            self.flush()
-            self.position = start
-            results |= task(rest and number == len(tasks) - 1)
-        return results
-
     def marked(self) -> Cursor:
-        """Return the position, in a variable of its own unless it is constant."""
+        """Return the position, which stays true when other values are read."""
         self.flush()
-        if self.position.base:
+        if self.position.masked or self.position.base in ("at", "end"):
             self.store_position(self.tables.local("start"))
         return self.position
 
-    def fields(self, wanted: Wanted, rest: bool) -> Results:
-        """Read fields of a structure."""
-        assert isinstance(wanted.type, ir.Ref)
-        results, missing = Results(), len(wanted.fields)
-        for field in self.messages[wanted.type.target].fields:
-            if not missing and not rest:
-                break
-            if field.name in wanted.fields:
-                missing -= 1
-                results |= self.value(wanted.fields[field.name], rest=rest or missing > 0)
-            else:
-                self.passed(field.type)
-        return results
+    # Values at paths.
 
-    # Values that are wanted.
+    def value(
+        self, type_: ir.FieldType, parts: tuple[PathStep, ...], way: tuple[object, ...]
+    ) -> str:
+        """Read the value at the rest of a path, `way` leads here; return its expression.
+
+        In the elements of a list, go to the end of what the path is in.
+        """
+        if not parts:
+            return self.read(type_)
+        assert isinstance(type_, ir.Ref)
+        part, rest = parts[0], parts[1:]
+        fields = iter(self.messages[type_.target].fields)
+        for field in fields:
+            if field.name == part.name:
+                break
+            self.pass_field((*way, field.name), field.type)
+        if part.place is None:
+            value = self.value(field.type, rest, (*way, *part))
+        else:
+            assert isinstance(field.type, (ir.Array, ir.Sequence))
+            value = self.elements(field.type, part.place, rest, (*way, *part))
+        if "*" in way:
+            for field in fields:
+                self.pass_field(way, field.type)
+        return value
+
+    def elements(
+        self,
+        type_: ir.Array | ir.Sequence,
+        index: int | str,
+        parts: tuple[PathStep, ...],
+        way: tuple[object, ...],
+    ) -> str:
+        """Read the value at the rest of a path from one element of a list, or from each."""
+        if isinstance(index, int):
+            start = self.marked()
+            self.go_to(type_, index)
+            value = self.value(type_.element, parts, way)
+            if "*" in way:
+                self.flush()
+                self.position = start
+                self.pass_steps(self.steps(type_))
+            return value
+        if parts or self.is_nanoseconds(type_.element):
+            return self.each(type_, parts, way)
+        values = self.read(type_)
+        return f"{values}.tolist()" if _is_numeric(type_.element) else values
+
+    def pass_field(self, way: tuple[object, ...], type_: ir.FieldType) -> None:
+        """Go over a field, unless the position after it is known from another path."""
+        if way in self.known:
+            self.flush()
+            self.position = self.known[way]
+            return
+        self.pass_steps(self.steps(type_))
+        if self.shares and not self.looping:
+            self.known[way] = self.marked()
 
     def steps(self, type_: ir.FieldType) -> tuple[plan.Step, ...]:
         """Return the steps of a value in a new variable."""
         local = self.names.new("value")
-        holder = ir.TypeName("", "msg", "")
-        place = plan.Place("", "", local, local, holder)
+        place = plan.Slot("", "", local, local, ir.TypeName("", "msg", ""))
         if not isinstance(type_, ir.Ref):
             return (plan.step_of(type_, place, self.messages, self.names),)
         nested = self.messages[type_.target]
         enter = plan.Enter(place, type_.target, not nested.fields)
         return (enter, *plan.steps(nested, self.messages, self.names, local, local))
 
-    def whole(self, wanted: Wanted, _rest: bool = False) -> Results:
-        """Read a value as `deserialize` does, but numbers of a list as a view."""
-        return dict.fromkeys(wanted.numbers, self.read(wanted.type))
+    def is_nanoseconds(self, type_: ir.FieldType) -> bool:
+        """Return whether values of a type are read as nanoseconds."""
+        return self.nanoseconds and is_time(type_, self.messages)
 
     def read(self, type_: ir.FieldType) -> str:
-        """Read a value; return its expression."""
+        """Read a value as `deserialize` does, but numbers of a list as a view."""
         first, *others = self.steps(type_)
         assert not isinstance(first, plan.Dummy)
         local = first.place.local
         if self.positions:
-            return self.found(first, local)
-        if self.nanoseconds and is_time(type_, self.messages):
-            seconds, nanoseconds = (
-                step.place.local for step in others if isinstance(step, plan.Number)
-            )
-            for code, name in (("i", seconds), ("I", nanoseconds)):
-                self.run.add(code, 4, name, name)
-                self.run.sizes.append((4, 4))
+            self.passed_step(first)
+            assert isinstance(first, (plan.Number, plan.NumberBlock))
+            self.line(self.position.text(-first.size), local)
+        elif self.is_nanoseconds(type_):
+            assert isinstance(type_, ir.Ref)
+            fields = self.messages[type_.target].fields
+            seconds, nanoseconds = (self.read(field.type) for field in fields)
             return f"{seconds} * 1000000000 + {nanoseconds}"
-        if isinstance(first, plan.Numbers):
+        elif isinstance(first, plan.NumbersStep):
             count = self.count(first.bound, first.place.path)
             start = self.pass_elements(count, first.unit, first.unit)
             self.view(local, first.info.dtype, count, start)
-        elif isinstance(first, plan.Block) and first.primitive not in plan.LIST_PRIMITIVES:
+        elif isinstance(first, plan.NumberBlock) and first.primitive not in plan.LIST_PRIMITIVES:
             self.passed_step(first)
             dtype = ir.PRIMITIVES[first.primitive].dtype
             self.view(local, dtype, str(first.count), self.position.text(-first.size))
@@ -311,130 +361,76 @@ class _FieldReader(Decoder):
         kind = self.tables.define(dtype, call("dtype", "order", f'"{dtype}"'))
         self.line(call("frombuffer", "data", kind, count, start), local)
 
-    def found(self, step: plan.Step, local: str) -> str:
-        """Store the position of a number or an array of them."""
-        assert isinstance(step, (plan.Number, plan.Block))
-        self.passed_step(step)
-        self.line(self.position.text(-step.size), local)
-        return local
-
-    def make_nested(self, place: plan.Place, type_: ir.TypeName) -> tuple[Line, ...]:
+    def make_nested(self, place: plan.Slot, type_: ir.TypeName) -> tuple[PlainStatement, ...]:
         """Return the statements that make a nested object."""
-        made = Line(call(self.makers[type_]), place.local)
-        return (made, Line(place.local, place.text)) if place.owner else (made,)
+        made = PlainStatement(call(self.makers[type_]), place.local)
+        return (made, PlainStatement(place.local, place.text)) if place.owner else (made,)
 
-    def texts(self, step: plan.Texts) -> None:
+    def texts(self, step: plan.StringsStep) -> None:
         """Read strings one by one: the codec's own function remembers those of the last message."""
         count = self.begin(step)
         self.line("[]", step.place.text)
 
         def element() -> None:
             local = self.names.new("text")
-            place = plan.Place("", "", local, local, step.place.type)
-            self.step(plan.Text(place, step.wide))
+            place = plan.Slot("", "", local, local, step.place.type)
+            self.step(plan.StringStep(place, step.wide))
             self.line(call(f"{step.place.text}.append", local))
 
-        self.loop(f"for _ in range({count}):", element)
+        self.repeat(count, element)
 
-    def text(self, place: plan.Place) -> str:
+    def text(self, place: plan.Slot) -> str:
         """Read the size of a string; return the expression that reads the string."""
         self.number("size", place.path)
         start = self.start()
         self.line(f"{self.position.text(-1)} + size", "end")
-        self.body.append(Block("if data[end]:", UNENDED))
+        self.body.append(CompoundStatement("if data[end]:", UNENDED))
         self.position = Cursor("end", 1, multiple_of(1))
         return f'str(data{slice_of(start)}, "utf-8")'
 
     # Elements of arrays and sequences.
 
-    def elements(
-        self, type_: ir.FieldType, index: int | None, wanted: Wanted, _rest: bool
-    ) -> Results:
-        """Read what is wanted of one element, or with None of each."""
-        if index is None and isinstance(wanted.type, ir.Ref):
-            return self.each(type_, wanted)
-        if index is None:  # whole lists of what has no fields
-            values = self.read(type_)
-            if (
-                isinstance(wanted.type, ir.Primitive)
-                and wanted.type.name not in plan.LIST_PRIMITIVES
-            ):
-                values = f"{values}.tolist()"
-            return dict.fromkeys(wanted.numbers, values)
+    def go_to(self, type_: ir.Array | ir.Sequence, index: int) -> None:
+        """Go to an element of a list."""
         (step,) = self.steps(type_)
         if isinstance(type_, ir.Array):
-            self.flush()
             place = str(index % type_.size)
+            self.flush()
         else:
-            assert isinstance(type_, ir.Sequence)
-            count = self.count(type_.bound, "count")
-            place = str(index) if index >= 0 else self.tables.local("index")
-            least = f"count <= {index}" if index >= 0 else f"count < {-index}"
-            number = min(wanted.all_numbers())
-            absent = call("absent", str(number), "count", self.position.text(-4))
-            self.body.append(Block(f"if {least}:", (Line(f"raise {absent}"),)))
+            self.count(type_.bound, "count")
+            place = str(index)
+            least = index if index >= 0 else -index - 1
+            absent = call("absent", str(self.number_of_path), "count", self.position.text(-4))
+            self.body.append(
+                CompoundStatement(f"if count <= {least}:", (PlainStatement(f"raise {absent}"),))
+            )
             if index < 0:
-                self.line(f"{count} - {-index}", place)
-        self.go_to(step, place)
-        return self.value(wanted, rest=False)
-
-    def go_to(self, step: plan.Step, place: str) -> None:
-        """Go to an element of a list that has one at this place."""
-        if isinstance(step, (plan.Numbers, plan.Block, plan.Bytes)):
-            size = 1 if isinstance(step, plan.Bytes) else step.unit
-            self.align(size)
-            self.jump(size, place)
-            return
-        assert isinstance(step, (plan.Texts, plan.Items))
-        if isinstance(step, plan.Texts) and not step.wide:
-            self.pass_texts(place)
-            return
-        if isinstance(step, plan.Texts):
-            self.repeat(place, partial(self.pass_text, True))
-            return
-        repeat = plan.fixed(step.body)
-        if repeat is None:
-            self.bounded(place, step)
-            self.repeat(place, partial(self.pass_steps, step.body))
-        else:
+                place = self.tables.local("index")
+                self.line(f"count - {-index}", place)
+        if repeat := _repeated(step):
             self.align(repeat.align)
-            self.jump(repeat.stride, place)
+        self.pass_elements_of(step, place, followed=True)
 
-    def jump(self, size: int, place: str) -> None:
-        """Go over as many elements as there are in front of a place."""
-        if place.isdigit():
-            self.position = self.position.skip(size * int(place))
-        else:
-            self.position = self.position.skip_by(f"{size} * {place}", size & -size)
-            self.store_position("at")
-
-    def each(self, type_: ir.FieldType, wanted: Wanted) -> Results:
-        """Read what is wanted of each structure of a list, into lists."""
+    def each(
+        self, type_: ir.Array | ir.Sequence, parts: tuple[PathStep, ...], way: tuple[object, ...]
+    ) -> str:
+        """Read the value at a path of each structure of a list, into a list."""
         (step,) = self.steps(type_)
-        assert isinstance(step, plan.Items)
-        count = self.begin(step)
-        lists: Results = {number: self.tables.local("values") for number in wanted.all_numbers()}
-        for values in lists.values():
-            self.line("[]", values)
+        assert isinstance(step, plan.StructuresStep)
+        count, values = self.begin(step), self.tables.local("values")
+        self.line("[]", values)
 
         def element() -> None:
-            results = self.value(wanted, rest=True)
+            value = self.value(type_.element, parts, way)
             self.flush()
-            for number, values in lists.items():
-                self.line(call(f"{values}.append", results[number]))
+            self.line(call(f"{values}.append", value))
 
-        self.bounded(count, step)
-        self.repeat(count, element)
-        return lists
+        self.repeat(count, element, plan.smallest(step.body))
+        return values
 
     # What is passed over.
 
-    def passed(self, type_: ir.FieldType, _rest: bool = True) -> Results:
-        """Go over a value."""
-        self.pass_steps(self.steps(type_))
-        return {}
-
-    def pass_steps(self, steps: tuple[plan.Step, ...]) -> None:
+    def pass_steps(self, steps: Sequence[plan.Step]) -> None:
         """Go over values."""
         for step in steps:
             self.passed_step(step)
@@ -442,36 +438,36 @@ class _FieldReader(Decoder):
     def passed_step(self, step: plan.Step) -> None:
         """Go over one value, which is not judged."""
         match step:
-            case plan.Number() | plan.Dummy() | plan.Block():
+            case plan.Number() | plan.Dummy() | plan.NumberBlock():
                 self.flush()
                 self.align(step.unit)
                 self.position = self.position.skip(step.size)
-            case plan.Text(_, wide):
+            case plan.StringStep(_, wide):
                 self.pass_text(wide)
-            case plan.Numbers() | plan.Bytes():
-                unit = step.unit if isinstance(step, plan.Numbers) else 1
-                self.pass_elements(self.count(None, "count"), unit, unit)
-            case plan.Texts(wide=True):
-                self.repeat(self.length(step), partial(self.pass_text, True))
-            case plan.Texts():
-                self.pass_texts(self.length(step))
-            case plan.Items():
-                count, repeat = self.length(step), plan.fixed(step.body)
-                texts = texts_of(step.body)
-                if texts:
-                    self.pass_texts(count if texts == 1 else f"{texts} * {count}")
-                elif repeat is not None and repeat.stride == repeat.size:
-                    self.pass_elements(count, repeat.align, repeat.size)
-                else:
-                    self.bounded(count, step)
-                    self.repeat(count, partial(self.pass_steps, step.body))
+            case plan.StringsStep(size=int(size)) | plan.StructuresStep(size=int(size)):
+                self.flush()
+                self.pass_elements_of(step, str(size))
+            case plan.NumbersStep() | plan.Bytes() | plan.StringsStep() | plan.StructuresStep():
+                self.pass_elements_of(step, self.count(None, "count"))
 
-    def length(self, step: plan.Texts | plan.Items) -> str:
-        """Read the count of a list that is passed over, or return its size."""
-        if step.size is None:
-            return self.count(None, "count")
-        self.flush()
-        return str(step.size)
+    def pass_elements_of(self, step: plan.Step, count: str, *, followed: bool = False) -> None:
+        """Go over elements of a list, which are `followed` by others."""
+        repeat = _repeated(step)
+        if repeat is not None and (followed or repeat.stride == repeat.size):
+            if count.isdigit():
+                self.align(repeat.align)
+                self.position = self.position.skip(repeat.stride * int(count))
+            else:
+                self.pass_elements(count, repeat.align, repeat.stride)
+        elif isinstance(step, plan.StructuresStep):
+            if texts := _texts_of(step.body):
+                self.pass_texts(count if texts == 1 else f"{texts} * {count}")
+            else:
+                self.repeat(count, partial(self.pass_steps, step.body), plan.smallest(step.body))
+        elif isinstance(step, plan.StringsStep) and step.wide:
+            self.repeat(count, partial(self.pass_text, True))
+        else:
+            self.pass_texts(count)
 
     def pass_text(self, wide: bool) -> None:
         """Go over a string."""
@@ -480,37 +476,25 @@ class _FieldReader(Decoder):
         self.position = Cursor("end", 0, multiple_of(4 if wide else 1))
 
     def pass_texts(self, count: str) -> None:
-        """Go over many strings: of all but the last, the next begins at a multiple of four."""
+        """Go over many strings."""
         self.align(4)
-        self.store_position("at")
-        self.line("at", "end")
-        word = self.tables.local("word")
-        following = Line(f"words[{word}] + 7 >> 2", word, "+=")
-        self.body.append(
-            Block(
-                f"if {count}:",
-                (
-                    Line("at >> 2", word),
-                    Block(f"for _ in range({count} - 1):", (following,)),
-                    Line(f"4 * {word} + 4 + words[{word}]", "end"),
-                ),
-            )
-        )
+        self.line(call("pass_texts", "words", self.position.text(), count), "end")
         self.position = Cursor("end", 0, multiple_of(1))
 
-    def bounded(self, count: str, step: plan.Items) -> None:
-        """Check that a buffer can hold so many elements, before a loop over them."""
-        if step.size is None:
-            self.short_if(f"{plan.smallest(step.body)} * {count} > limit")
-
-    def repeat(self, count: str, emit: Callable[[], None]) -> None:
-        """Emit a loop, or what is in it if that is needed less than twice."""
+    def repeat(self, count: str, emit: Callable[[], None], least: int = 0) -> None:
+        """Emit a loop over elements of at least so many bytes, or what is in it for one."""
 
         def element() -> None:
             emit()
             self.flush()
 
+        if least:
+            self.short_if(f"{least} * {count} > limit")
         if count == "1":
             element()
         elif count != "0":
             self.loop(f"for _ in range({count}):", element)
+
+
+def _is_numeric(type_: ir.FieldType) -> bool:
+    return isinstance(type_, ir.Primitive) and type_.name not in plan.LIST_PRIMITIVES

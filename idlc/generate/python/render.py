@@ -58,7 +58,11 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     # The functions that make empty objects of the message and of those in it. They demand that
     # classes of the package have the fields that the codec was made for.
     makers: dict[ir.TypeName, str] = {}
-    nested = (step.type for step in plan.walk(steps) if isinstance(step, (plan.Enter, plan.Items)))
+    nested = (
+        step.type
+        for step in plan.walk(steps)
+        if isinstance(step, (plan.Enter, plan.StructuresStep))
+    )
     for type_ in dict.fromkeys((structure.name, *nested)):
         stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
         words = ["kind" if type_ == structure.name else references.name(type_)]

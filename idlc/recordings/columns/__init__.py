@@ -7,6 +7,6 @@ the types that are returned.
 """
 
 from idlc.recordings.columns.arrow import to_arrow
-from idlc.recordings.columns.read import to_columns
+from idlc.recordings.columns.read import to_columns, unread_bytes
 
-__all__ = ["to_arrow", "to_columns"]
+__all__ = ["to_arrow", "to_columns", "unread_bytes"]

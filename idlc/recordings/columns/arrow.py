@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from idlc.recordings.columns.read import to_columns, type_of
@@ -17,11 +17,12 @@ def to_arrow(
     flat: bool = False,
     datetimes: bool = False,
     dictionary: bool = False,
+    on_unread: Callable[[Any], object] | None = None,
 ) -> Any:
     """Return a `pyarrow.Table` with a row for each message."""
     with needing("pyarrow", "to_arrow"):
         import pyarrow  # type: ignore[import-untyped,unused-ignore]
-    columns = to_columns(kind, messages, fields, datetimes)
+    columns = to_columns(kind, messages, fields, datetimes, on_unread)
     batch = record_batch(columns.flattened() if flat else columns, dictionary)
     structure = type_of(kind)
     metadata = {

@@ -66,6 +66,8 @@ class Level:
 
     def __init__(self, key: int) -> None:
         self.key = key
+        #: False if its last steps are left out, because nobody wants what they read.
+        self.whole = True
         self.steps: list[Segment | Text | List] = []
         self.node: Node
 
@@ -162,6 +164,7 @@ def plan_of(structure: Structure, fields: tuple[str, ...] | None) -> Level:
     # what comes after the last column matters to nobody
     while fields is not None and level.steps and not is_wanted(level.steps[-1]):
         level.steps.pop()
+        level.whole = False
     return level
 
 

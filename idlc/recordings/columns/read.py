@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
 
@@ -73,8 +73,12 @@ def to_columns(
     messages: Any,
     fields: Iterable[str] | None = None,
     datetimes: bool = False,
+    on_unread: Callable[[Any], object] | None = None,
 ) -> Columns:
-    """Return the columns of messages, which may have a way of their own; raise DecodeError."""
+    """Return the columns of messages, which may have a way of their own; raise DecodeError.
+
+    `on_unread` gets the number of bytes that are left in each message, where all fields are read.
+    """
     wanted = (fields,) if isinstance(fields, str) else fields
     if hasattr(messages, "columns"):
         columns: Columns = messages.columns(kind, wanted)
@@ -82,14 +86,27 @@ def to_columns(
         plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted))
         located = messages_of(messages)
         try:
-            table, top = _read(plan, located)
+            table, top, unread = _read(plan, located)
         except UnreadableError:
             explain(kind, plan, located)
+        if on_unread is not None and plan.whole:
+            on_unread(unread)
         columns = table.columns(top)
     return columns.dated() if datetimes else columns
 
 
-def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
+def unread_bytes(kind: type | Structure, messages: Any) -> Any:
+    """Return the number of bytes in each message that its type does not read.
+
+    It is `None` if a message cannot be read.
+    """
+    try:
+        return _read(plan_of(type_of(kind), None), messages_of(messages))[2]
+    except UnreadableError:
+        return None
+
+
+def _read(plan: Level, messages: Messages) -> tuple[Table, Elements, Any]:
     source, result = messages.source, ScanResult()
     if (messages.stops - messages.starts < 4).any():
         raise UnreadableError
@@ -100,22 +117,26 @@ def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
     big = orders == 0
     mixed = bool(big.any() and not big.all())
     done: list[Any] = []
+    unread = np.zeros(len(big), np.int64)
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
         starts = messages.starts[rows] + 4
         cursors = Cursors(starts, messages.stops[rows], starts)
         rest = np.ones(len(rows), bool)
-        for chosen in scan_uniform(plan, source, order, cursors, result):
+        for chosen, left in scan_uniform(plan, source, order, cursors, result):
             done.append(rows[chosen])
+            unread[rows[chosen]] = left
             rest[chosen] = False
         if rest.any():
             first = result.count[plan.key]
             result.count[plan.key] += int(rest.sum())
-            VectorScan(source, order, result).level(plan, cursors.select(rest), first)
+            others = cursors.select(rest)
+            VectorScan(source, order, result).level(plan, others, first)
+            unread[rows[rest]] = others.end - others.at
             done.append(rows[rest])
     order = ">" if big.any() and not mixed else "<"
     table = Table(source, order, result)
     order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
-    return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
+    return table, Elements(plan, len(big), order_of_rows, big if mixed else None), unread
 
 
 def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:

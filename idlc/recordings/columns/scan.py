@@ -360,8 +360,11 @@ LEAST_PART = 0.25
 
 def scan_uniform(
     plan: Level, source: Source, order: str, cursors: Cursors, result: ScanResult
-) -> Iterator[Any]:
-    """Scan messages that share one layout; yield the indices of their cursors, layout by layout."""
+) -> Iterator[tuple[Any, int]]:
+    """Scan messages that share one layout; yield the indices of their cursors, layout by layout.
+
+    With them comes the number of bytes that are left in each of the messages.
+    """
     rest = np.arange(len(cursors.at))
     # others take no operation for each element
     varies = any(isinstance(step, List) and not step.level.fixed for step in plan.steps)
@@ -371,7 +374,7 @@ def scan_uniform(
         scan = SequentialScan(order, first)
         scan.enter(source, cursor, 0)
         first.count[plan.key] = 1
-        scan.level(plan, int(cursor.at[0]), 0)
+        end = scan.level(plan, int(cursor.at[0]), 0)
         # which have the length of the first, and its sizes at the same places
         lengths = cursor.end - cursor.at
         same = lengths == lengths[0]
@@ -384,7 +387,7 @@ def scan_uniform(
             return
         chosen = rest[same]
         _replicate(plan, first, cursors.at[chosen], result)
-        yield chosen
+        yield chosen, int(cursor.end[0]) - end
         rest = rest[~same]
 
 

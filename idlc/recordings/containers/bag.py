@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.damage import Damage
 
 SUFFIXES = (".mcap", ".db3")
 #: Files that rosbag2 compressed as a whole.
-COMPRESSED = (".mcap.zstd", ".db3.zstd")
+ZSTD = ".zstd"
+COMPRESSED = tuple(suffix + ZSTD for suffix in SUFFIXES)
 METADATA = "metadata.yaml"
 TYPE_KEYS = ("type", "type_description_hash")
 #: No recorder writes more, or deeper.
@@ -19,37 +21,53 @@ MOST_OF_METADATA = 1 << 23
 DEEPEST = 100
 
 
-def files_of(folder: Path) -> tuple[list[Path], list[str]]:
-    """Return the files of a bag in their order, and notes about them."""
+class BagFiles(NamedTuple):
+    """The files of a bag in their order, notes about them, and those that are missing.
+
+    `counted` is the number of messages that the metadata counts.
+    """
+
+    paths: list[Path]
+    notes: list[str]
+    missing: list[Damage]
+    counted: int
+
+
+def files_of(folder: Path) -> BagFiles:
+    """Return the files of a bag."""
     try:
-        files = sorted((file for file in folder.iterdir() if file.is_file()), key=_natural)
+        every = (file for file in folder.iterdir() if file.is_file())
+        files = sorted(every, key=lambda file: natural(file.name))
     except OSError as error:
         raise RecordingError(f"`{folder}` cannot be read: {error.strerror}") from None
     present = {file.name: file for file in files if file.name.endswith(SUFFIXES + COMPRESSED)}
-    notes = []
+    notes: list[str] = []
+    damage: list[Damage] = []
+    counted = 0
     metadata = folder / METADATA
     if metadata.is_file():
         try:
-            paths = _names(metadata)
+            paths, counted = _contents(metadata)
         except RecordingError as error:
             paths = []
             notes.append(f"{error.message}; idlc reads all files in the folder")
         named = dict.fromkeys(path if path in present else _own_name(path) for path in paths)
         missing = [name for name in named if name not in present]
         others = [name for name in present if name not in named]
-        notes += [f"`{name}` is missing, although {METADATA} lists it" for name in missing]
+        what = f"is missing, although {METADATA} lists it"
+        damage = [Damage(str(folder / name), f"`{name}` {what}") for name in missing]
         if any(name in present for name in named):
+            others = [name for name in others if name + ZSTD not in named]
             notes += [f"idlc skips `{name}`: {METADATA} does not list it" for name in others]
             present = {name: present[name] for name in named if name in present}
     if not present:
         inside = min((path.parent for path in folder.glob(f"*/{METADATA}")), default=None)
         hint = f"pass a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
         raise RecordingError(f"`{folder}` contains no recording", hint)
-    for name in present:
-        if name.endswith(COMPRESSED):
-            hint = f"zstd -d {folder / name}"
-            raise RecordingError(f"the whole file `{name}` is compressed", hint)
-    return list(present.values()), notes
+    # a file may be there twice after it was decompressed
+    plain = {file.name: file for file in files if file.name.endswith(SUFFIXES)}
+    chosen = [plain.get(name.removesuffix(ZSTD), file) for name, file in present.items()]
+    return BagFiles(list(dict.fromkeys(chosen)), notes, damage, counted)
 
 
 def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | None:
@@ -100,16 +118,22 @@ def _topics(root: Any) -> list[Any]:
     return _values(topics, "topic_metadata")
 
 
-def _names(metadata: Path) -> list[str]:
-    """Return the names in `relative_file_paths`; raise RecordingError if they cannot be read."""
+def _contents(metadata: Path) -> tuple[list[str], int]:
+    """Return the names in `relative_file_paths`, and the number of messages.
+
+    Raises RecordingError if they cannot be read.
+    """
     information = _values([_root(_read(metadata))], "rosbag2_bagfile_information")
-    return [
+    counts = [str(node.value) for node in _values(information, "message_count")]
+    is_number = bool(counts) and re.fullmatch(r"\d{1,18}", counts[0], re.ASCII)
+    names = [
         str(node.value)
         for paths in _values(information, "relative_file_paths")
         if paths.id == "sequence"
         for node in paths.value
         if node.id == "scalar"
     ]
+    return names, int(counts[0]) if is_number else 0
 
 
 def _read(metadata: Path) -> bytes:
@@ -155,6 +179,6 @@ def _own_name(path: str) -> str:
     return path.replace("\\", "/").rpartition("/")[2]
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sort bag_9 before bag_10."""
-    return [(int(number or 0), text) for text, number in re.findall(r"(\D*)(\d*)", path.name)]
+def natural(name: str) -> list[tuple[str, int]]:
+    """Return a key that sorts bag_9 before bag_10."""
+    return [(text, int(number or 0)) for text, number in re.findall(r"(\D*)(\d*)", name)]

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.source import DamageError, RecordingError
 
 #: lz4 returns new bytes, so many at a time.
 PIECE = 1 << 22
@@ -36,7 +37,7 @@ class Room:
     def reserve(self, size: int) -> None:
         """Reserve room for so many bytes; raise RecordingError if there is none."""
         if size > MOST_IN_A_CHUNK:
-            raise RecordingError(f"a chunk declares {size:,} bytes, more than {MOST_IN_A_CHUNK:,}")
+            raise DamageError(f"a chunk declares {size:,} bytes, more than {MOST_IN_A_CHUNK:,}")
         self._bytes -= size
         if self._bytes < 0:
             what = f"more than {MOST_GROWTH:,} times as much as the file"
@@ -57,13 +58,29 @@ def decompress(data: memoryview, compression: str, target: memoryview) -> None:
     elif compression == "lz4":
         size = _lz4(data, target)
     elif compression:
-        raise RecordingError(f"unknown compression `{compression}`; idlc reads zstd and lz4")
+        raise DamageError(f"unknown compression `{compression}`; idlc reads zstd and lz4")
     else:
         size = len(data)
         target[:size] = data[: len(target)]
     if size != len(target):
         more = "more" if size > len(target) else f"{size:,}"
-        raise RecordingError(f"a chunk declares {len(target):,} bytes and holds {more}")
+        raise DamageError(f"a chunk declares {len(target):,} bytes and holds {more}")
+
+
+def decompressed(data: memoryview, compression: str) -> bytes:
+    """Return a chunk of any size that is accepted; raise DamageError if there is none."""
+    if not compression:
+        return bytes(data)
+    target = memoryview(bytearray(min(MOST_IN_A_CHUNK, MOST_GROWTH * len(data))))
+    if compression == "zstd":
+        size = _zstd(data, target)
+    elif compression == "lz4":
+        size = _lz4(data, target)
+    else:
+        raise DamageError(f"unknown compression `{compression}`; idlc reads zstd and lz4")
+    if size > len(target):
+        raise DamageError(f"a chunk holds more than {len(target):,} bytes")
+    return bytes(target[:size])
 
 
 def _zstd(data: memoryview, target: memoryview) -> int:
@@ -79,7 +96,24 @@ def _zstd(data: memoryview, target: memoryview) -> int:
             done += size
         return done + len(reader.read(1))
     except zstandard.ZstdError as error:
-        raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
+        raise DamageError(f"a chunk cannot be decompressed: {error}") from None
+
+
+def unpack(path: Path, target: Path) -> str | None:
+    """Decompress a whole file; return why only its start can be, if that is so."""
+    zstandard, decompressor = _zstandard()
+    room = Room(path.stat().st_size)
+    try:
+        with path.open("rb") as source, target.open("xb") as file:
+            reader = decompressor.stream_reader(source, read_across_frames=True)
+            while piece := reader.read(PIECE):
+                room.reserve(len(piece))
+                file.write(piece)
+    except zstandard.ZstdError as error:
+        return f"it cannot be decompressed as a whole: {error}"
+    except OSError as error:
+        raise RecordingError(f"`{path}` cannot be decompressed: {error.strerror}") from None
+    return None
 
 
 def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:
@@ -88,11 +122,11 @@ def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:
     try:
         size = zstandard.frame_content_size(data)
         if size < 0:
-            raise RecordingError("a compressed message does not declare its size")
+            raise DamageError("a compressed message does not declare its size")
         room.reserve(size)
         message: bytes = decompressor.decompress(data, allow_extra_data=False)
     except zstandard.ZstdError as error:
-        raise RecordingError(f"a compressed message cannot be read: {error}") from None
+        raise DamageError(f"a compressed message cannot be read: {error}") from None
     return message
 
 
@@ -127,7 +161,7 @@ def _lz4(data: memoryview, target: memoryview) -> int:
             data = data[size:]
             ended = ended or len(piece) < room
     except (RuntimeError, ValueError, EOFError) as error:
-        raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
+        raise DamageError(f"a chunk cannot be decompressed: {error}") from None
     return done
 
 

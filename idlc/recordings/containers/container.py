@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import shutil
+import tempfile
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
@@ -11,18 +14,19 @@ from msgspec.structs import replace
 
 from idlc.project.find import is_address
 from idlc.recordings.containers import bag, db3, records
-from idlc.recordings.containers.compression import ZSTD_MAGIC
+from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.db3 import Db3File
 from idlc.recordings.containers.file import (
     CDR,
     Schema,
     Topic,
     UnreadTopic,
-    check_count,
     unread_reason,
+    wrong_count,
 )
 from idlc.recordings.containers.mcap import McapFile
-from idlc.recordings.containers.source import RecordingError, first_bytes, is_local, of_file
+from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes, is_local
+from idlc.recordings.damage import Damage
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
@@ -32,6 +36,8 @@ if TYPE_CHECKING:
 #: chunks or rows, and `parts` are these divided, or together, where they take about some size.
 File: TypeAlias = McapFile | Db3File
 Opened = TypeVar("Opened", bound="File | Container")
+#: The first bytes of files that stand for a recording which was not downloaded.
+GIT_LFS, GIT_ANNEX = b"version https://git-lfs", b"/annex/objects/"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
@@ -47,12 +53,40 @@ class Channel(NamedTuple):
 class Container(AbstractContextManager["Container"]):
     """An open recording: its topics, and the files that they are in."""
 
-    def __init__(self, name: str, files: list[File], notes: Iterable[str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        files: list[File],
+        notes: Iterable[str] = (),
+        damage: Iterable[Damage] = (),
+    ) -> None:
         self.name = name
         self.files = files
-        self.notes = (*notes, *(note for file in files for note in file.notes))
+        self.notes_of_bag = tuple(notes)
+        self.damage_of_bag = tuple(damage)
+        self._late: dict[str, int] = {}
         self._channels = dict(_merged(files))
         self.topics: tuple[Topic, ...] = tuple(self._channels)
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """The parts of the recording that were found to be damaged until now."""
+        return (*self.damage_of_bag, *(damage for file in self.files for damage in file.damage))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is unusual about the recording, as far as it was read."""
+        of_files = [note for file in self.files for note in file.notes]
+        unproven = [
+            f"{Path(file.name).name}: no checksum covers some of its messages, which may be damaged"
+            for file in self.files
+            if file.damage and file.damage.is_unproven
+        ]
+        late = [
+            f"`{topic}`: {count:,} {'time' if count == 1 else 'times'} after the year 2262: null"
+            for topic, count in self._late.items()
+        ]
+        return (*self.notes_of_bag, *of_files, *unproven, *late)
 
     def places(self, topic: Topic) -> Iterator[tuple[File, list[int], int]]:
         """Yield each file with messages of a topic, its numbers in the file, and their count."""
@@ -63,16 +97,63 @@ class Container(AbstractContextManager["Container"]):
         for file, by_number in counts.items():
             yield self.files[file], list(by_number), sum(by_number.values())
 
+    def joined(self, topics: Sequence[Topic]) -> Topic:
+        """Return one topic with the messages of several, whose types are the same."""
+        channels = [self._channels[topic] for topic in topics]
+        mine, bare = (
+            list(dict.fromkeys(own for pair in channels for own in pair[side])) for side in (0, 1)
+        )
+        count = sum(channel.topic.count for channel in (*mine, *bare))
+        topic = replace(topics[0], count=count)
+        self._channels[topic] = mine, bare
+        return topic
+
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
-        """Yield the messages of a topic, many at a time, in the order of the recording."""
+        """Yield the messages of a topic, many at a time, in the order of the recording.
+
+        Raises RecordingError if damage has left none of them.
+        """
+        read = late = 0
         for file, numbers, counted in self.places(topic):
             total = 0
             for batch in file.messages(numbers, file.pieces(numbers, window), window):
                 total += len(batch)
+                late += batch.late()
                 yield batch
-            if window == (None, None):
-                with of_file(file.name):
-                    check_count(topic.name, counted, total)
+            if window == (None, None) and total != counted and not file.damage:
+                file.damage.add(wrong_count(topic.name, counted, total))
+            read += total
+        if late:
+            self._late[topic.name] = late
+        if topic.count and not read and window == (None, None) and self.damage:
+            raise DamageError(f"`{topic.name}` has no readable messages: {self.damage[0]}")
+
+    def sizes(self) -> dict[str, int]:
+        """Return the bytes of the messages of each topic, as far as they are known."""
+        sizes: dict[str, int] = {}
+        unknown: set[str] = set()
+        for file in self.files:
+            by_number = None
+            with suppress(DamageError):
+                by_number = file.sizes()
+            for topic, number in file.topics:
+                if by_number is None:
+                    unknown.add(topic.name)
+                else:
+                    sizes[topic.name] = sizes.get(topic.name, 0) + by_number.get(number, 0)
+        return {name: size for name, size in sizes.items() if name not in unknown}
+
+    def verify(self) -> None:
+        """Read all messages once, so that all damage is known."""
+        from idlc.recordings.containers.messages import ALWAYS
+
+        for file in self.files:
+            numbers = [number for _, number in file.topics]
+            messages = file.messages(numbers, file.pieces(numbers, ALWAYS), ALWAYS)
+            total, counted = sum(map(len, messages)), sum(topic.count for topic, _ in file.topics)
+            if total != counted and not file.damage:
+                what = f"its index lists {counted:,} messages, but it has {total:,}"
+                file.damage.add(what)
 
     def unread(self) -> list[UnreadTopic]:
         """Return the topics that cannot be read, judging by the first message of each."""
@@ -86,10 +167,16 @@ class Container(AbstractContextManager["Container"]):
                         reasons[why] = None
         return list(reasons)
 
+    def span(self) -> tuple[int, int] | None:
+        """Return the times of the first and the last message; None if there is none."""
+        starts = [file.start for file in self.files if file.start is not None]
+        ends = [file.end for file in self.files if file.end is not None]
+        return (min(starts), max(ends)) if starts and ends else None
+
     def start(self) -> int:
         """Return when the first message came; 0 if there is none."""
-        starts = [file.start for file in self.files]
-        return min((time for time in starts if time is not None), default=0)
+        span = self.span()
+        return span[0] if span else 0
 
     def close(self) -> None:
         """Close all files."""
@@ -100,46 +187,108 @@ class Container(AbstractContextManager["Container"]):
         self.close()
 
 
-def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Container:
+def open_recording(
+    path: Any, *, index: bool = True, check: bool | None = None, strict: bool = False
+) -> Container:
     """Open an .mcap or .db3 file, or the folder of a bag; raise RecordingError if it is none.
 
     A list of them is one recording. MCAP files may also be URLs that fsspec can open, and file
     objects. Without `index`, MCAP files are walked over whatever their summaries say. `check`
-    compares checksums.
+    compares checksums; None does so only in files that are known to be damaged. With `strict`,
+    damage is an error.
     """
+
+    def opened(place: Path) -> File:
+        return _opened(place, index, check, strict)
+
     if isinstance(path, (list, tuple)):
-        opened = _all_or_none(path, lambda place: open_recording(place, index=index, check=check))
-        files = [file for container in opened for file in container.files]
-        return Container(", ".join(container.name for container in opened), files, ())
+        containers, damage = _readable(
+            path,
+            lambda place: open_recording(place, index=index, check=check, strict=strict),
+            strict,
+        )
+        files = [file for container in containers for file in container.files]
+        own_notes = [note for container in containers for note in container.notes_of_bag]
+        damage += [each for container in containers for each in container.damage_of_bag]
+        name = ", ".join(container.name for container in containers)
+        return Container(name, files, own_notes, damage)
     if not is_local(path):
-        return Container(str(path), [McapFile(path, index, check)], ())
+        return Container(str(path), [McapFile(path, index, check, strict=strict)])
     if is_address(str(path)):
         hint = f"record it first: `idlc record {path} -o robot.mcap`"
         raise RecordingError(f"`{path}` is the address of a robot", hint)
     path = Path(path)
     if not path.is_dir():
-        return Container(str(path), [_open_file(path, index, check)], ())
-    paths, notes = bag.files_of(path)
-    return Container(str(path), _all_or_none(paths, lambda p: _open_file(p, index, check)), notes)
+        return Container(str(path), [opened(path)])
+    return _opened_bag(path, opened, strict)
 
 
-def open_pieces(place: Any) -> File:
+def _opened_bag(path: Path, opened: Callable[[Path], File], strict: bool) -> Container:
+    """Open the folder of a bag."""
+    bag_files = bag.files_of(path)
+    if strict and bag_files.missing:
+        raise RecordingError(bag_files.missing[0].problem)
+    files, damage = _readable(bag_files.paths, opened, strict)
+    count = sum(topic.count for file in files for topic, _ in file.topics)
+    if count < bag_files.counted:
+        what = f"{bag.METADATA} counts {bag_files.counted:,} messages, and the files have {count:,}"
+        logs = [f"`{file.log}`" for file in files if isinstance(file, Db3File) and file.is_lone]
+        rest = f"; the others may be in {', '.join(logs)}, which is missing" if logs else ""
+        bag_files.notes.append(what + rest)
+    return Container(str(path), files, bag_files.notes, [*bag_files.missing, *damage])
+
+
+def open_pieces(place: Any, check: bool | None = None, strict: bool = False) -> File:
     """Open a file to read pieces of it that are known: nothing else is read."""
-    if is_local(place) and Path(place).suffix == ".db3":
-        return Db3File(Path(place), read=False)
-    return McapFile(place, read=False)
+    if is_local(place):
+        return _opened(Path(place), True, check, strict, read=False)
+    return McapFile(place, check=check, read=False, strict=strict)
 
 
-def _all_or_none(places: Iterable[Any], opened: Callable[[Any], Opened]) -> list[Opened]:
-    """Return the opened files; close all if one of them fails."""
+def _opened(place: Path, index: bool, check: bool | None, strict: bool, read: bool = True) -> File:
+    """Open a file; one that is compressed as a whole is decompressed to a temporary file."""
+    if not first_bytes(place).startswith(ZSTD_MAGIC):
+        if is_db3(place):
+            return Db3File(place, read, strict)
+        return McapFile(place, index, check, read, strict)
+    folder = tempfile.mkdtemp(prefix="idlc-")
+    try:
+        plain = Path(folder, place.name.removesuffix(bag.ZSTD))
+        problem = unpack(place, plain)
+        file = _opened(plain, index, check, strict, read)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    weakref.finalize(file, shutil.rmtree, folder, ignore_errors=True)
+    file.name = file.place = file.damage.file = str(place)
+    if problem:
+        file.damage.add(problem)
+    return file
+
+
+def _readable(
+    places: Iterable[Any], opened: Callable[[Any], Opened], strict: bool
+) -> tuple[list[Opened], list[Damage]]:
+    """Return the opened files, and the damage of those that cannot be read.
+
+    If none can be, or with `strict`, the first error is raised, and all are closed.
+    """
+    files: list[Opened] = []
+    errors: list[tuple[str, DamageError]] = []
     with ExitStack() as stack:
-        files = [stack.enter_context(closing(opened(place))) for place in places]
+        for place in places:
+            try:
+                files.append(stack.enter_context(closing(opened(place))))
+            except DamageError as error:
+                errors.append((str(place), error))
+        if errors and (strict or not files):
+            raise errors[0][1]
         stack.pop_all()
-    return files
-
-
-def _open_file(path: Path, index: bool, check: bool) -> File:
-    return Db3File(path) if is_db3(path) else McapFile(path, index, check)
+    damage = [
+        Damage(name, error.message.removeprefix(f"`{name}`: ").replace(f"`{name}`", "it"))
+        for name, error in errors
+    ]
+    return files, damage
 
 
 def is_db3(path: Path) -> bool:
@@ -148,16 +297,24 @@ def is_db3(path: Path) -> bool:
     if path.name == bag.METADATA:
         hint = f"give the folder: `{path.parent}`"
         raise RecordingError(f"`{path}` is the metadata of a recording, not a recording", hint)
-    start = first_bytes(path)
+    start = first_bytes(path, 64)
     if start.startswith((db3.MAGIC, records.MAGIC)):
         return start.startswith(db3.MAGIC)
     if not start:
-        raise RecordingError(f"`{path}` is empty")
+        raise DamageError(f"`{path}` is empty")
+    if start.startswith(GIT_LFS):
+        hint = "`git lfs pull` downloads it"
+        raise DamageError(f"`{path}` is a pointer of Git LFS to a recording", hint)
+    if start.startswith(GIT_ANNEX):
+        hint = f"`git annex get {path}` downloads it"
+        raise DamageError(f"`{path}` is a pointer of git-annex to a recording", hint)
     if start.startswith(b"#ROSBAG"):
-        hint = "`rosbags-convert` converts ROS 1 recordings"
+        hint = f"convert it: `rosbags-convert --src {path} --dst {path.with_suffix('')}`"
+        raise RecordingError(f"`{path}` is a recording of ROS 1, which idlc does not read", hint)
     if start.startswith(ZSTD_MAGIC):
-        hint = f"the whole file is compressed: zstd -d {path}"
-    raise RecordingError(f"`{path}` is not an MCAP or .db3 recording", hint)
+        raise RecordingError(f"`{path}` is compressed as a whole", f"zstd -d {path}")
+    kind = DamageError if path.suffix in bag.SUFFIXES else RecordingError
+    raise kind(f"`{path}` is not an MCAP or .db3 recording", hint)
 
 
 def _merged(files: list[File]) -> Iterator[tuple[Topic, tuple[list[Channel], list[Channel]]]]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, compress, zstd_frame
-from idlc.recordings.containers.file import CDR, START, Schema, unread_reason
+from idlc.recordings.containers.file import CDR, START, Schema, other_encoding, unread_reason
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
 
@@ -19,7 +19,8 @@ class Conversion(NamedTuple):
 
     `definition` is the schema's text with all dependencies, `encoding` its encoding, and
     `type_hash` the RIHS01 hash. `convert` takes payloads of a topic and their log times in
-    nanoseconds, and returns as many payloads; without it, payloads are copied as they are.
+    nanoseconds, and returns as many payloads; without it, payloads are copied as they are. `old` is
+    the text of the definition that it is for, if a topic has several.
     """
 
     type: str
@@ -27,6 +28,20 @@ class Conversion(NamedTuple):
     definition: str
     type_hash: str
     convert: Callable[[Sequence[Raw], Sequence[int]], Sequence[bytes]] | None = None
+    old: str | None = None
+
+
+#: By the name of a topic, its conversion, or those of its several definitions.
+Conversions: TypeAlias = "Mapping[str, Conversion | tuple[Conversion, ...]]"
+
+
+def selected(conversions: Conversions, topic: str, schema: Schema | None) -> Conversion | None:
+    """Return the conversion for the messages of a topic that have a definition, or have none."""
+    found = conversions.get(topic)
+    if found is None or isinstance(found, Conversion):
+        return found
+    text = "" if schema is None else schema.text
+    return next((each for each in found if each.old == text), None)
 
 
 class RewrittenTopic(NamedTuple):
@@ -53,13 +68,13 @@ def check(
     `recorded` has the definitions of topics that were checked before, and is added to.
     """
     if conversion.convert and encoding != CDR:
-        what = f"messages of `{topic}` are written as `{encoding}`"
-        raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+        raise RecordingError(*other_encoding(topic, encoding))
     kind, schema = definition
     if schema is not None and schema.is_blank:
         schema = None
     other_kind, other = recorded.get(topic, definition)
-    if kind != other_kind or (schema and other and schema != other):
+    several = conversion.old is not None
+    if kind != other_kind or (schema and other and schema != other and not several):
         raise RecordingError(f"`{topic}` is recorded with two different definitions")
     recorded[topic] = kind, schema or other
 

@@ -31,7 +31,7 @@ class Topic(msgspec.Struct, frozen=True):
     """The messages recorded under one name, of one type.
 
     `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
-    the recording has no definition.
+    the recording has no definition. `qos` is the YAML of the publishers' profiles.
     """
 
     name: str
@@ -40,6 +40,7 @@ class Topic(msgspec.Struct, frozen=True):
     hash: str | None
     encoding: str
     schema: Schema | None
+    qos: str = ""
 
 
 def full_name(name: str) -> str:
@@ -53,12 +54,16 @@ def recorded_schema(schema: Schema) -> Schema | None:
     return None if schema.is_blank and schema.encoding != MSG else schema
 
 
+def wrong_count(topic: str, counted: int, actual: int) -> str:
+    """Return the sentence about a number of messages that is not the counted one."""
+    return f"the index lists {counted:,} messages of `{topic}`, but the file has {actual:,}"
+
+
 def check_count(topic: str, counted: int, actual: int) -> None:
     """Raise RecordingError if the number of messages is not the counted one."""
     if counted != actual:
         hint = "--no-index, or Recording(path, index=False), ignores the counts in the file"
-        what = f"the index lists {counted:,} messages of `{topic}`, but the file has {actual:,}"
-        raise RecordingError(what, hint)
+        raise RecordingError(wrong_count(topic, counted, actual), hint)
 
 
 #: So many bytes suffice.
@@ -84,6 +89,17 @@ class UnreadTopic(NamedTuple):
 
     message: str
     hint: str
+
+
+#: The packages that decode messages of other encodings.
+_DECODERS = {"ros1": "mcap-ros1-support", "protobuf": "mcap-protobuf-support", "json": "mcap"}
+
+
+def other_encoding(topic: str, encoding: str) -> UnreadTopic:
+    """Return why messages that are not CDR cannot be read."""
+    what = f"messages of `{topic}` are written as `{encoding}`, not as ROS 2 writes them, `{CDR}`"
+    package = _DECODERS.get(encoding, "mcap")
+    return UnreadTopic(what, f"the Python package `{package}` reads these messages")
 
 
 def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:

@@ -10,6 +10,7 @@ import zlib
 from array import array
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from struct import Struct
@@ -23,7 +24,6 @@ from idlc.recordings.containers.file import (
     START,
     Schema,
     Topic,
-    check_count,
     full_name,
     recorded_schema,
 )
@@ -38,8 +38,10 @@ from idlc.recordings.containers.records import (
     ChunkHead,
     Fields,
     heads,
+    sound_heads,
 )
-from idlc.recordings.containers.source import RecordingError, Source, of_file
+from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.damage import DamageList
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import Messages, Window
@@ -47,6 +49,8 @@ if TYPE_CHECKING:
 END_OF_TIME = (1 << 64) - 1
 #: The start of a message: its channel and time, with its sequence number between them.
 CHANNEL_AND_TIME = Struct("<HIQ")
+#: An entry of an index of messages: their times, and where in the chunk they begin.
+TIME_AND_PLACE = Struct("<QQ")
 
 
 class Channel(NamedTuple):
@@ -59,10 +63,11 @@ class Channel(NamedTuple):
 
 
 class Facts(msgspec.Struct):
-    """The content of a file; `start` is the time of the first message.
+    """The content of a file; `start` and `end` are the times of the first and last message.
 
     `counts` is by channel; so is `loose`, of messages outside of chunks in a file with a summary.
-    `raws` has the contents of records by their kind and number, as they were first defined.
+    `raws` has the contents of records by their kind and number, as they were first defined. With
+    `is_proven`, a checksum covers the summary; without `is_ended`, the file ends before it.
     """
 
     schemas: dict[int, Schema] = {}
@@ -72,6 +77,9 @@ class Facts(msgspec.Struct):
     counts: dict[int, int] = {}
     loose: dict[int, int] | None = None
     start: int | None = None
+    end: int | None = None
+    is_proven: bool = False
+    is_ended: bool = True
     notes: list[str] = []
 
     def add(self, op: int, data: memoryview) -> None:
@@ -97,27 +105,29 @@ class Facts(msgspec.Struct):
                 raise RecordingError(f"channel {number} has two different definitions")
             self.raws.setdefault((op, number), bytes(data))
 
-    def count(self, channel: int, messages: int, first: int) -> None:
-        """Count messages of a channel, none of which came before the first time."""
+    def count(self, channel: int, messages: int, first: int, last: int) -> None:
+        """Count messages of a channel, none of which is outside of these times."""
         self.counts[channel] = self.counts.get(channel, 0) + messages
-        if self.start is None or first < self.start:
-            self.start = first
+        self.start = first if self.start is None else min(first, self.start)
+        self.end = last if self.end is None else max(last, self.end)
 
 
-def read_facts(source: Source, index: bool = True, check: bool = False) -> Facts:
+def read_facts(
+    source: Source, damage: DamageList, index: bool = True, check: bool | None = None
+) -> Facts:
     """Return the content of a file; without `index`, its summary is not used.
 
-    `check` compares the summary's checksum.
+    Chunks with a wrong checksum are left out unless `check` is False.
     """
     if source.size < len(MAGIC) or source.view(0, len(MAGIC)) != MAGIC:
         raise RecordingError(f"`{source.name}` is not an MCAP file: it begins with other bytes")
     reason = "idlc does not use its index"
     if index:
         try:
-            return _summary(source, check)
-        except RecordingError as error:
+            return _summary(source)
+        except DamageError as error:
             reason = error.message
-    return _walk(source, reason, index)
+    return _walk(_Walk(source, damage, check), reason, index)
 
 
 def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
@@ -134,6 +144,20 @@ def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
             yield data[:most]
 
 
+def _sizes(source: Source, chunk: Chunk, room: Room) -> Iterator[tuple[int, int]]:
+    """Yield channel and size of each message of a chunk, or of a stretch outside of any."""
+    if chunk.compression is None:
+        for op, at, size in heads(source, chunk.at, chunk.at + chunk.size):
+            if op == MESSAGE_OP:
+                channel = int.from_bytes(source.view(at + HEAD.size, 2), "little")
+                yield channel, size - HEAD.size - MESSAGE_HEAD.size
+        return
+    head = records.read_chunk_head(source, chunk.at, chunk.size)
+    for op, _, data in records.read_records(_content(source, head, room)):
+        if op == MESSAGE_OP:
+            yield int.from_bytes(data[:2], "little"), len(data) - MESSAGE_HEAD.size
+
+
 def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
     """Return the records of a chunk."""
     room.reserve(head.size)
@@ -142,23 +166,21 @@ def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
     return target
 
 
-def _summary(source: Source, check: bool) -> Facts:
-    """Return the content by the summary; raise RecordingError if that is not reliable."""
+def _summary(source: Source) -> Facts:
+    """Return the content by the summary; raise DamageError if that is not reliable."""
     end = source.size - FOOTER.size - len(MAGIC)
     if end < len(MAGIC) or source.view(source.size - len(MAGIC), len(MAGIC)) != MAGIC:
-        raise RecordingError("it was not closed")
+        raise DamageError("it was not closed")
     op, size, start, _, crc = FOOTER.unpack(source.view(end, FOOTER.size))
     if (op, size) != (records.FOOTER_OP, FOOTER.size - HEAD.size):
-        raise RecordingError("it has no footer")
+        raise DamageError("it has no footer")
     if not len(MAGIC) <= start <= end:
-        raise RecordingError("it has no summary")
-    data = source.view(start, end - start)
-    if check and crc:
-        covered = source.view(start, source.size - len(MAGIC) - 4 - start)
-        if zlib.crc32(covered) != crc:
-            raise RecordingError("the checksum of its summary is wrong")
-    facts, statistics = Facts(), None
-    for op, _, content in records.read_records(data):
+        raise DamageError("it has no summary")
+    data = source.view(start, source.size - len(MAGIC) - 4 - start)
+    if crc and zlib.crc32(data) != crc:
+        raise DamageError("the checksum of its summary is wrong")
+    facts, statistics = Facts(is_proven=crc != 0), None
+    for op, _, content in records.read_records(data[: end - start]):
         facts.add(op, content)
         if op == records.CHUNK_INDEX_OP:
             facts.chunks.append(records.read_chunk_index(content))
@@ -170,44 +192,48 @@ def _summary(source: Source, check: bool) -> Facts:
 
 
 def _check_summary(facts: Facts, statistics: memoryview | None) -> None:
-    """Add the counts of the writer; raise RecordingError if by these a summary is incomplete."""
+    """Add the counts of the writer; raise DamageError if by these a summary is incomplete."""
     if statistics is None:
-        raise RecordingError("its summary has no statistics")
+        raise DamageError("its summary has no statistics")
     fields = Fields(statistics, "the statistics")
     messages, _ = fields.number(8), fields.read(2 + 4 + 4 + 4)
-    chunks, start, _ = fields.number(4), fields.number(8), fields.read(8)
+    chunks, first, last = fields.number(4), fields.number(8), fields.number(8)
     part = fields.part()
     while part.more():
         number = part.number(2)
         facts.counts[number] = part.number(8)
-    facts.start = start if messages else None
+    if messages:
+        facts.start, facts.end = first, last
     if chunks != len(facts.chunks):
-        raise RecordingError("its summary names other chunks than it counts")
+        raise DamageError("its summary names other chunks than it counts")
     if not facts.counts.keys() <= facts.channels.keys():
-        raise RecordingError("its summary does not name all channels")
+        raise DamageError("its summary does not name all channels")
     needed = {channel.schema for channel in facts.channels.values() if channel.schema}
     if not needed <= facts.schemas.keys():
-        raise RecordingError("its summary does not name all schemas")
+        raise DamageError("its summary does not name all schemas")
     if messages != sum(facts.counts.values()):
-        raise RecordingError("its summary contains two different message counts")
+        raise DamageError("its summary contains two different message counts")
 
 
 def _add_loose(source: Source, facts: Facts, start: int) -> None:
     """Add the stretches that no chunk covers and that have messages, in a file with a summary.
 
-    Raises RecordingError if chunks overlap.
+    Raises DamageError if chunks overlap.
     """
     facts.chunks.sort(key=lambda chunk: chunk.at)
-    walk, end = _Walk(source), len(MAGIC)
+    walk, end = _Walk(source, DamageList(source.name), False), len(MAGIC)
     ranges = [(chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks]
     for at, following in (*ranges, (start, start)):
         if at < end:
-            raise RecordingError("its summary lists chunks that do not exist")
+            raise DamageError("its summary lists chunks that do not exist")
         for op, place, size in heads(source, end, at):
             if op == records.CHUNK_OP:
-                raise RecordingError("its summary does not name all chunks")
+                raise DamageError("its summary does not name all chunks")
             if op == MESSAGE_OP:
                 walk.message(place, size)
+            end = place + size
+        if end != at:
+            raise DamageError("its records do not lead to its summary")
         walk.end_of_loose()
         end = following
     facts.loose = walk.facts.counts
@@ -221,14 +247,15 @@ class _Walk:
     Nothing else says whether a chunk has more messages than its indexes name.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, damage: DamageList, check: bool | None) -> None:
         self.source = source
+        self.damage = damage
+        self.check = check
         self.facts = Facts()
         self.loose: tuple[int, int] | None = None
         self.chunk: tuple[int, int] | None = None
         self.indexes: list[tuple[int, int]] = []
         self.room = Room(source.size)
-        self.damaged = False
 
     def content(self, at: int, size: int) -> memoryview:
         """Return the content of a record."""
@@ -236,11 +263,10 @@ class _Walk:
 
     def message(self, at: int, size: int) -> None:
         """Count a message outside of any chunk, and make it part of a stretch of them."""
-        data = self.source.view(at + HEAD.size, min(size - HEAD.size, CHANNEL_AND_TIME.size))
-        if len(data) == CHANNEL_AND_TIME.size:
-            channel, _, time = CHANNEL_AND_TIME.unpack(data)
-            self.facts.count(channel, 1, time)
-        if self.loose and at + size - self.loose[0] > records.GROUP:
+        data = self.source.view(at + HEAD.size, CHANNEL_AND_TIME.size)
+        channel, _, time = CHANNEL_AND_TIME.unpack(data)
+        self.facts.count(channel, 1, time, time)
+        if self.loose and (at != self.loose[1] or at + size - self.loose[0] > records.GROUP):
             self.end_of_loose()
         start = self.loose[0] if self.loose else at
         self.loose = (start, at + size)
@@ -256,51 +282,66 @@ class _Walk:
         """Add the chunk before, its messages, and its indexes if they name all of these."""
         if self.chunk is None:
             return
-        at, size = self.chunk
-        head = records.read_chunk_head(self.source, at, size)
+        (at, size), self.chunk = self.chunk, None
+        named, offsets = self._named()
+        try:
+            head = records.read_chunk_head(self.source, at, size)
+        except DamageError as error:
+            self.damage.add(error.message, at, at + size, messages=sum(named.values()) or None)
+            return
+        counts: dict[int, int] = {}
+        first, last = END_OF_TIME, 0
+        try:
+            try:
+                content = _content(self.source, head, self.room)
+            except DamageError:
+                proven = records.proven_head(self.source, head)
+                if proven is None:
+                    raise
+                content = _content(self.source, proven, self.room)
+            if self.check is not False and head.crc and zlib.crc32(content) != head.crc:
+                raise DamageError("the checksum of a chunk is wrong")
+            every = zip(records.read_records(content), self.room.records(), strict=False)
+            for (op, _, data), _ in every:
+                if op != MESSAGE_OP:
+                    self.facts.add(op, data)
+                elif len(data) >= CHANNEL_AND_TIME.size:
+                    channel, _, time = CHANNEL_AND_TIME.unpack_from(data)
+                    counts[channel] = counts.get(channel, 0) + 1
+                    first, last = min(first, time), max(last, time)
+        except DamageError as error:
+            # without a checksum, the messages before the damage are as good as any
+            messages = sum(named.values()) - sum(counts.values()) if named else None
+            times = head.first, head.last
+            self.damage.add(error.message, at, at + size, messages=messages, times=times)
+        for channel, messages in counts.items():
+            self.facts.count(channel, messages, first, last)
+        indexes = bytes(offsets) if counts == named else None
+        if counts:
+            self.facts.chunks.append(Chunk(at, size, first, last, head.compression, indexes))
+
+    def _named(self) -> tuple[dict[int, int], bytes]:
+        """Return the numbers of messages that the indexes of a chunk name, and their places."""
+        indexes, self.indexes = self.indexes, []
         named: dict[int, int] = {}
         offsets = bytearray()
-        for place, length in self.indexes:
+        for place, length in indexes:
             fields = Fields(self.content(place, length), "the index of a chunk")
             channel, entries = fields.number(2), fields.number(4)
             named[channel] = named.get(channel, 0) + entries // 16
             offsets += INDEX_OFFSET.pack(channel, place)
-        counts: dict[int, int] = {}
-        first, last = END_OF_TIME, 0
-        try:
-            content = _content(self.source, head, self.room)
-        except RecordingError as error:
-            if not named or not named.keys() <= self.facts.channels.keys():
-                raise
-            # reading the topics in it reports the problem again; other topics stay readable
-            if not self.damaged:
-                what = f"the chunk at byte {at}, and perhaps others, cannot be read"
-                self.facts.notes.append(f"{what}: {error.message}")
-            self.damaged = True
-            content, counts = memoryview(b""), named
-            first, last = head.first, head.last
-        every = zip(records.read_records(content), self.room.records(), strict=False)
-        for (op, _, data), _ in every:
-            if op != MESSAGE_OP:
-                self.facts.add(op, data)
-            elif len(data) >= CHANNEL_AND_TIME.size:
-                channel, _, time = CHANNEL_AND_TIME.unpack_from(data)
-                counts[channel] = counts.get(channel, 0) + 1
-                first, last = min(first, time), max(last, time)
-        for channel, messages in counts.items():
-            self.facts.count(channel, messages, first)
-        indexes = bytes(offsets) if counts == named else None
-        self.facts.chunks.append(Chunk(at, size, first, last, head.compression, indexes))
-        self.chunk, self.indexes = None, []
+        return named, bytes(offsets)
 
 
-def _walk(source: Source, reason: str, index: bool) -> Facts:
+def _walk(walk: _Walk, reason: str, index: bool) -> Facts:
     """Return the content by the complete records; `reason` says why the summary is not used.
 
     Without `index`, the indexes of chunks are not used either.
     """
-    walk, ended, end = _Walk(source), False, len(MAGIC)
-    for op, at, size in heads(source, end, source.size):
+    source, ended, end = walk.source, False, len(MAGIC)
+    skipped: list[tuple[int, int]] = []
+    every = sound_heads(source, end, source.size, lambda *part: skipped.append(part))
+    for op, at, size in every:
         end = at + size
         if op == records.MESSAGE_INDEX_OP and walk.chunk:
             if index:
@@ -313,13 +354,23 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
             walk.end_of_loose()
             walk.chunk = at, size
         elif op in (records.SCHEMA_OP, records.CHANNEL_OP):
-            walk.facts.add(op, walk.content(at, size))
+            try:
+                walk.facts.add(op, walk.content(at, size))
+            except DamageError as error:
+                walk.damage.add(error.message, at, end)
         # a summary follows, and nothing keeps a writer from going on
         ended = op == records.DATA_END_OP or (ended and op not in (MESSAGE_OP, records.CHUNK_OP))
-        if op == records.FOOTER_OP:
-            break
     walk.end_of_chunk()
     walk.end_of_loose()
+    for start, stop in skipped:
+        if stop < source.size:
+            walk.damage.add("there are no records", start, stop)
+        elif not ended:
+            walk.damage.add("the end of the file is not a whole record", start, stop)
+    for number in walk.facts.counts.keys() - walk.facts.channels.keys():
+        what = f"the definition of channel {number} is missing"
+        walk.damage.add(what, messages=walk.facts.counts.pop(number))
+    walk.facts.is_ended = ended
     left = source.size - end
     rest = f", {left:,} bytes are skipped" if left else ""
     extent = "from its records" if ended else f"to its last whole record{rest}"
@@ -328,25 +379,38 @@ def _walk(source: Source, reason: str, index: bool) -> Facts:
 
 
 class McapFile:
-    """An MCAP file, whose channels are topics; without `read`, nothing is read of them."""
+    """An MCAP file, whose channels are topics; without `read`, nothing is read of them.
+
+    `check` compares the checksums of chunks: None does so once there is damage. A `strict` file
+    raises RecordingError for damage.
+    """
 
     def __init__(
-        self, place: Any, index: bool = True, check: bool = False, read: bool = True
+        self,
+        place: Any,
+        index: bool = True,
+        check: bool | None = None,
+        read: bool = True,
+        strict: bool = False,
     ) -> None:
         self.place = place
         self.check = check
         self.source = Source(place)
         self.name = self.source.name
+        self.size = self.source.size
+        self.damage = DamageList(self.name, strict)
         with of_file(self.name):
-            self.facts = read_facts(self.source, index, check) if read else Facts()
-        self.start = self.facts.start
-        self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
+            facts = read_facts(self.source, self.damage, index, check) if read else Facts()
+        self.facts = facts
+        self.start, self.end = facts.start, facts.end
+        self.notes = [f"{Path(self.name).name}: {note}" for note in facts.notes]
         self.topics: list[tuple[Topic, int]] = []
-        for number, channel in self.facts.channels.items():
-            schema, count = self.facts.schemas.get(channel.schema), self.facts.counts.get(number, 0)
+        for number, channel in facts.channels.items():
+            schema, count = facts.schemas.get(channel.schema), facts.counts.get(number, 0)
             kind, recorded = (schema.name, recorded_schema(schema)) if schema else ("", None)
             digest = channel.metadata.get("topic_type_hash") or None
-            topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded)
+            qos = channel.metadata.get("offered_qos_profiles", "")
+            topic = Topic(channel.topic, kind, count, digest, channel.encoding, recorded, qos)
             self.topics.append((topic, number))
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
@@ -359,14 +423,46 @@ class McapFile:
             if not mine:
                 continue
             starts = _starts(self.source, chunk, room)
-            for data, _ in zip(starts, room.records(), strict=False):
-                number = int.from_bytes(data[:2], "little")
-                if number in mine:
-                    yield number, bytes(data[MESSAGE_HEAD.size :])
-                    mine.remove(number)
-                    waiting.discard(number)
-                    if not mine:
-                        break
+            with suppress(DamageError):  # reading the messages says what is wrong
+                for data, _ in zip(starts, room.records(), strict=False):
+                    number = int.from_bytes(data[:2], "little")
+                    if number in mine:
+                        yield number, bytes(data[MESSAGE_HEAD.size :])
+                        mine.remove(number)
+                        waiting.discard(number)
+                        if not mine:
+                            break
+
+    def sizes(self) -> dict[int, int] | None:
+        """Return the bytes of the messages of each channel; None if not all chunks are indexed.
+
+        The indexes of a chunk say where its messages begin. What is between them is more than a
+        message only where a channel is defined, so the chunks with first messages are opened.
+        """
+        sizes: dict[int, int] = {}
+        seen: set[int] = set()
+        room = Room(self.source.size)
+        for chunk in self.facts.chunks:
+            starts: list[tuple[int, int]] = []
+            for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
+                entries = records.index_entries(self.source, channel, at)
+                data = self.source.view(at + HEAD.size + 6, entries)
+                starts += [(place, channel) for _, place in TIME_AND_PLACE.iter_unpack(data)]
+            new = {channel for _, channel in starts} - seen
+            if chunk.compression is not None and chunk.indexes is None:
+                return None
+            if new or chunk.compression is None:
+                seen |= new
+                for channel, size in _sizes(self.source, chunk, room):
+                    sizes[channel] = sizes.get(channel, 0) + size
+                continue
+            head = records.read_chunk_head(self.source, chunk.at, chunk.size)
+            starts.sort()
+            ends = [*(place for place, _ in starts[1:]), head.size]
+            for (place, channel), end in zip(starts, ends, strict=True):
+                size = end - place - HEAD.size - MESSAGE_HEAD.size
+                sizes[channel] = sizes.get(channel, 0) + size
+        return sizes
 
     def pieces(self, topics: Collection[int], window: Window) -> list[Chunk]:
         """Return the chunks that may hold messages of some channels, with the indexes of these."""
@@ -380,7 +476,7 @@ class McapFile:
             for number, chunk in enumerate(self.facts.chunks)
             if number in mine or chunk.indexes is None
         ]
-        if window != (None, None):
+        if window != (None, None) or not self.facts.is_proven:
             chunks = self._checked(chunks, topics)
         return [
             chunk
@@ -398,27 +494,26 @@ class McapFile:
         return indexes
 
     def _checked(self, chunks: list[Chunk], channels: Collection[int]) -> list[Chunk]:
-        """Return chunks of some channels, without their indexes if these may be incomplete.
+        """Return chunks of some channels; all, without their indexes, if these are not complete.
 
-        Raises RecordingError if the indexes miss messages, which a window would miss, too. In
-        stores that is not checked, because each index is a request there.
+        A window would miss the same messages as its index. In stores that is not checked, because
+        each index is a request there.
         """
         loose, counts = self.facts.loose, self.facts.counts
         whole = [chunk for chunk in chunks if chunk.compression is not None]
         if loose is None or not self.source.is_local:
             return chunks
-        if any(chunk.indexes is None for chunk in whole):
-            return [chunk._replace(indexes=None) for chunk in self.facts.chunks]
-        with of_file(self.name):
-            counted = sum(counts.get(number, 0) - loose.get(number, 0) for number in channels)
-            name = self.facts.channels[next(iter(channels))].topic
-            named = sum(
-                records.index_entries(self.source, channel, at) // 16
-                for chunk in whole
-                for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b"")
-            )
-            check_count(name, counted, named)
-        return chunks
+        counted = sum(counts.get(number, 0) - loose.get(number, 0) for number in channels)
+        if all(chunk.indexes is not None for chunk in whole):
+            with suppress(DamageError):
+                named = sum(
+                    records.index_entries(self.source, channel, at) // 16
+                    for chunk in whole
+                    for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b"")
+                )
+                if named == counted:
+                    return chunks
+        return [chunk._replace(indexes=None) for chunk in self.facts.chunks]
 
     def parts(
         self, topics: Collection[int], window: Window, size: int
@@ -433,7 +528,7 @@ class McapFile:
         """Yield the messages of some channels in some chunks, adjacent ones together."""
         from idlc.recordings.containers.mcap_messages import in_chunks
 
-        return in_chunks(self.source, pieces, topics, window, self.check)
+        return in_chunks(self.source, pieces, topics, window, self.check, self.damage)
 
     def close(self) -> None:
         """Release the file."""

@@ -6,7 +6,7 @@ Definitions may be anywhere in a chunk, so all are decompressed, and their messa
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, TypeAlias
@@ -17,10 +17,12 @@ from idlc.recordings.containers import records
 from idlc.recordings.containers.compression import MOST_IN_A_CHUNK, Room, compress, decompress
 from idlc.recordings.containers.conversion import (
     Conversion,
+    Conversions,
     Recorded,
     RewrittenTopic,
     check,
     converted,
+    selected,
 )
 from idlc.recordings.containers.file import Schema, check_count, full_name
 from idlc.recordings.containers.mcap import Facts, read_facts
@@ -42,8 +44,10 @@ from idlc.recordings.containers.records import (
     SCHEMA_OP,
     Fields,
     heads,
+    sound_heads,
 )
-from idlc.recordings.containers.source import RecordingError, Source, of_file
+from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.damage import DamageList
 
 #: Numbers of schemas end before.
 MOST_SCHEMAS = 1 << 16
@@ -67,13 +71,14 @@ class Plan:
     """The definitions that take the place of others."""
 
     def __init__(
-        self, facts: Facts, conversions: Mapping[str, Conversion], recorded: dict[str, Recorded]
+        self, facts: Facts, conversions: Conversions, recorded: dict[str, Recorded]
     ) -> None:
-        self.changed = {
-            number: conversions[own.topic]
-            for number, own in facts.channels.items()
-            if own.topic in conversions
-        }
+        self.changed: dict[int, Conversion] = {}
+        for number, channel_ in facts.channels.items():
+            definition = facts.schemas.get(channel_.schema)
+            conversion = selected(conversions, channel_.topic, definition)
+            if conversion is not None:
+                self.changed[number] = conversion
         self._check(facts, recorded)
         #: By kind and number: contents of records.
         self.contents = dict(facts.raws)
@@ -135,10 +140,16 @@ class Rewriting:
     """One pass over a file; `room` bounds what is decompressed."""
 
     def __init__(
-        self, source: Source, facts: Facts, plan: Plan, write: Callable[[Raw], object]
+        self,
+        source: Source,
+        facts: Facts,
+        plan: Plan,
+        write: Callable[[Raw], object],
+        damage: DamageList,
     ) -> None:
         self.source = source
         self.facts = facts
+        self.damage = damage
         self.plan = plan
         self.room = Room(source.size)
         #: The schemas that are defined outside of chunks.
@@ -152,10 +163,11 @@ class Rewriting:
         first = next(heads(self.source, start, self.source.size), None)
         if first is None or first[0] != records.HEADER_OP:
             self.writer.write(record(records.HEADER_OP, bytes(8)))
-        for op, at, size in heads(self.source, end, self.source.size):
+        for op, at, size in sound_heads(self.source, end, self.source.size, self._skip):
             progress(at)
             is_loose = op == MESSAGE_OP or (op in (SCHEMA_OP, CHANNEL_OP) and not ended)
-            if start < end and (not is_loose or at + size - start > records.GROUP):
+            is_next = is_loose and at == end
+            if start < end and (not is_next or at + size - start > records.GROUP):
                 self._loose(start, end)
                 start = end = at
             if is_loose:
@@ -166,10 +178,7 @@ class Rewriting:
                     break
                 continue
             ended |= op == records.DATA_END_OP
-            if op == records.CHUNK_OP:
-                self._chunk(at, size)
-            elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
-                self._other(op, at, size)
+            self._record(op, at, size)
         if start < end:
             self._loose(start, end)
         for number in self.facts.channels:
@@ -181,6 +190,8 @@ class Rewriting:
 
     def check(self, facts: Facts) -> None:
         """Raise RecordingError if other numbers of messages were written than are counted."""
+        if self.damage:
+            return
         for number, own in facts.channels.items():
             count = self.writer.counts.get(number, 0)
             check_count(own.topic, facts.counts.get(number, 0), count)
@@ -192,9 +203,24 @@ class Rewriting:
             count, size = (by.get(number, 0) for by in (self.writer.counts, self.writer.sizes))
             before = topics.get(own.topic, RewrittenTopic(0, 0, False))
             change = self.plan.changed.get(number)
-            done = bool(change and change.convert)
+            done = bool(change and change.convert) or before.converted
             topics[own.topic] = RewrittenTopic(before.messages + count, before.size + size, done)
         return topics
+
+    def _record(self, op: int, at: int, size: int) -> None:
+        """Write a record that is by itself, unless it is damaged."""
+        try:
+            if op == records.CHUNK_OP:
+                self._chunk(at, size)
+            elif op not in (*DERIVED, SCHEMA_OP, CHANNEL_OP):
+                self._other(op, at, size)
+        except DamageError as error:
+            self.damage.add(error.message, at, at + size)
+
+    def _skip(self, start: int, stop: int) -> None:
+        """Add a part without records to the damage, unless it is the end of a summary."""
+        if stop < self.source.size or not self.facts.is_ended:
+            self.damage.add("there are no records", start, stop)
 
     def _loose(self, start: int, end: int) -> None:
         """Write records outside of chunks."""
@@ -212,13 +238,23 @@ class Rewriting:
         if head.compression or head.size != head.stored:
             data = memoryview(bytearray(head.size))
             decompress(stored, head.compression, data)
-        content, crc = Content(data, self.room), head.crc
+        crc = head.crc
+        if crc and zlib.crc32(data) != crc:
+            raise DamageError(f"the checksum of the chunk at byte {at} is wrong")
+        is_cut = False
+        try:
+            content = Content(data, self.room)
+        except DamageError as error:
+            if crc:
+                raise
+            # without a checksum, the messages before the damage are as good as any
+            is_cut = True
+            self.damage.add(error.message, at, at + size)
+            content = Content(data[: records.sound_size(data)], self.room)
         self._define_channels(content)
         edits = self._edits(content, set())
-        if edits:
-            if crc and zlib.crc32(data) != crc:
-                raise RecordingError(f"the checksum of the chunk at byte {at} is wrong")
-            new = _edited(data, edits)
+        if edits or is_cut:
+            new = _edited(content.data, edits)
             self._check_size(len(new))
             content, crc = Content(new), zlib.crc32(new)
             stored = memoryview(compress(new, head.compression))
@@ -291,11 +327,13 @@ class Rewriting:
 
     def _messages(self, content: Content) -> Iterator[Edit]:
         """Yield the messages with new payloads."""
-        by_topic: dict[str, list[Any]] = {}
+        by_topic: dict[tuple[str, str | None], list[Any]] = {}
         for number, mine in content.by_channel.items():
-            if number in self.plan.changed and self.plan.changed[number].convert:
-                by_topic.setdefault(self.facts.channels[number].topic, []).append(mine)
-        for topic, parts in by_topic.items():
+            change = self.plan.changed.get(number)
+            if change is not None and change.convert:
+                key = self.facts.channels[number].topic, change.old
+                by_topic.setdefault(key, []).append(mine)
+        for (topic, _), parts in by_topic.items():
             mine = np.sort(np.concatenate(parts))
             starts, times = content.places[mine], content.heads["log"][mine].tolist()
             stops = (starts + HEAD.size + content.heads["size"][mine].astype(np.int64)).tolist()
@@ -335,24 +373,27 @@ def _has_checksum(source: Source) -> bool:
 def rewrite_mcap(
     place: Path,
     file: BinaryIO,
-    conversions: Mapping[str, Conversion],
+    conversions: Conversions,
     recorded: dict[str, Recorded],
     index: bool,
     progress: Callable[[int, int], object],
+    damage: DamageList,
 ) -> dict[str, RewrittenTopic]:
     """Write an MCAP file with conversions of topics; `index` is that of `read_facts`.
 
-    `recorded` has what other files of the recording have of a topic, and is added to.
+    `recorded` has what other files of the recording have of a topic, and is added to. What is
+    damaged is left out.
     """
     source = Source(place)
     every: list[Facts] = []
     with of_file(source.name), source.opened():
         for use_index in dict.fromkeys((index, False)):
-            facts = read_facts(source, use_index)
+            facts = read_facts(source, damage, use_index)
             every.append(facts)
             file.seek(0)
             file.truncate()
-            rewriting = Rewriting(source, facts, Plan(facts, conversions, recorded), file.write)
+            plan = Plan(facts, conversions, recorded)
+            rewriting = Rewriting(source, facts, plan, file.write, damage)
             try:
                 rewriting.run(lambda done: progress(done, source.size))
             except _UnlistedError:

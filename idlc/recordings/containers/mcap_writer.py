@@ -26,7 +26,7 @@ from idlc.recordings.containers.records import (
     Fields,
     read_records,
 )
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.source import DamageError
 from idlc.version import __version__
 
 
@@ -50,7 +50,7 @@ class Content:
         for (op, at, content), _ in every:
             if op == MESSAGE_OP:
                 if len(content) < LEAST:
-                    raise RecordingError("a message is cut off")
+                    raise DamageError("a message is cut off")
                 places.append(at)
             elif op in (SCHEMA_OP, CHANNEL_OP):
                 number = Fields(content, "a definition").number(2)
@@ -92,9 +92,12 @@ def channel(
     number: int, schema_number: int, topic: bytes, encoding: bytes, metadata: dict[bytes, bytes]
 ) -> bytes:
     """Return the content of a channel's record."""
-    pairs = b"".join(text_field(part) for pair in metadata.items() for part in pair)
     head = pack("<HH", number, schema_number)
-    return head + text_field(topic) + text_field(encoding) + text_field(pairs)
+    return head + text_field(topic) + text_field(encoding) + _pairs(metadata)
+
+
+def _pairs(metadata: dict[bytes, bytes]) -> bytes:
+    return text_field(b"".join(text_field(part) for pair in metadata.items() for part in pair))
 
 
 class McapWriter:
@@ -157,7 +160,7 @@ class McapWriter:
             names = [bytes(fields.part().data) for _ in range(2)]
             length = bytes(fields.read(8))
             if int.from_bytes(length, "little") + fields.at + 4 > size:
-                raise RecordingError("an attachment is cut off")
+                raise DamageError("an attachment is cut off")
             what = place + times + length + b"".join(map(text_field, names))
             self._index(records.ATTACHMENT_INDEX_OP, what)
         elif op == records.METADATA_OP:
@@ -241,6 +244,13 @@ class ChunkWriter(McapWriter):
         self._records += record(op, content)
         if len(self._records) >= CHUNK:
             self.flush()
+
+    def add_metadata(self, name: str, values: dict[bytes, bytes]) -> None:
+        """Append named facts."""
+        self.flush()
+        content = text_field(name.encode()) + _pairs(values)
+        self.index_other(records.METADATA_OP, memoryview(content), len(content))
+        self.write(record(records.METADATA_OP, content))
 
     def flush(self) -> None:
         """Write the records that were collected."""

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeAlias
 import msgspec
 import numpy as np
 
-from idlc.recordings.containers.source import RecordingError
-
 #: Times of numpy and Arrow end here, in the year 2262.
 END_OF_TIME = 1 << 63
+#: Stands for a later time; it is NaT, numpy's null.
+NO_TIME = -END_OF_TIME
 
 #: From this mean size on, messages are not copied to be one buffer.
 LARGE = 1 << 15
@@ -41,7 +41,9 @@ class Window(NamedTuple):
         if self.start is None and self.end is None:
             return None
         # numpy compares numbers of 64 bits, and limits may have more
-        inside = np.full(len(times), self.start is None or self.start < END_OF_TIME)
+        inside = times != NO_TIME
+        if self.start is not None and self.start >= END_OF_TIME:
+            inside[:] = False
         if self.start is not None and 0 < self.start < END_OF_TIME:
             inside &= times >= self.start
         if self.end is not None and self.end < END_OF_TIME:
@@ -56,7 +58,7 @@ ALWAYS = Window()
 class Messages(msgspec.Struct, frozen=True, eq=False):
     """Messages of one topic, in the order in which they were recorded, for `to_columns` to read.
 
-    Times are int64, in nanoseconds; `publish_times` is None where a recording has none.
+    Times are int64, in nanoseconds, or NO_TIME; `publish_times` is None where a recording has none.
     """
 
     log_times: Any
@@ -64,6 +66,11 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
 
     def __len__(self) -> int:
         return len(self.log_times)
+
+    def late(self) -> int:
+        """Return how many times are not known because they are after the year 2262."""
+        times = (self.log_times, self.publish_times)
+        return sum(int(np.count_nonzero(each == NO_TIME)) for each in times if each is not None)
 
     def views(self) -> list[Raw]:
         """Return the bytes of each message."""
@@ -74,6 +81,10 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
         publish = None if self.publish_times is None else self.publish_times[mask]
         raws = [raw for raw, chosen in zip(self.views(), mask, strict=True) if chosen]
         return Separate(self.log_times[mask], publish, raws)
+
+    def first_views(self, count: int) -> list[Raw]:
+        """Return the bytes of the first messages."""
+        return self.views()[:count]
 
 
 class Ranges(Messages, frozen=True, eq=False):
@@ -98,8 +109,12 @@ class Ranges(Messages, frozen=True, eq=False):
 
     def views(self) -> list[Raw]:
         """Return each message as a part of the buffer."""
+        return self.first_views(len(self))
+
+    def first_views(self, count: int) -> list[Raw]:
+        """Return each of the first messages as a part of the buffer."""
         view = memoryview(self.buffer)
-        pairs = zip(self.starts.tolist(), self.stops.tolist(), strict=True)
+        pairs = zip(self.starts[:count].tolist(), self.stops[:count].tolist(), strict=True)
         return [view[start:stop] for start, stop in pairs]
 
 
@@ -116,11 +131,21 @@ class Separate(Messages, frozen=True, eq=False):
         return self.raws
 
 
-def times_of(values: Any, what: str) -> Any:
-    """Return unsigned times as int64."""
-    if len(values) and int(values.max()) >= END_OF_TIME:
-        raise RecordingError(f"a message has a {what} after the year 2262")
-    return values.astype(np.int64)
+def times_of(values: Any) -> Any:
+    """Return unsigned times as int64, NO_TIME for those after the year 2262."""
+    times = values.astype(np.int64)
+    if len(times) and times.min() < 0:
+        times[times < 0] = NO_TIME
+    return times
+
+
+def in_order(parts: Sequence[Messages]) -> Messages:
+    """Return the messages of all parts in the order of their log times."""
+    joined = join_messages(parts)
+    order = np.argsort(joined.log_times, kind="stable")
+    publish = None if joined.publish_times is None else joined.publish_times[order]
+    raws = joined.views()
+    return Separate(joined.log_times[order], publish, [raws[at] for at in order.tolist()])
 
 
 def join_messages(parts: Sequence[Messages]) -> Messages:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import zlib
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from struct import Struct
 from typing import NamedTuple, TypeVar
 
-from idlc.recordings.containers.source import RecordingError, Source
+from idlc.recordings.containers.compression import decompressed
+from idlc.recordings.containers.source import DamageError, Source
 
 Item = TypeVar("Item")
 MAGIC = b"\x89MCAP0\r\n"
@@ -26,6 +30,32 @@ HEADER_OP, FOOTER_OP, SCHEMA_OP, CHANNEL_OP, MESSAGE_OP, CHUNK_OP = 1, 2, 3, 4, 
 MESSAGE_INDEX_OP, CHUNK_INDEX_OP, ATTACHMENT_OP, ATTACHMENT_INDEX_OP = 7, 8, 9, 0x0A
 STATISTICS_OP, METADATA_OP, METADATA_INDEX_OP = 0x0B, 0x0C, 0x0D
 SUMMARY_OFFSET_OP, DATA_END_OP = 0x0E, 0x0F
+#: The smallest content of each kind of record.
+LEAST = {
+    HEADER_OP: 8,
+    FOOTER_OP: 20,
+    SCHEMA_OP: 14,
+    CHANNEL_OP: 16,
+    MESSAGE_OP: MESSAGE_HEAD.size,
+    CHUNK_OP: 40,
+    MESSAGE_INDEX_OP: 6,
+    CHUNK_INDEX_OP: 64,
+    ATTACHMENT_OP: 36,
+    ATTACHMENT_INDEX_OP: 48,
+    STATISTICS_OP: 46,
+    METADATA_OP: 8,
+    METADATA_INDEX_OP: 20,
+    SUMMARY_OFFSET_OP: 17,
+    DATA_END_OP: 4,
+}
+#: The kinds of records that are also in chunks.
+INNER = {SCHEMA_OP, CHANNEL_OP, MESSAGE_OP}
+#: So many records in a row prove that the first is one.
+IN_A_ROW = 3
+#: Anything that may be the head of a record smaller than 1 TiB; of chunks, compressed and not.
+_ANY_HEAD = re.compile(rb"[\x02-\x0f](?=.{5}\0{3})", re.DOTALL)
+#: A search for the next record reads so much at a time.
+SEARCHED = 1 << 20
 
 
 class Chunk(NamedTuple):
@@ -56,7 +86,7 @@ class Fields:
         """Return the next bytes."""
         left = len(self.data) - self.at
         if size > left:
-            raise RecordingError(f"{self.what} is broken: {size} bytes expected, {left} left")
+            raise DamageError(f"{self.what} is broken: {size} bytes expected, {left} left")
         self.at += size
         return self.data[self.at - size : self.at]
 
@@ -78,29 +108,129 @@ class Fields:
 
 
 def read_records(data: memoryview) -> Iterator[tuple[int, int, memoryview]]:
-    """Yield kind, offset and content of each record; raise RecordingError if one is cut off."""
+    """Yield kind, offset and content of each record; raise DamageError if one is cut off."""
     at, end = 0, len(data)
     while at < end:
         if end - at < HEAD.size:
-            raise RecordingError(f"a record is cut off after {end - at} bytes")
+            raise DamageError(f"a record is cut off after {end - at} bytes")
         op, size = HEAD.unpack_from(data, at)
         start = at + HEAD.size
         if not op:
-            raise RecordingError("a record is of no kind")
+            raise DamageError("a record is of no kind")
         if size > end - start:
-            raise RecordingError(f"a record of {size} bytes is cut off after {end - start}")
+            raise DamageError(f"a record of {size} bytes is cut off after {end - start}")
         yield op, at, data[start : start + size]
         at = start + size
 
 
+def sound_size(data: memoryview) -> int:
+    """Return how many bytes the whole records at the start of a chunk take."""
+    end = 0
+    with suppress(DamageError):
+        for op, at, content in read_records(data):
+            if len(content) < LEAST.get(op, 0):
+                break
+            end = at + HEAD.size + len(content)
+    return end
+
+
 def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
     """Yield kind, offset and size, with the head, of each complete record."""
-    while at + HEAD.size <= end:
-        op, size = HEAD.unpack(source.view(at, HEAD.size))
-        if not op or at + HEAD.size + size > end:
-            return
-        yield op, at, HEAD.size + size
-        at += HEAD.size + size
+    while (head := _head(source, at, end)) is not None:
+        op, size = head
+        yield op, at, size
+        at += size
+
+
+def sound_heads(
+    source: Source, at: int, end: int, skipped: Callable[[int, int], object]
+) -> Iterator[tuple[int, int, int]]:
+    """Yield the same, and go on behind damage, whose range `skipped` is called with.
+
+    Ends with the footer. Records of the kinds that are in chunks are only found again in a file
+    that has messages outside of chunks.
+    """
+    before: tuple[int, int, int] | None = None
+    is_loose = False
+    while at < end:
+        head = _head(source, at, end)
+        if head is not None and head[0] == CHUNK_OP and not _is_chunk(source, at, head[1]):
+            # later versions of MCAP may add fields
+            head = head if _is_record(source, at + head[1], end) else None
+        if head is not None:
+            if before:
+                yield before
+            before = (head[0], at, head[1])
+            is_loose |= head[0] == MESSAGE_OP
+            at += head[1]
+            if head[0] == FOOTER_OP:
+                break
+            continue
+        # the size of the record before may be what is wrong
+        proven = before is None or before[0] == CHUNK_OP
+        start = at if before is None or proven else before[1] + HEAD.size
+        following = resume(source, start, end, is_loose)
+        if following < at and before:
+            skipped(before[1], following)
+        else:
+            if before:
+                yield before
+            skipped(at, following)
+        before, at = None, following
+    if before:
+        yield before
+
+
+def resume(source: Source, at: int, end: int, is_loose: bool) -> int:
+    """Return where the next record begins, at or after an offset; `end` if none does."""
+    while at < end:
+        # a pattern looks ahead, so windows overlap
+        window = min(SEARCHED + HEAD.size, end - at)
+        data = source.view(at, window)
+        for match in _ANY_HEAD.finditer(data):
+            place = at + match.start()
+            op, size = HEAD.unpack_from(data, match.start())
+            if size < LEAST[op] or place + HEAD.size + size > end or (op in INNER and not is_loose):
+                continue
+            if _is_record(source, place, end):
+                return place
+        at += max(window - HEAD.size, 1)
+    return end
+
+
+def _head(source: Source, at: int, end: int) -> tuple[int, int] | None:
+    """Return kind and size, with the head, of a record; None if none can be at an offset."""
+    if at + HEAD.size > end:
+        return None
+    op, size = HEAD.unpack(source.view(at, HEAD.size))
+    if not op or at + HEAD.size + size > end or size < LEAST.get(op, 0):
+        return None
+    return op, HEAD.size + size
+
+
+def _is_chunk(source: Source, at: int, size: int) -> bool:
+    """Return whether the two sizes of a chunk agree."""
+    try:
+        head = read_chunk_head(source, at, size)
+    except DamageError:
+        return False
+    return head.start + head.stored == at + size
+
+
+def _is_record(source: Source, at: int, end: int) -> bool:
+    """Return whether a record begins at an offset: a whole chunk, or several records in a row."""
+    for _ in range(IN_A_ROW):
+        if at == end:
+            return True
+        head = _head(source, at, end)
+        if head is None or head[0] not in LEAST:
+            return False
+        if head[0] == CHUNK_OP:
+            return _is_chunk(source, at, head[1])
+        at += head[1]
+        if head[0] == FOOTER_OP:
+            return True
+    return True
 
 
 def grouped(
@@ -126,7 +256,7 @@ def read_chunk_index(data: memoryview) -> Chunk:
     first, last, at, size = (fields.number(8) for _ in range(4))
     indexes = bytes(fields.read(fields.number(4)))
     if len(indexes) % INDEX_OFFSET.size:
-        raise RecordingError("the index of a chunk is broken: its offsets are cut off")
+        raise DamageError("the index of a chunk is broken: its offsets are cut off")
     index_size = fields.number(8)
     return Chunk(at, size, first, last, fields.name(), indexes or None, index_size)
 
@@ -151,20 +281,29 @@ def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
     compression, stored = fields.name(), fields.number(8)
     left = size - HEAD.size - fields.at
     if stored > left:
-        raise RecordingError(f"a chunk is broken: {stored} bytes expected, {left} left")
+        raise DamageError(f"a chunk is broken: {stored} bytes expected, {left} left")
     return ChunkHead(first, last, large, crc, compression, at + HEAD.size + fields.at, stored)
+
+
+def proven_head(source: Source, head: ChunkHead) -> ChunkHead | None:
+    """Return the head of a chunk with the size of its content, if the checksum proves that."""
+    with suppress(DamageError):
+        content = decompressed(source.view(head.start, head.stored), head.compression)
+        if head.crc and zlib.crc32(content) == head.crc:
+            return head._replace(size=len(content))
+    return None
 
 
 def index_entries(source: Source, channel: int, at: int) -> int:
     """Return the number of bytes of entries in the MessageIndex at `at`, by its head."""
     op, size = HEAD.unpack(source.view(at, HEAD.size))
     if op != MESSAGE_INDEX_OP:
-        raise RecordingError(f"there is no index of messages at byte {at}, where another has one")
+        raise DamageError(f"there is no index of messages at byte {at}, where another has one")
     source.check(at + HEAD.size, size)
     fields = Fields(source.view(at + HEAD.size, min(size, 6)), "an index of messages")
     if fields.number(2) != channel:
-        raise RecordingError(f"the index of messages at byte {at} is of another channel")
+        raise DamageError(f"the index of messages at byte {at} is of another channel")
     entries = fields.number(4)
-    if entries % 16 or entries > size - 6:
-        raise RecordingError(f"the index of messages at byte {at} is cut off")
+    if entries % 16 or entries != size - 6:
+        raise DamageError(f"the index of messages at byte {at} is cut off")
     return entries

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import EIO
 from io import FileIO
 from os import fstat, path, stat_result
 from pathlib import Path
@@ -17,6 +18,10 @@ class RecordingError(HintedError):
     """A recording, or a part of it, cannot be read."""
 
 
+class DamageError(RecordingError):
+    """Some bytes of a recording are not what its writer wrote; others may be sound."""
+
+
 @contextmanager
 def of_file(name: str) -> Iterator[None]:
     """Have errors say which file is meant."""
@@ -25,7 +30,7 @@ def of_file(name: str) -> Iterator[None]:
     except RecordingError as error:
         if f"`{name}`" in error.message:
             raise
-        raise RecordingError(f"`{name}`: {error.message}", error.hint) from None
+        raise type(error)(f"`{name}`: {error.message}", error.hint) from None
 
 
 #: What is smaller is read with so much of what follows, which is mostly wanted next.
@@ -68,7 +73,9 @@ class Source:
             if isinstance(error, FileNotFoundError):
                 reason = "No such file or directory"
             reason = reason or type(error).__name__
-            raise RecordingError(f"`{self.name}` cannot be read: {reason}") from None
+            is_damage = self.is_local and getattr(error, "errno", None) == EIO
+            kind = DamageError if is_damage else RecordingError
+            raise kind(f"`{self.name}` cannot be read: {reason}") from None
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
@@ -128,7 +135,7 @@ class Source:
     def check(self, start: int, size: int) -> None:
         """Raise RecordingError if the file does not have these bytes."""
         if min(start, size) < 0 or start + size > self.size:
-            raise RecordingError(
+            raise DamageError(
                 f"`{self.name}`: {size} bytes expected at byte {start}, the file has {self.size}"
             )
 

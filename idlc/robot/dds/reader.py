@@ -71,15 +71,14 @@ class _Partial:
 class RemoteWriter:
     """What a reader knows of a writer, and the samples of it that wait for earlier ones."""
 
-    def __init__(self, guid: bytes, address: Address, reliable: bool, is_latched: bool) -> None:
+    def __init__(self, guid: bytes, address: Address, reliable: bool) -> None:
         self.guid = guid
         self.address = address
         self.reliable = reliable
-        #: The number of the next sample to deliver; `None` until the writer has told.
+        #: The number of the next sample to deliver. Of a reliable writer it is `None` until the
+        #: first heartbeat: the writer may know the reader, and send to it, before the reader knows
+        #: the writer. Gaps tell what a late reader has missed.
         self.next: int | None = None
-        #: True if the first heartbeat tells which sample is the first one wanted. Writers of idlc
-        #: tell each reader what it has not missed.
-        self.waits = is_latched or guid.startswith(wire.VENDOR)
         self.early: dict[int, Received | None] = {}
         self.partial: OrderedDict[int, _Partial] = OrderedDict()
         self.bytes = 0
@@ -102,8 +101,7 @@ class Reader:
         """Receive from a writer."""
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         if guid not in self.writers:
-            is_latched = self.qos.is_latched and qos.is_latched
-            self.writers[guid] = RemoteWriter(guid, address, reliable, is_latched)
+            self.writers[guid] = RemoteWriter(guid, address, reliable)
 
     def unmatch(self, guid: bytes) -> None:
         """Forget a writer."""
@@ -130,7 +128,7 @@ class Reader:
             self._take(writer, Received(guid, *part[2:]))
 
     def _take(self, writer: RemoteWriter, sample: Received) -> None:
-        if writer.next is None and not (writer.reliable and writer.waits):
+        if writer.next is None and not writer.reliable:
             writer.next = sample.number
         if writer.next is not None and sample.number < writer.next:
             return
@@ -173,8 +171,6 @@ class Reader:
             return
         if writer.next is not None and part.number < writer.next:
             return
-        if writer.next is None and writer.reliable and not writer.waits:
-            writer.next = part.number  # else a heartbeat would begin after it
         if part.total > MOST_SAMPLE:
             self.lost += 1
             writer.early.setdefault(part.number, None)  # else the reader would ask for ever
@@ -231,7 +227,7 @@ class Reader:
         if writer is None or not writer.reliable:
             return []
         if writer.next is None:
-            writer.next = part.first if writer.waits else part.last + 1
+            writer.next = part.first
         if writer.next < part.first:
             self._skip(writer, part.first)
         self._drain(writer)

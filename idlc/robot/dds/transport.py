@@ -193,7 +193,7 @@ class DdsTransport:
                 callback(token, True)
         return _Closer(lambda: self._watchers.remove(callback))
 
-    def tokens(self, domain: int, timeout: float) -> Iterator[str]:  # noqa: ARG002
+    def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:  # noqa: ARG002
         """Yield the tokens that exist, as soon as the others have told all of theirs."""
         end = self._started + min(timeout, _PATIENCE)
         while (now := time.monotonic()) < end:

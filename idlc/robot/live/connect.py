@@ -8,15 +8,17 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
+from itertools import islice
 from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import did_you_mean, one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, Kind, pack_attachment, parse_token
 from idlc.robot.live.graph import Entity as Noun
 from idlc.robot.names import action_part
 from idlc.robot.qos import QoSProfile
@@ -31,6 +33,8 @@ TICK = 0.5
 MOST_OPEN = 8
 #: Seconds after which a request without a reply counts as dropped.
 DROPPED = 1.5
+#: Tokens of other domains that idlc looks at.
+MOST_TOKENS = 100_000
 TOPICS = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
 #: Bytes of samples that wait to be read; more are lost.
 MOST_WAITING = 64 << 20
@@ -53,10 +57,25 @@ def connected(address: str, report: Report, timeout: float = 5.0) -> Iterator[Se
     with session:
         yield session
         report.notes += session.transport.notes()
+        if not robot_entities(session):
+            report.notes.append(where_nodes_are(session))
         if session.graph.is_full:
             report.notes.append("the robot announces too many endpoints; some are missing")
         if session.graph.is_incomplete:
             report.notes.append("the robot answers too slowly; endpoints may be missing")
+
+
+def where_nodes_are(session: Session) -> str:
+    """Return a sentence about a domain without nodes, and about those that have nodes."""
+    others: Counter[int] = Counter()
+    with suppress(TimeoutError):
+        tokens = islice(session.transport.tokens(None, APPEARING), MOST_TOKENS)
+        ends = (end for token in tokens if (end := parse_token(token)))
+        others.update(end.domain for end in ends if end.kind is Kind.NODE)
+    del others[session.domain]
+    has = [f"; domain {own} has {counted(number, 'node')}" for own, number in others.most_common(5)]
+    advice = "; set ROS_DOMAIN_ID" if has else ""
+    return f"there is no node in domain {session.domain}{''.join(has)}{advice}"
 
 
 def robot_entities(session: Session, *kinds: Kind) -> list[Entity]:

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
+from idlc.recordings.containers.file import START, unread_reason
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import type_of
 from idlc.robot.keys import Entity, Kind
@@ -20,6 +21,8 @@ from idlc.robot.live.types import definitions
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 from idlc.robot.session import Session
 
+#: Reasons that are printed while messages arrive.
+MOST_REASONS = 10
 #: The profile for a topic without publishers.
 _DEFAULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -44,11 +47,16 @@ def subscribe(
 
 
 def find_version(
-    session: Session, name: str, kinds: Sequence[Kind], report: Report
+    session: Session,
+    name: str,
+    kinds: Sequence[Kind],
+    report: Report,
+    include: tuple[str, ...] = (),
 ) -> tuple[Any, list[Entity]]:
     """Return the class and the endpoints of a topic or service, of the first version on offer.
 
-    Without these, it reports IDL655 or IDL652, and returns `None` and no endpoints.
+    Types are also looked up in the folders `include`. Without a type or an endpoint, it reports
+    IDL655 or IDL652, and returns `None` and no endpoints.
     """
     ends = find_endpoints(session, [name], kinds, report)
     if not ends:
@@ -58,14 +66,16 @@ def find_version(
     version = f"the version of `{first.node_name}`, {first.type} {first.hash}"
     if len(chosen) < len(ends):
         report.notes.append(f"`{first.name}` has several versions; idlc uses {version}")
-    (definition,) = definitions(session, "", [first])
+    (definition,) = definitions(session, "", [first], include=include)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            return type_of(definition.topic).kind, chosen
+            return type_of(definition.topic, include).kind, chosen
         except RecordingError as error:
-            hint = f"the robot: {definition.problem}" if definition.problem else error.hint
-            missing = codes.MISSING_DEFINITION.of("", error.message, hint=hint)
+            message = error.message.replace("the recording does not", "the robot does not")
+            if definition.problem:
+                message += f" ({definition.problem})"
+            missing = codes.MISSING_DEFINITION.of("", message, hint=error.hint)
             report.add(replace(missing, severity=Severity.ERROR))
             return None, []
         finally:
@@ -78,25 +88,35 @@ def messages(
     read: Callable[[bytes], Any],
     count: int | None,
     report: Report,
+    complain: Callable[[str], object] = lambda _: None,
 ) -> Iterator[Any]:
     """Yield what is read of the messages of a topic as they arrive, until there are `count`.
 
-    Malformed and lost ones are noted.
+    Malformed ones count. They and lost ones are noted; `complain` is called at once with each new
+    reason why messages are malformed.
     """
     inbox, done, malformed = Inbox(), 0, 0
+    reasons = set[str]()
     with ExitStack() as declared:
         subscribe(session, ends, inbox, 0, declared)
         try:
             while count is None or done < count:
                 arrival = inbox.get(TICK)
-                if arrival and arrival.sample:
-                    try:
-                        message = read(arrival.sample.payload)
-                    except ValueError:
-                        malformed += 1
-                        continue
-                    done += 1
-                    yield message
+                if arrival is None or arrival.sample is None:
+                    continue
+                done += 1
+                payload = arrival.sample.payload
+                try:
+                    message = read(payload)
+                except ValueError as error:
+                    malformed += 1
+                    known = unread_reason(ends[0].name, payload[:START])
+                    reason = known.message if known else f"a message is malformed: {error}"
+                    if reason not in reasons and len(reasons) < MOST_REASONS:
+                        reasons.add(reason)
+                        complain(reason)
+                    continue
+                yield message
         finally:
             for number, adjective in ((malformed, "malformed"), (inbox.lost, "lost")):
                 if number:

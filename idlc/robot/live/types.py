@@ -28,11 +28,11 @@ from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.file import CDR, MSG, Schema, Topic
-from idlc.recordings.definition_text import mcap
 from idlc.recordings.definitions import (
     RecordedDefinition,
     TextCache,
     interface_of,
+    mcap_text,
     read_definition,
     type_name,
 )
@@ -56,10 +56,10 @@ DESCRIBE = "type_description_interfaces/srv/GetTypeDescription"
 Key: TypeAlias = tuple[str, str]
 
 
-def _compiler() -> Compiler:
-    """Return a compiler of what this machine has, without files of the working folder."""
+def _compiler(include: tuple[str, ...] = ()) -> Compiler:
+    """Return a compiler of what this machine has, without other files of the working folder."""
     scope = Scope(Root.here())
-    return Compiler(Library((), scope.root, Report(), distro=scope.distro))
+    return Compiler(Library(include, scope.root, Report(), distro=scope.distro))
 
 
 @cache
@@ -74,17 +74,31 @@ def ask(
 ) -> dict[Question, Answer]:
     """Return the nodes' answers within `patience` seconds; each question has one."""
     questions = list(dict.fromkeys(questions))
-    servers = robot_entities(session, Kind.SERVICE)
-    services = {end.node_name: end for end in servers if end.type == DESCRIBE}
+    services = _describers(session)
     answers = {each: answer_of(None, each.node in services) for each in questions}
+    answers.update(_replies(session, services, questions, patience))
+    return answers
+
+
+def _describers(session: Session) -> dict[str, Entity]:
+    servers = robot_entities(session, Kind.SERVICE)
+    return {end.node_name: end for end in servers if end.type == DESCRIBE}
+
+
+def _replies(
+    session: Session,
+    services: Mapping[str, Entity],
+    questions: Iterable[Question],
+    patience: float = PATIENCE,
+) -> Iterator[tuple[Question, Answer]]:
+    """Yield questions with the nodes' answers as these arrive, for `patience` seconds."""
     offered = [question for question in questions if question.node in services]
     requests = ((services[node], _request(name, hash_)) for node, name, hash_ in offered)
     room = MOST_REPLIES
     for number, payload in call(session, requests, patience, again=True):
         room -= len(payload)
         if room >= 0:
-            answers[offered[number]] = _answer(payload)
-    return answers
+            yield offered[number], _answer(payload)
 
 
 def _request(name: str, hash_: str) -> Any:
@@ -108,60 +122,100 @@ def read_robot(address: str, report: Report) -> tuple[RecordedDefinition, ...] |
             return None
         ends = (end for end in robot_entities(session) if end.kind is not Kind.NODE)
         whole = [end for end in ends if place_of(end)[2] in ("", "feedback")]
-        return definitions(session, address, whole)
+        # in the order of the names, whoever answers first
+        every = definitions(session, address, whole)
+        return tuple(sorted(every, key=lambda each: (each.topic.name, each.topic.type)))
 
 
 def definitions(
-    session: Session, address: str, ends: Iterable[Entity], *, whole: bool = False
-) -> tuple[RecordedDefinition, ...]:
-    """Return the definitions of what endpoints use, one for each name and version of its type.
+    session: Session,
+    address: str,
+    ends: Iterable[Entity],
+    *,
+    whole: bool = False,
+    include: tuple[str, ...] = (),
+) -> Iterator[RecordedDefinition]:
+    """Yield the definitions of what endpoints use, one for each name and version of its type.
+
+    They come as nodes answer.
 
     `address` is the robot's name in reports. An action is defined by its feedback. Local types with
-    the right hash have no definition of the robot's, unless `whole` asks for their own.
+    the right hash have no definition of the robot's, unless `whole` asks for their own. Then local
+    types also define what endpoints announce without a hash.
     """
     users: dict[Key, list[Entity]] = {}
-    parts: dict[tuple[str, str], list[Entity]] = {}
     for end in ends:
         users.setdefault((end.type, end.hash), []).append(end)
+    parts = _parts_of_actions(session)
+    compiler = _compiler(include)
+    cache: TextCache = {}
+    asked: dict[Key, list[Question]] = {}
+
+    def read(key: Key, text: str, problem: str) -> Iterator[RecordedDefinition]:
+        schema = Schema(key[0], MSG, text) if text else None
+        for name in dict.fromkeys(place_of(end)[1] for end in users[key]):
+            topic = Topic(name, key[0], 0, key[1] or None, CDR, schema)
+            definition = read_definition(topic, address, cache)
+            yield definition._replace(origin="the robot", problem=problem)
+
+    for key, mine in users.items():
+        type_ = type_name(key[0])
+        if type_ and (text := _local_text(compiler, type_, key[1], unsure=whole)):
+            yield from read(key, text if whole else "", "")
+        elif type_ and key[1]:
+            names = dict.fromkeys(place_of(end)[1] for end in mine)
+            others = chain(*(parts.get(part, ()) for part in product(names, _PARTS)))
+            asked[key] = [*_questions(type_, (*mine, *others))]
+        else:
+            yield from read(key, "", "" if key[1] else "it announces no type hash")
+    for key, text, problem in _answered(session, asked):
+        yield from read(key, text, problem)
+
+
+def _parts_of_actions(session: Session) -> dict[tuple[str, str], list[Entity]]:
+    """Return endpoints of actions whose descriptions contain goals and results."""
+    parts: dict[tuple[str, str], list[Entity]] = {}
     for end in robot_entities(session):
         part = place_of(end)[1:]
         if part[1] in _PARTS and len(mine := parts.setdefault(part, [])) < MOST_OF_A_PART:
             mine.append(end)
-    compiler = _compiler()
-    questions: dict[Key, list[Question]] = {}
-    results: dict[Key, tuple[str, str]] = {}
-    places: dict[tuple[str, Key], None] = {}
-    for key, mine in users.items():
-        names = dict.fromkeys(place_of(end)[1] for end in mine)
-        places |= dict.fromkeys((name, key) for name in names)
-        type_ = type_name(key[0])
-        if type_ and (text := _local_text(compiler, type_, key[1])):
-            results[key] = text if whole else "", ""
-        elif type_ and key[1]:
-            others = chain(*(parts.get(part, ()) for part in product(names, _PARTS)))
-            questions[key] = [*_questions(type_, (*mine, *others))]
-    answers = ask(session, chain(*questions.values()))
-    for key, asked in questions.items():
-        results[key] = _definition(key, {each: answers[each] for each in asked})
-    cache: TextCache = {}
-    read = []
-    for name, key in places:
-        no_hash = "" if key[1] else "it announces no type hash"
-        text, problem = results.get(key, ("", no_hash))
-        schema = Schema(key[0], MSG, text) if text else None
-        topic = Topic(name, key[0], 0, key[1] or None, CDR, schema)
-        definition = read_definition(topic, address, cache)
-        read.append(definition._replace(origin="the robot", problem=problem))
-    return tuple(read)
+    return parts
 
 
-def _local_text(compiler: Compiler, name: ir.TypeName, hash_: str) -> str | None:
-    """Return the definition of a type on this machine, if it has the robot's hash."""
+def _answered(
+    session: Session, asked: Mapping[Key, list[Question]]
+) -> Iterator[tuple[Key, str, str]]:
+    """Yield each type with its text, or the reason why there is none, as nodes answer."""
+    services = _describers(session)
+    answers: dict[Key, dict[Question, Answer]] = {}
+    users: dict[Question, list[Key]] = {}
+    for key, questions in asked.items():
+        answers[key] = {each: answer_of(None, each.node in services) for each in questions}
+        for question in answers[key]:
+            users.setdefault(question, []).append(key)
+    for question, answer in _replies(session, services, users):
+        for key in users[question]:
+            if key in answers:
+                answers[key][question] = answer
+                text, problem = _definition(key, answers[key])
+                if text and INCOMPLETE not in text:
+                    del answers[key]
+                    yield key, text, problem
+    for key, known in answers.items():
+        yield key, *_definition(key, known)
+
+
+def _local_text(compiler: Compiler, name: ir.TypeName, hash_: str, *, unsure: bool) -> str | None:
+    """Return the definition of a type on this machine, if it has the robot's hash.
+
+    If the robot announces none, any definition will do for the `unsure`.
+    """
     interface, report = interface_of(name), Report()
     reached = compiler.reached([interface])
     model = compiler.model(interface.package, list(reached.values()), report)
-    is_same = not report.had_errors and model.hash(name) == hash_
-    return mcap(model.interfaces[interface], model) if is_same else None
+    is_same = model.hash(name) == hash_ or (unsure and not hash_ and interface in reached)
+    is_sound = is_same and not report.had_errors
+    return mcap_text(model.interfaces[interface], model) if is_sound else None
 
 
 def _questions(name: ir.TypeName, ends: Iterable[Entity]) -> Iterator[Question]:
@@ -197,6 +251,6 @@ def _definition(key: Key, answers: Mapping[Question, Answer]) -> tuple[str, str]
     for texts in sorted(candidates, key=lambda each: str(each.values()).count(INCOMPLETE)):
         if interface in texts:
             if linked := model_of_sources(texts, name, key[1]):
-                return mcap(linked.interfaces[interface], linked), ""
+                return mcap_text(linked.interfaces[interface], linked), ""
             problems.append("a node sends a definition with another type hash")
     return "", first_few(list(dict.fromkeys(problems)) or ["no node has its definition"], ASKED)

@@ -172,3 +172,21 @@ class Timer(Ready):
         if period := self.timer_period_ns:
             self._next += period * (-left // period + 1)
         return self.callback
+
+
+class GuardCondition(Timer):
+    """Calls back after each `trigger`, which any thread may call."""
+
+    def __init__(self, callback: Callback, group: CallbackGroup | None, clock: Clock) -> None:
+        super().__init__(callback, group, 0, clock)
+        self.cancel()
+
+    def trigger(self) -> None:
+        """Have the executor call back; until it does, further triggers count as one."""
+        self._next = -math.inf
+        self.wake()
+
+    def take(self) -> Callback | None:
+        """Return the callback if the condition was triggered."""
+        was_triggered, self._next = self._next < math.inf, math.inf
+        return self.callback if was_triggered else None

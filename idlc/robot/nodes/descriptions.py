@@ -6,6 +6,8 @@ from typing import Any
 
 from idlc.runtime.typeinfo import types_of
 
+#: The parameter without which, or with True, a node has the service.
+START_SERVICE = "start_type_description_service"
 SERVICE = "type_description_interfaces/srv/GetTypeDescription"
 
 

@@ -1,10 +1,11 @@
-"""Futures, and the executor: one thread that runs all callbacks of its nodes, one at a time.
+"""Futures, and executors: one thread runs all callbacks of its nodes, one at a time, or several do.
 
 Threads of the transport only append to bounded queues and wake it.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Generator
 from concurrent import futures
@@ -12,6 +13,7 @@ from contextlib import AbstractContextManager, suppress
 from functools import partial
 from inspect import iscoroutine
 from queue import Empty, SimpleQueue
+from threading import Lock
 from typing import Any, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
@@ -89,11 +91,24 @@ class CallbackGroup:
     #: Functions to call at the end of the callback that runs; `None` if others need not wait.
     waiting: list[Callback] | None = None
 
-    def end(self, waiting: list[Callback]) -> None:
+    def __init__(self) -> None:
+        self._lock = Lock()
+
+    def begin(self, waiting: list[Callback] | None, resume: Callback) -> bool:
+        """Begin a callback, unless one runs; then `resume` is called at its end."""
+        with self._lock:
+            if self.waiting is not None:
+                self.waiting.append(resume)
+                return False
+            self.waiting = waiting
+            return True
+
+    def end(self, waiting: list[Callback] | None) -> None:
         """End a callback; in a new executor, another one may run already."""
-        if self.waiting is waiting:
-            self.waiting = None
-        for resume in waiting:
+        with self._lock:
+            if self.waiting is waiting:
+                self.waiting = None
+        for resume in waiting or ():
             resume()
 
 
@@ -134,18 +149,18 @@ class Ready:
         group = self.callback_group
         if self._executor is not executor:
             return False
-        if (waiting := group.waiting) is not None:
-            waiting.append(partial(executor.schedule, self.run, executor))
+        waiting: list[Callback] | None = None
+        if isinstance(group, MutuallyExclusiveCallbackGroup):
+            waiting = []
+        if not group.begin(waiting, partial(executor.schedule, self.run, executor)):
             return False
         self._is_queued = False
         callback = self.take()
         if callback is None:
+            group.end(waiting)
             return False
-        waiting = []
         future: Future[Any] = Future(executor=executor)
         future.wake_at_end(partial(group.end, waiting))
-        if isinstance(group, MutuallyExclusiveCallbackGroup):
-            group.waiting = waiting
         return executor.step(future, callback)
 
 
@@ -262,6 +277,35 @@ class Executor(AbstractContextManager["Executor"]):
 
 
 SingleThreadedExecutor = Executor
+
+
+class MultiThreadedExecutor(Executor):
+    """Runs callbacks in threads; those of a mutually exclusive group one after the other."""
+
+    def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
+        super().__init__(context=context)
+        self._pool = futures.ThreadPoolExecutor(num_threads or max(2, os.cpu_count() or 2))
+
+    def step(self, future: Future[Any], work: Any) -> bool:
+        """Run a function, or a coroutine to its next `await`, in a thread."""
+        with suppress(RuntimeError):  # the executor is shut down
+            self._pool.submit(self._step, future, work)
+        return True
+
+    def _step(self, future: Future[Any], work: Any) -> None:
+        try:
+            super().step(future, work)
+        except BaseException as error:
+            self.schedule(_fail, error)
+
+    def shutdown(self) -> None:
+        """Stop spinning, and give up the nodes; callbacks that run go on."""
+        super().shutdown()
+        self._pool.shutdown(wait=False)
+
+
+def _fail(error: BaseException) -> bool:
+    raise error
 
 
 def _end(timeout: Limit) -> float:

@@ -13,9 +13,9 @@ from idlc.robot.graph import Graph
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.names import InvalidNameError, expand_namespace, is_node_name
 from idlc.robot.nodes.arguments import parse_arguments
-from idlc.robot.nodes.clock import Clock, ClockType, Time, Timer
+from idlc.robot.nodes.clock import Clock, ClockType, GuardCondition, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
-from idlc.robot.nodes.descriptions import SERVICE, describe
+from idlc.robot.nodes.descriptions import SERVICE, START_SERVICE, describe
 from idlc.robot.nodes.endpoints import (
     Endpoint,
     EventCallbacks,
@@ -92,11 +92,13 @@ class Node(HasParameters):
         self._parameter_events = self.create_publisher(
             event, "/parameter_events", profiles.qos_profile_parameter_events
         )
-        answer, service = partial(describe, self), standard(SERVICE)
-        DeepService[Any, Any](self, "~/get_type_description", service, 10, None, answer)
         overrides = overrides_of(self.arguments, self.get_fully_qualified_name())
+        overrides |= {each.name: each for each in parameter_overrides or ()}
+        if START_SERVICE not in overrides or overrides[START_SERVICE].value is not False:
+            answer, service = partial(describe, self), standard(SERVICE)
+            DeepService[Any, Any](self, "~/get_type_description", service, 10, None, answer)
         self._begin_parameters(
-            {**overrides, **{each.name: each for each in parameter_overrides or ()}},
+            overrides,
             allow_undeclared=allow_undeclared_parameters,
             declare_overrides=automatically_declare_parameters_from_overrides,
         )
@@ -130,6 +132,7 @@ class Node(HasParameters):
         return True
 
     destroy_publisher = destroy_subscription = destroy_service = destroy_client = destroy_timer
+    destroy_guard_condition = destroy_timer
 
     def destroy_node(self) -> None:
         """Withdraw the node with its endpoints; may be called twice."""
@@ -290,6 +293,15 @@ class Node(HasParameters):
         timer = Timer(callback, group, int(timer_period_sec * 1e9), clock or self._clock)
         self.add(timer)
         return timer
+
+    def create_guard_condition(
+        self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
+    ) -> GuardCondition:
+        """Return a condition that calls back when it is triggered."""
+        group = callback_group or self.default_callback_group
+        condition = GuardCondition(callback, group, self._clock)
+        self.add(condition)
+        return condition
 
     # the graph
 

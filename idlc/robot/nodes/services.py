@@ -148,7 +148,13 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         if future is None:
             self.ignored += sample is not None
             return
-        future.executor = self._executor
+        executor = future.executor = self._executor
+        self._finish(future, sample)
+        if executor is not None:
+            # a response counts as a callback, so that `spin_once` returns
+            executor.schedule(lambda: True)
+
+    def _finish(self, future: Future[ResponseT], sample: Sample | None) -> None:
         if sample is None:
             hint = "is the service running? `wait_for_service` waits until the service runs"
             future.set_exception(RobotError(f"no service answered `{self.srv_name}`", hint))

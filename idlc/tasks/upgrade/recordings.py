@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -19,27 +20,36 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
 from idlc.model import ir
 from idlc.project.files import is_folder
-from idlc.project.find import RULES
+from idlc.project.find import RULES, is_address
 from idlc.project.git import GIT
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.recordings.columns import unread_bytes
+from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.conversion import Conversion
-from idlc.recordings.containers.file import MSG
+from idlc.recordings.containers.file import CDR, MSG
+from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definition_text import definition_text
-from idlc.recordings.definitions import interface_of
+from idlc.recordings.definitions import definition_text, interface_of
+from idlc.recordings.find import is_recording
+from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
+from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
     DefinedTopic,
     LocalTypes,
     RecordedTypes,
+    damage_problems,
     recorded_types,
     topics_of,
     versions,
 )
+from idlc.runtime.typeinfo import Structure
 from idlc.tasks.upgrade.targets import Target, compiled, target_of
+from idlc.versions.constants import renumbered
 from idlc.versions.conversion import Finding, Plan, Version, make_plan
-from idlc.versions.converters import Payloads, RunRules
+from idlc.versions.converters import RunRules
 from idlc.versions.distribution import PREFIX
+from idlc.versions.exact import Payloads
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 #: Called with a recording, and how much of it is done.
@@ -59,16 +69,22 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
     write_rules: str | None = None
     dry_run: bool = False
     allow_loss: bool = False
+    strict: bool = False
     again: str = "idlc upgrade"
 
 
 class TopicPlan(NamedTuple):
-    """A recorded topic, and the plan of its messages; without a plan, the type was removed."""
+    """A recorded topic, and the plan of its messages; without a plan, the type was removed.
+
+    `definition` is the recorded one, and `several` says that the topic has others, too.
+    """
 
     recording: str
     topic: str
     type: str
     plan: Plan | None
+    definition: str = ""
+    several: bool = False
 
     @property
     def findings(self) -> list[Finding]:
@@ -85,16 +101,20 @@ class TopicPlan(NamedTuple):
 
 
 class Result(NamedTuple):
-    """The plans of changed topics, the recordings that were written, and new files of rules."""
+    """The plans of changed topics, the recordings that were written, and new files of rules.
+
+    `undefined` are unchanged topics whose definitions the recording lacks, by its path.
+    """
 
     plans: list[TopicPlan]
     written: list[tuple[str, str, Any]]
     stubs: list[str]
+    undefined: dict[str, list[tuple[str, Version]]]
 
 
 def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progress) -> Result:
     """Plan the upgrade of recordings, and write them unless something is in the way of it."""
-    result = Result([], [], [])
+    result = Result([], [], [], {})
     with ExitStack() as opened:
         target = opened.enter_context(target_of(options.to, options.scope, report))
         local = _local(options, opened, report)
@@ -105,7 +125,10 @@ def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progre
             return result
         found = _found(target, named, options.scope.root)
         for recording in options.recordings:
-            result.plans.extend(_plans(recording, options, target, local, Known(named), report))
+            undefined = result.undefined.setdefault(recording, [])
+            known_rules = Known(named)
+            every = _plans(recording, options, target, local, known_rules, report, undefined)
+            result.plans.extend(every)
         if report.errors:
             return result
         if options.write_rules is not None:
@@ -126,7 +149,10 @@ def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalT
     scope = options.scope
     if options.old is None:
         return LocalTypes(scope, report)
-    if options.to is not None and not options.to.startswith((GIT, PREFIX)):
+    is_folder_of_packages = options.to is not None and not (
+        options.to.startswith((GIT, PREFIX)) or is_recording(options.to, scope.root)
+    )
+    if options.to is not None and is_folder_of_packages:
         # a revision of what `--to` names
         scope = msgspec.structs.replace(scope, paths=(options.to,))
     old = opened.enter_context(target_of(options.old, scope, report))
@@ -157,12 +183,17 @@ def _plans(
     local: LocalTypes,
     rules: Known,
     report: Report,
+    undefined: list[tuple[str, Version]],
 ) -> Iterator[TopicPlan]:
-    """Yield the plan of each topic of a recording whose type is another one in the target."""
+    """Yield the plan of each topic of a recording whose type is another one in the target.
+
+    Unchanged topics whose definitions the recording lacks are added to `undefined`.
+    """
     topics = topics_of(read_source, [recording], (), options.scope.root, report)
     if topics is None:
         return
     selected = set(options.topics)
+    definitions = Counter(topic.topic.name for topic in topics)
     for version in versions(topics):
         version = msgspec.structs.replace(
             version,
@@ -172,12 +203,48 @@ def _plans(
             continue
         types = recorded_types(version, local, report)
         report.extend(types.errors)
+        if not is_address(recording):
+            _check_lengths(recording, types, options, report)
         with stage("plan", recording):
-            yield from _of_types(recording, types, target, rules, report)
+            for each in _of_types(recording, types, target, rules, report, undefined):
+                yield each._replace(several=definitions[each.topic] > 1)
+
+
+def _check_lengths(
+    recording: str, types: RecordedTypes, options: UpgradeOptions, report: Report
+) -> None:
+    """Report topics whose messages are of another version than their definition."""
+    models = dict(types.models)
+    with open_recording(options.scope.root.path(recording)) as container:
+        for typed in types.topics:
+            topic, package = typed.recorded.topic, typed.name.package
+            if topic.encoding != CDR or typed.name not in models[package].messages:
+                continue
+            structure = TopicType(models, typed.name).structure
+            raws: list[Any] = []
+            for batch in container.messages(topic, ALWAYS):
+                raws += batch.first_views(SAMPLE - len(raws))
+                if len(raws) >= SAMPLE:
+                    break
+            known = known_versions(topic, options.scope.include, ())
+            hint = "if the recording has no definition, add --from with the publisher's version"
+            unread = unread_bytes(structure, raws)
+            try:
+                problem = check_lengths(topic, structure, unread, raws, known, hint) if raws else ""
+            except RecordingError as error:
+                report.add(codes.CONVERSION_FAILED.of(recording, error.message, hint=error.hint))
+            else:
+                if problem:
+                    report.add(codes.CONVERSION_FAILED.of(recording, problem, hint=hint))
 
 
 def _of_types(
-    recording: str, types: RecordedTypes, target: Target, rules: Known, report: Report
+    recording: str,
+    types: RecordedTypes,
+    target: Target,
+    rules: Known,
+    report: Report,
+    undefined: list[tuple[str, Version]],
 ) -> Iterator[TopicPlan]:
     compiler = target.compiler(types.texts)
     known: list[tuple[DefinedTopic, Version, ir.TypeName]] = []
@@ -198,10 +265,14 @@ def _of_types(
         if (topic.name, name) not in plans:
             new = Version(models, name)
             is_same = old.key == new.key and not _differs(old, new, target)
+            is_same = is_same and not _renumbers(old, new)
             plans[topic.name, name] = None if is_same else make_plan(old, new, rules)
-        plan = plans[topic.name, name]
+        plan, recorded = plans[topic.name, name], topic.recorded.topic
         if plan is not None:
-            yield TopicPlan(recording, topic.recorded.topic.name, str(topic.name), plan)
+            definition = recorded.schema.text if recorded.schema else ""
+            yield TopicPlan(recording, recorded.name, str(topic.name), plan, definition)
+        elif recorded.schema is None:
+            undefined.append((recorded.name, old))
 
 
 def _name_in(library: Any, old: Version, rules: Known) -> ir.TypeName | None:
@@ -234,6 +305,13 @@ def _differs(old: Version, new: Version, target: Target) -> bool:
         for version in (old, new)
     )
     return before != after
+
+
+def _renumbers(old: Version, new: Version) -> bool:
+    """Return whether a constant of a type has another value in a version of the same hash."""
+    return any(
+        renumbered(old.of(name).message, new.of(name).message) for name in old.reached & new.reached
+    )
 
 
 def _judge(
@@ -290,13 +368,13 @@ def _write(
     result: Result, options: UpgradeOptions, run: RunRules, report: Report, progress: Progress
 ) -> None:
     """Write each recording; report those that cannot be, and go on with the others."""
-    from idlc.recordings.rewrite import rewrite
+    from idlc.recordings.rewrite import mcap_name, rewrite
 
     root = options.scope.root
     out = Path(root.path(options.out or "."))
     targets: dict[str, str] = {}
     for recording in options.recordings:
-        name = Path(os.path.normpath(root.path(recording))).name
+        name = mcap_name(Path(os.path.normpath(root.path(recording))))
         shown = f"{str(options.out).rstrip('/')}/{name}"
         if os.path.lexists(out / name) or shown in targets.values():
             what = "is the name of two recordings" if shown in targets.values() else "exists"
@@ -308,19 +386,42 @@ def _write(
     for recording, shown in targets.items():
         plans = [each for each in result.plans if each.recording == recording]
         try:
-            summary = rewrite(
-                root.path(recording), root.path(shown), _conversions(plans, run), progress
-            )
+            conversions = _definitions(result.undefined[recording]) | _conversions(plans, run)
+            source, to = root.path(recording), root.path(shown)
+            summary = rewrite(source, to, conversions, progress, strict=options.strict)
         except (RecordingError, UpgradeError) as error:
             advice = getattr(error, "hint", None)
             report.add(codes.CONVERSION_FAILED.of(recording, str(error), hint=advice))
         else:
-            result.written.append((recording, shown, summary))
+            result.written.append((recording, shown, summary.topics))
+            report.extend(damage_problems(recording, summary.damage))
+            if _has_db3(Path(root.path(recording))):
+                report.notes.append(PLUGIN)
+    report.notes[:] = dict.fromkeys(report.notes)
 
 
-def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Conversion]:
-    """Return the conversion of each topic; raise UpgradeError if rules cannot be run."""
-    conversions: dict[str, Conversion] = {}
+#: The note about MCAP files that were .db3 files.
+PLUGIN = (
+    "the new recordings are MCAP files; ROS 2 Humble plays them if the package "
+    "ros-humble-rosbag2-storage-mcap is installed"
+)
+
+
+def _has_db3(path: Path) -> bool:
+    return path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3")))
+
+
+def _definitions(topics: Iterable[tuple[str, Version]]) -> dict[str, Any]:
+    """Return what adds the definitions of topics that do not change."""
+    return {
+        topic: Conversion(version.key.type, MSG, definition_of(version), version.key.hash)
+        for topic, version in topics
+    }
+
+
+def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Any]:
+    """Return the conversions of each topic; raise UpgradeError if rules cannot be run."""
+    conversions: dict[str, Any] = {}
     ways: dict[int, Payloads] = {}
     for entry in plans:
         plan = entry.plan
@@ -328,15 +429,33 @@ def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Convers
             continue
         convert = None
         if not plan.same:
-            way = ways[id(plan)] = ways.get(id(plan)) or Payloads.of(plan, run)
-            convert = partial(converted, way, entry.topic)
+            way = ways[id(plan)] = ways.get(id(plan)) or Payloads(plan, run)
+            structure = TopicType(dict(plan.old.models), plan.old.name).structure
+            convert = partial(converted, way, structure, entry.topic)
         definition, new = definition_of(plan.new), plan.new.key
-        conversions[entry.topic] = Conversion(new.type, MSG, definition, new.hash, convert)
+        own = Conversion(new.type, MSG, definition, new.hash, convert)
+        if entry.several:
+            others = conversions.get(entry.topic, ())
+            conversions[entry.topic] = (*others, own._replace(old=entry.definition))
+        else:
+            conversions[entry.topic] = own
     return conversions
 
 
 def converted(
-    way: Payloads, topic: str, payloads: Sequence[Any], times: Sequence[int]
+    way: Payloads,
+    structure: Structure,
+    topic: str,
+    payloads: Sequence[Any],
+    times: Sequence[int],
 ) -> list[bytes]:
-    """Return new payloads; errors name the topic and the time of the message."""
+    """Return new payloads; errors name the topic and the time of the message.
+
+    A message that is longer than its type is an error.
+    """
+    unread = unread_bytes(structure, payloads)
+    if unread is not None and (unread > MOST_PADDING).any():
+        number = int((unread > MOST_PADDING).argmax())
+        what = f"{unread[number]:,} bytes that the definition of {structure.name} does not read"
+        raise RecordingError(f"`{topic}` at {times[number]} ns has {what}")
     return way.many(payloads, lambda number: f"`{topic}` at {times[number]} ns")

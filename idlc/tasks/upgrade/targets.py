@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from idlc.api.sources import read_source
 from idlc.compiler.compiler import Compiler, sources_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
@@ -18,6 +19,9 @@ from idlc.project.find import InterfaceFile, find
 from idlc.project.git import GIT, checked_out
 from idlc.project.library import InterfaceTexts, Library
 from idlc.project.settings import Scope
+from idlc.recordings.find import is_recording
+from idlc.recordings.packages import check_versions
+from idlc.recordings.types import topics_of, versions
 from idlc.versions.distribution import PREFIX, is_distro
 from idlc.wire.layout import oversized
 
@@ -93,7 +97,7 @@ class Target:
 
 @contextmanager
 def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[Target | None]:
-    """Give the types that `--to` means; `None` after an error."""
+    """Give the types that `--to` means, such as those of a recording; `None` after an error."""
     if to is None:
         folders = inputs.nearby_packages(scope.root)
         homes = {package: places[0] for package, places in folders.items() if places}
@@ -109,8 +113,18 @@ def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[Target |
         with checked_out(to.removeprefix(GIT), paths[0], scope.root, report) as revision:
             files = revision.files(paths, scope.exclude, report) if revision else ()
             yield _of_files(files, scope, report) if revision else None
+    elif is_recording(to, scope.root):
+        yield _of_recording(to, scope, report)
     else:
         yield _of_files(find([to], scope.root, report, scope.exclude), scope, report)
+
+
+def _of_recording(path: str, scope: Scope, report: Report) -> Target | None:
+    groups = versions(topics_of(read_source, [path], (), scope.root, report) or ())
+    check_versions(groups, report)
+    if report.had_errors:
+        return None
+    return Target(scope, groups[0].texts if groups else {}, {})
 
 
 def _of_files(files: tuple[InterfaceFile, ...], scope: Scope, report: Report) -> Target | None:

@@ -123,6 +123,24 @@ def raw_latched_and_waited_for():
     assert message == String("latched")
 
 
+def readers_take_raw_messages():
+    import idlc
+
+    node, publisher = node_and_string()
+    publisher.publish(String("text"))
+    header = node.create_publisher(Header, "header", LATCHED)
+    plain = Header(frame_id="map").serialize()
+    header.publish(idlc.patch(Header, plain, {"stamp": 5 * 10**9 + 7}))
+    texts, headers = [], []
+    node.create_subscription(String, "topic", texts.append, LATCHED, raw=True)
+    node.create_subscription(Header, "header", headers.append, LATCHED, raw=True)
+    eventually(lambda: texts and headers, node)
+    assert idlc.reader(String, "data")(texts[0]) == "text"
+    read = idlc.reader(Header, "stamp", "stamp.sec", "frame_id", nanoseconds=True)
+    assert read(headers[0]) == (5 * 10**9 + 7, 5, "map")
+    assert raises(ValueError, idlc.reader(Header, "frame_id"), headers[0][:14])
+
+
 def wrong_values_raise_where_they_are_published():
     node, publisher = node_and_string()
     header = node.create_publisher(Header, "header", 1)

@@ -1,4 +1,4 @@
-"""`idlc robot router`."""
+"""`idlc router`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 from idlc.cli import options
 
 
-@click.command("router", epilog=options.example("idlc robot router"))
+@click.command("router", epilog=options.example("idlc router"))
 @click.option(
     "--listen",
     metavar="ENDPOINT",

@@ -1,0 +1,140 @@
+"""Recordings of one type and of several versions, read together."""
+
+import struct
+
+import pytest
+from mcap.writer import Writer
+
+import idlc
+from idlc.cli.main import main
+from idlc.recordings.containers.source import RecordingError
+
+LINE = "=" * 80
+IN = f"{LINE}\nMSG: demo_msgs/In\nfloat64 x\n"
+TIME = f"{LINE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+TOP = "demo_msgs/In a\nbuiltin_interfaces/Time t\n"
+#: Definitions of one type.
+SAME = {
+    "plain": TOP + IN + TIME,
+    "order": TOP + TIME + IN,
+    "comment": TOP.replace("In a\n", "In a  # a comment\n") + IN + TIME,
+    "blanks": TOP.replace("In a\n", "In   a\n\n") + IN + TIME + "\n",
+    "names": TOP.replace("demo_msgs/In", "demo_msgs/msg/In") + IN + TIME,
+    "constant": "uint8 MOST=3\n" + TOP + IN + TIME,
+}
+
+
+def body(value):
+    return b"\0\1\0\0" + struct.pack("<dII", value, 5, 6)
+
+
+def write(path, channels, *, topic="/t"):
+    """Write messages `(definition, time, bytes)`, each definition as a channel of its own."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        numbers = {}
+        for (name, text), time, data in channels:
+            if (name, text) not in numbers:
+                schema = writer.register_schema(name, "ros2msg", text.encode())
+                numbers[name, text] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(numbers[name, text], time, data, time)
+        writer.finish()
+    return str(path)
+
+
+def same(name):
+    return "demo_msgs/msg/Out", SAME[name]
+
+
+@pytest.mark.parametrize("other", [*SAME][1:])
+def test_definitions_of_one_type_are_one(other, tmp_path, capsys):
+    """In two files, and in one, tables, messages, parts and upgrades do not mind the text."""
+    first = write(tmp_path / "a.mcap", [(same("plain"), 1, body(1.0))])
+    second = write(tmp_path / "b.mcap", [(same(other), 2, body(2.0))])
+    both = write(
+        tmp_path / "c.mcap",
+        [(same("plain"), 1, body(1.0)), (same(other), 2, body(2.0)), (same("plain"), 3, body(3.0))],
+    )
+    for place, values in (([first, second], [1.0, 2.0]), (both, [1.0, 2.0, 3.0])):
+        with idlc.Recording(place) as recording:
+            topic = recording["/t"]
+            assert topic.topic.count == len(values)
+            assert topic.to_columns()["a"]["x"].tolist() == values
+            assert topic.to_arrow(flat=True)["a.x"].to_pylist() == values
+            assert [message.a.x for _, message in topic] == values
+            parts = [value for part in topic.parts() for value in part.to_columns()["a"]["x"]]
+            assert parts == values
+            assert topic.between(2, 3).to_columns()["a"]["x"].tolist() == [2.0]
+    assert main(["columns", first, second, "/t", "--format", "csv"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+P1, P2 = ("demo_msgs/msg/P", "uint8 v\n"), ("demo_msgs/msg/P", "uint8 v\nfloat64 w 7\n")
+OTHER = ("demo_msgs/msg/Q", "string s\n")
+
+
+def old(value):
+    return b"\0\1\0\0" + bytes([value])
+
+
+def new(value, more):
+    return b"\0\1\0\0" + struct.pack("<B7xd", value, more)
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "2023.mcap", [(P1, 1, old(1)), (P1, 2, old(2))])
+    write(tmp_path / "2024.mcap", [(P2, 3, new(3, 0.5)), (P2, 4, new(4, 1.5))])
+    write(tmp_path / "both.mcap", [(P1, 1, old(1)), (P2, 2, new(2, 0.5)), (P1, 3, old(3))])
+    write(tmp_path / "two.mcap", [(P1, 1, old(1)), (OTHER, 2, b"\0\1\0\0\2\0\0\0a\0")])
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("place", "values"),
+    [
+        (["2023.mcap", "2024.mcap"], [(1, 7.0), (2, 7.0), (3, 0.5), (4, 1.5)]),
+        (["2024.mcap", "2023.mcap"], [(3, 0.5), (4, 1.5), (1, 7.0), (2, 7.0)]),
+        ("both.mcap", [(1, 7.0), (2, 0.5), (3, 7.0)]),
+    ],
+)
+def test_versions_are_read_as_one(place, values, files):
+    kind = idlc.load("2024.mcap").P
+    with idlc.Recording(place, as_=kind) as recording:
+        topic = recording["/t"]
+        assert [(message.v, message.w) for _, message in topic] == values
+        columns = topic.to_columns()
+        assert [*zip(columns["v"].tolist(), columns["w"].tolist(), strict=True)] == values
+        assert topic.to_arrow(fields=["w"])["w"].to_pylist() == [w for _, w in values]
+        assert topic.topic.count == len(values)
+        rows = [v for part in topic.parts() for v in part.to_columns()["v"].tolist()]
+        assert sorted(rows) == sorted(v for v, _ in values)
+        assert topic.between(2, 4).to_columns()["v"].tolist() == [
+            v for v, _ in values if 2 <= v < 4
+        ]
+
+
+@pytest.mark.parametrize("place", [["2023.mcap", "2024.mcap"], "both.mcap"])
+def test_versions_without_as_are_named(place, files):
+    with idlc.Recording(place) as recording, pytest.raises(RecordingError) as caught:
+        recording["/t"]
+    assert caught.value.message.count("RIHS01_") == 2
+    assert ".mcap" in caught.value.message
+    target = "2024.mcap" if isinstance(place, list) else "PATH"
+    assert f"--to {target} -o upgraded`" in caught.value.hint
+
+
+def test_one_of_two_types_is_selected(files, capsys):
+    with idlc.Recording("two.mcap") as recording:
+        with pytest.raises(RecordingError, match=r"demo_msgs/msg/P, demo_msgs/msg/Q"):
+            recording["/t"]
+        assert recording.topic("/t", "demo_msgs/Q").to_columns()["s"].to_list() == ["a"]
+        with pytest.raises(RecordingError, match="no messages of"):
+            recording.topic("/t", "demo_msgs/msg/R")
+    assert main(["columns", "two.mcap", "/t", "--format", "csv"]) == 1
+    assert "--type" in capsys.readouterr().err
+    words = ["columns", "two.mcap", "/t", "--type", "demo_msgs/msg/P", "--format", "csv"]
+    assert main(words) == 0
+    assert capsys.readouterr().out.splitlines()[0].endswith('"v"')

@@ -1,0 +1,102 @@
+"""Upgrades of recordings with several versions, without definitions, and to another recording."""
+
+import pytest
+
+import idlc
+from idlc.cli.main import main
+from tests.api.test_lengths import humble_range, write_db3
+from tests.api.test_versions_together import P1, P2, SAME, body, new, old, same, write
+from tests.tasks.test_upgrade import write_package
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "2023.mcap", [(P1, 1, old(1)), (P1, 2, old(2))])
+    write(tmp_path / "2024.mcap", [(P2, 3, new(3, 0.5)), (P2, 4, new(4, 1.5))])
+    write(tmp_path / "both.mcap", [(P1, 1, old(1)), (P2, 2, new(2, 0.5)), (P1, 3, old(3))])
+    return tmp_path
+
+
+@pytest.mark.parametrize("first", ["2023.mcap", "both.mcap"])
+def test_a_recording_is_upgraded_to_another(first, files, capsys):
+    """Then both are read together, and a second run changes nothing."""
+    assert main(["upgrade", first, "--to", "2024.mcap", "-o", "up"]) == 0
+    assert main(["columns", f"up/{first}", "2024.mcap", "/t", "--format", "csv"]) == 0
+    capsys.readouterr()
+    assert main(["upgrade", f"up/{first}", "--to", "2024.mcap", "-o", "twice"]) == 0
+    assert "no types changed" in capsys.readouterr().out
+    tables = [idlc.Recording(f"{folder}/{first}")["/t"].to_columns() for folder in ("up", "twice")]
+    assert tables[0]["w"].tolist() == tables[1]["w"].tolist()
+    assert tables[0]["w"].tolist() == ([7.0, 7.0] if first == "2023.mcap" else [7.0, 0.5, 7.0])
+
+
+@pytest.mark.parametrize("other", [*SAME][1:])
+def test_definitions_of_one_type_are_upgraded_together(other, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "a.mcap", [(same("plain"), 1, body(1.0)), (same(other), 2, body(2.0))])
+    texts = {"Out": SAME["plain"].partition("=")[0] + "uint8 more 4\n", "In": "float64 x\n"}
+    write_package(tmp_path / "new", texts, "demo_msgs")
+    assert main(["upgrade", "a.mcap", "--to", "new/demo_msgs", "-o", "up"]) == 0
+    with idlc.Recording("up/a.mcap") as recording:
+        columns = recording["/t"].to_columns()
+    assert columns["a"]["x"].tolist() == [1.0, 2.0]
+    assert columns["more"].tolist() == [4, 4]
+
+
+def test_what_did_not_change_is_said(files, capsys):
+    write_package(files / "other", {"X": "uint8 x\n"}, "other_msgs")
+    assert main(["upgrade", "2023.mcap", "--to", "other/other_msgs", "-o", "up"]) == 0
+    assert capsys.readouterr().out == "2023.mcap → up/2023.mcap\n  no types changed\n"
+
+
+def test_a_database_of_humble_is_converted_once(tmp_path, monkeypatch, capsys):
+    """What is not converted gets its definition, too; the second run changes nothing."""
+    monkeypatch.chdir(tmp_path)
+    topics = [
+        ("/range", "sensor_msgs/msg/Range", [humble_range(2.0)]),
+        ("/text", "std_msgs/msg/String", [b"\0\1\0\0\2\0\0\0a\0"]),
+    ]
+    path = write_db3(tmp_path / "h.db3", topics)
+    words = ["--from", "distro:humble", "--to", "distro:jazzy", "-o"]
+    assert main(["upgrade", path, *words, "up"]) == 0
+    captured = capsys.readouterr()
+    assert "/range: 1 message converted" in captured.out
+    assert "ros-humble-rosbag2-storage-mcap" in captured.err
+    assert main(["upgrade", "up/h.mcap", *words, "twice"]) == 0
+    assert "no types changed" in capsys.readouterr().out
+    with idlc.Recording("twice/h.mcap") as recording:
+        assert all(topic.schema.text and topic.hash for topic in recording.topics)
+        assert recording["/range"].to_columns()["range"].tolist() == [2.0]
+        assert recording["/text"].to_columns()["data"].to_list() == ["a"]
+
+
+def test_recordings_are_compared_with_each_other(files, capsys):
+    assert main(["breaking", "2024.mcap", "--against", "2023.mcap"]) == 1
+    assert "compared 1 interface, 2 recordings" in capsys.readouterr().out
+    assert main(["breaking", "2023.mcap", "--against", "2023.mcap"]) == 0
+    assert main(["breaking", "both.mcap", "--against", "2023.mcap"]) == 1
+
+
+def test_definitions_are_written_as_files(files, capsys):
+    """They compile to the recorded types, and nothing is replaced."""
+    write(files / "a.mcap", [(same("plain"), 1, body(1.0))])
+    assert main(["show", "a.mcap", "--format", "msg", "-o", "defs"]) == 0
+    assert capsys.readouterr().out.split() == [
+        "defs/demo_msgs/msg/Out.msg",
+        "defs/demo_msgs/msg/In.msg",
+        "defs/builtin_interfaces/msg/Time.msg",
+    ]
+    assert (files / "defs/demo_msgs/msg/In.msg").read_text() == "float64 x\n"
+    with idlc.Recording("a.mcap") as recording:
+        digest = recording["/t"].structure.hash
+    assert main(["show", "defs/demo_msgs", "--format", "hash"]) == 0
+    assert digest in capsys.readouterr().out
+    assert main(["show", "a.mcap", "/t", "--format", "msg", "-o", "defs"]) == 0
+    (files / "defs/demo_msgs/msg/In.msg").write_text("mine\n")
+    assert main(["show", "a.mcap", "--format", "msg", "-o", "defs"]) != 0
+    assert (files / "defs/demo_msgs/msg/In.msg").read_text() == "mine\n"
+    assert main(["show", "both.mcap", "--format", "msg", "-o", "both"]) == 1
+    assert "IDL653" in capsys.readouterr().err
+    for words in (["a.mcap", "--format", "msg"], ["a.mcap", "-o", "x"], ["std_msgs", "-o", "x"]):
+        assert main(["show", *words]) == 2
