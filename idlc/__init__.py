@@ -6,6 +6,7 @@ from idlc.version import __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from idlc.api.arrays import to_numpy
     from idlc.api.load import load
     from idlc.api.reader import patch, reader
     from idlc.api.recording import Recording
@@ -22,6 +23,7 @@ __all__ = [
     "reader",
     "split_delimited",
     "split_mcap_chunk",
+    "to_numpy",
     "upgrade",
 ]
 
@@ -35,6 +37,7 @@ _MODULES = {
     "reader": "api.reader",
     "split_delimited": "recordings.batches",
     "split_mcap_chunk": "recordings.batches",
+    "to_numpy": "api.arrays",
     "upgrade": "api.upgrade",
 }
 

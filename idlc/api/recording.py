@@ -14,7 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from idlc.model.distros import BY_NAME, unknown_distro
-from idlc.recordings.containers.compression import missing
+from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     from idlc.api.conditions import Condition
     from idlc.api.upgrade import Upgrade
+    from idlc.recordings.aligned.table import Aligned
     from idlc.recordings.load import TopicType
     from idlc.runtime.typeinfo import Structure
 
@@ -313,6 +314,21 @@ class Selection:
                     _raise(error, self.topic, part[len(values)], done + len(values))
                 done += len(values)
 
+    @property
+    def read_type(self) -> Structure:
+        """The type that messages are read as."""
+        from idlc.recordings.columns.read import type_of
+
+        return type_of(self._source(None))
+
+    def table(self, batch: Messages, fields: Iterable[str] | None, numbers: Any = 0) -> pa.Table:
+        """Return the columns of some messages, whose `numbers` in the recording errors name."""
+        from idlc.recordings.columns import to_arrow
+
+        source, judge = self._source(None), self._on_unread(None, batch)
+        with _at(self.topic, batch.views, numbers):
+            return to_arrow(source, self.read_as(batch), fields, True, True, on_unread=judge)
+
     def to_columns(
         self, kind: Any = None, *, fields: Iterable[str] | None = None, datetimes: bool = False
     ) -> Any:
@@ -414,15 +430,6 @@ def _known(times: Any) -> Any:
     return None if known.all() else arrow().py_buffer(np.packbits(known, bitorder="little"))
 
 
-def arrow() -> Any:
-    """Return pyarrow, or say how to install it."""
-    try:
-        import pyarrow
-    except ImportError:
-        raise missing("pyarrow", "tables are made by Arrow") from None
-    return pyarrow
-
-
 def _each(read: Callable[[Raw], Any], views: list[Raw]) -> tuple[list[Any], Exception | None]:
     """Return what is read of each message, up to the first that raises an error."""
     values: list[Any] = []
@@ -441,8 +448,11 @@ def _raise(error: Exception, topic: Topic, view: Raw, number: int) -> None:
 
 
 @contextmanager
-def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator[None]:
-    """Turn errors in messages into errors that name the message of the recording."""
+def _at(topic: Topic, views: Callable[[], list[Raw]], done: Any = 0) -> Iterator[None]:
+    """Turn errors in messages into errors that name the message of the recording.
+
+    `done` is the number of messages before them, or an array with the number of each.
+    """
     try:
         yield
     except ValueError as caught:
@@ -455,7 +465,8 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
         if why:
             raise RecordingError(*why) from error
         problem = f"{path}: {error.problem}" if path else error.problem
-        what = f"message {done + number} of `{topic.name}` is broken"
+        place = done + number if isinstance(done, int) else done[number]
+        what = f"message {place} of `{topic.name}` is broken"
         raise RecordingError(f"{what}: {problem} at byte {error.offset}") from error
 
 
@@ -642,6 +653,37 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         """Return the paths of the files that have messages of some topics."""
         places = (place for each in group for place in self._container.places(each.topic))
         return list(dict.fromkeys(file.name for file, *_ in places))
+
+    def aligned(
+        self,
+        topics: Mapping[str, Any] | Iterable[str],
+        *,
+        on: str | None = None,
+        every: Any = None,
+        how: Any = "last",
+        tolerance: Any = None,
+        clock: Any = "log",
+        start: Any = None,
+        end: Any = None,
+    ) -> Aligned:
+        """Return a table with a row for each message of topic `on`, or `every` so often.
+
+        >>> topics = {"/camera/image": None, "/joint_states": ["position", "velocity"]}
+        >>> recording.aligned(topics, on="/camera/image", tolerance="50ms").to_arrow()
+
+        `topics` has the fields of each topic, None for all. The value of a tick is that of the
+        `last` message until then, or of the `nearest`, or `linear` between two. It is null without
+        a message within `tolerance`. The `clock` of messages is `log`, or `header` for the stamp of
+        their header. These three are for all topics, or a mapping has them by topic. Lengths of
+        time are `50ms`, `30Hz`, a timedelta, or an int in nanoseconds; `start` and `end` limit the
+        ticks, as for `between`.
+        """
+        from idlc.recordings.aligned.table import aligned
+
+        limits = [
+            None if time is None else moment(time, self._container.start) for time in (start, end)
+        ]
+        return aligned(self, topics, on, every, how, tolerance, clock, (limits[0], limits[1]))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)

@@ -35,12 +35,17 @@ def _dispatch(words: list[str]) -> int:
         from idlc.cli.direct import check_paths
 
         return status_of(lambda: check_paths(tuple(words[1:])))
-    # words that editors add to a server's command have no effect
-    added = all(word == "--stdio" or word.startswith("--clientProcessId=") for word in words[1:])
-    if words[:1] == ["lsp"] and added:
+    if words[:1] == ["lsp"]:
+        words = [word for word in words if not _is_added_by_editor(word)]
+    if words == ["lsp"]:
         from idlc.cli.direct import serve_editor
 
         return status_of(serve_editor)
     from idlc.cli.app import run
 
     return run(words)
+
+
+def _is_added_by_editor(word: str) -> bool:
+    """Return whether a word is one that editors add to a server's command, without an effect."""
+    return word == "--stdio" or word.startswith("--clientProcessId=")

@@ -121,8 +121,9 @@ def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
 def _qos(qos: QoSProfile) -> str:
     """Return a profile in few words, without what is the default."""
     durability = [qos.durability.name.lower()] if qos.is_latched else []
-    kept = "keep_all" if qos.history.name == "KEEP_ALL" else f"depth {qos.depth}"
-    return " ".join((qos.reliability.name.lower(), *durability, kept))
+    history = {"KEEP_LAST": [f"depth {qos.depth}"], "KEEP_ALL": ["keep_all"]}
+    kept = history.get(qos.history.name, [])
+    return " ".join((qos.reliability.name.lower(), *durability, *kept))
 
 
 def _qos_facts(qos: QoSProfile) -> dict[str, Any]:

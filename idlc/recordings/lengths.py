@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from idlc.recordings.containers.file import Topic
-from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
 from idlc.runtime.typeinfo import Structure
+
+if TYPE_CHECKING:  # it imports numpy, which classes do not need
+    from idlc.recordings.containers.messages import Raw
 
 #: Middlewares pad messages to a multiple of four bytes.
 MOST_PADDING = 3

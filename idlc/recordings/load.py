@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import cached_property, lru_cache
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -25,7 +25,6 @@ from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.recordings.containers.container import Topic
-from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
@@ -50,6 +49,9 @@ from idlc.recordings.types import (
 )
 from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import Structure, Types, structure_of
+
+if TYPE_CHECKING:  # it imports numpy, which classes do not need
+    from idlc.recordings.containers.messages import Raw
 
 
 def known_spec(package: str, module: str) -> Any:

@@ -38,11 +38,12 @@ class DurabilityPolicy(IntEnum):
 
 
 class HistoryPolicy(IntEnum):
-    """The kept messages: the last `depth`, or all."""
+    """The kept messages: the last `depth`, or all; Fast DDS does not tell others."""
 
     SYSTEM_DEFAULT = 0
     KEEP_LAST = 1
     KEEP_ALL = 2
+    UNKNOWN = 3
 
 
 class LivelinessPolicy(IntEnum):

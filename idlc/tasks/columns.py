@@ -10,13 +10,14 @@ import sys
 import warnings
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import msgspec
+import numpy as np
 
 from idlc.api.conditions import Condition
 from idlc.api.recording import RecordedTopic, Recording, UnknownTopicError
@@ -33,13 +34,23 @@ if TYPE_CHECKING:
 
 
 def converted(batch: pa.RecordBatch, convert: Callable[[pa.Array], pa.Array]) -> pa.RecordBatch:
-    """Return a batch with each column converted."""
+    """Return a batch with each column converted; what is null stays null."""
     import pyarrow as pa
 
-    columns = list(map(convert, batch.columns))
+    columns = [_apart_from_nulls(column, convert) for column in batch.columns]
     pairs = zip(batch.schema, columns, strict=True)
     schema = pa.schema([field.with_type(column.type) for field, column in pairs])
     return pa.RecordBatch.from_arrays(columns, schema=schema.with_metadata(batch.schema.metadata))
+
+
+def _apart_from_nulls(column: pa.Array, convert: Callable[[pa.Array], pa.Array]) -> pa.Array:
+    import pyarrow as pa
+
+    if not column.null_count:
+        return convert(column)
+    mask = column.is_null().to_numpy(zero_copy_only=False)
+    places = np.maximum(np.cumsum(~mask) - 1, 0)
+    return convert(column.drop_null()).take(pa.array(places, mask=mask))
 
 
 def filled(column: pa.Array) -> pa.Array:
@@ -182,6 +193,8 @@ TEXT = "text"
 
 #: Called with a topic, the number of messages done, and of all.
 Progress = Callable[[str, int, int], None]
+#: Writes files from an open recording.
+Work = Callable[["Recording", "ColumnsOptions", Report, Progress], Iterable["WrittenFile"]]
 
 
 class ColumnsOptions(msgspec.Struct, frozen=True):
@@ -223,10 +236,12 @@ class Job(NamedTuple):
     style: str
 
 
-def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list[WrittenFile]:
+def columns(
+    options: ColumnsOptions, report: Report, progress: Progress, work: Work | None = None
+) -> list[WrittenFile]:
     """Write the columns of topics, each file whole or not at all; return what was written.
 
-    A topic that cannot be read does not keep others from being written.
+    By default, the work is a file for each topic.
     """
     done: list[WrittenFile] = []
     missing: dict[str, list[str]] = {}
@@ -244,9 +259,7 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     ):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            for job in _jobs(recording, options, report):
-                with _problems(options, report):
-                    done += _written(job, options, report, progress)
+            done += (work or _each_topic)(recording, options, report, progress)
         for message in (warning.message for warning in caught):
             if isinstance(message, OtherDefinitionWarning):
                 report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
@@ -258,6 +271,15 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
         report.notes += recording.notes
         report.extend(damage_problems(", ".join(paths), recording.damage))
     return done
+
+
+def _each_topic(
+    recording: Recording, options: ColumnsOptions, report: Report, progress: Progress
+) -> Iterator[WrittenFile]:
+    """Write each topic; one that cannot be read does not keep others from being written."""
+    for job in _jobs(recording, options, report):
+        with _problems(options, report):
+            yield from _written(job, options, report, progress)
 
 
 @contextmanager
@@ -281,7 +303,11 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
         with nullcontext() if options.topics else _problems(options, report):
             topic = recording.topic(name, options.type_name)
             topics.append(topic.between(options.start, options.end))
-    jobs = [_job(topic, options, len(names) > 1) for topic in topics]
+    return checked([_job(topic, options, len(names) > 1) for topic in topics], options, report)
+
+
+def checked(jobs: Sequence[Job], options: ColumnsOptions, report: Report) -> Sequence[Job]:
+    """Return jobs that can be done together, or report why they cannot, and return none."""
     if problem := _problem(jobs, options):
         message, hint = problem
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
@@ -295,6 +321,16 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
     return () if taken else jobs
 
 
+def stdout_style(options: ColumnsOptions) -> str:
+    """Return the format of what goes to standard output."""
+    return options.style or (TEXT if sys.stdout.isatty() else "arrow")
+
+
+def opened(path: str) -> AbstractContextManager[BinaryIO]:
+    """Give the file of a path, or standard output."""
+    return nullcontext(sys.stdout.buffer) if path == STDOUT else whole_file(path)
+
+
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     """Return where a topic goes: to a file in a folder if there are several, or OUT is one."""
     out, dotted = options.out, topic.topic.name.replace("/", ".").lstrip(".")
@@ -302,7 +338,7 @@ def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
     name = re.sub(r"[^\w.-]", "_", dotted, flags=re.ASCII) or "_"
     suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
-        return Job(topic, out, options.style or (TEXT if sys.stdout.isatty() else "arrow"))
+        return Job(topic, out, stdout_style(options))
     if MARK in out:
         return Job(topic, out.replace(MARK, name), options.style or suffix or "")
     if out.endswith("/") or Path(out).is_dir() or (many and not suffix):
@@ -364,7 +400,6 @@ def _written(
             preview.add(batch, plain)
         yield WrittenFile(name, job.path, rows, preview)
         return
-    stdout = nullcontext(sys.stdout.buffer)
-    with stdout if job.path == STDOUT else whole_file(job.path) as file:
+    with opened(job.path) as file:
         write(counted(), reader.schema, file, job.style)
     yield WrittenFile(name, job.path, rows)

@@ -47,13 +47,15 @@ def test_commands_and_programs_do_what_the_page_says(folder):
             assert run(folder, "-m", *command.split(), "--format", "text") in PAGE
         else:
             run(folder, "-m", *command.split())
-    described, read, counted, loaded, averaged = (
+    described, read, counted, loaded, aligned, pictured, averaged = (
         run(folder, "-c", code + AT_ONCE * ("daft" in code)) for code in ALONE
     )
     assert "count    200.0" in described
     assert re.search(r"^/imu +sensor_msgs/msg/Imu +200$", read, re.MULTILINE)
     assert counted.startswith("[(200, 0.")
     assert loaded.endswith("True\n")
+    assert re.fullmatch(r"/imu 3\.33\d* 0\.0\n/joints 3\.33\d* 0\.2\n", aligned)
+    assert pictured == "uint8 3 33\n"
     assert averaged.startswith("{'angular_velocity.z': [0.")
 
 

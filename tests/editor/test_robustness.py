@@ -307,7 +307,7 @@ def test_words_that_clients_add_cost_no_time(words):
 
 
 def test_words_of_clients_go_with_others():
-    words = ["lsp", "--stdio", "--clientProcessId", "7", "--check"]
+    words = ["lsp", "--stdio", "--clientProcessId=7", "--check"]
     done = subprocess.run([sys.executable, "-m", "idlc", *words], capture_output=True, check=True)
     assert json.loads(done.stdout)["serverInfo"]["name"] == "idlc"
 

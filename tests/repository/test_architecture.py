@@ -41,7 +41,7 @@ SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 #: The pages that name the tests which hold the house.
 HOUSE_PAGES = ("architecture.md", "contributing/type-support.md", "contributing/tests.md")
 
-MOST_MODULES = 325
+MOST_MODULES = 330
 MOST_IN_A_FOLDER = 15
 #: The command line has one module for each command; the runtime is one folder in each package.
 CROWDED = {"idlc/cli", "idlc/runtime"}

@@ -1,4 +1,4 @@
-"""A router on loopback, for each test a new one on a free port."""
+"""Middlewares on loopback: for each test a new router on a free port, or a domain of its own."""
 
 import random
 import socket
@@ -8,6 +8,7 @@ import pytest
 
 from idlc.robot.errors import RobotError
 from idlc.robot.session import open_router
+from tests.support.domains import held_domain
 
 #: Below the ports that systems give to programs that ask for any, so that no program gets one of
 #: these between two tries.
@@ -40,3 +41,21 @@ def router():
     session, endpoint = start_router()
     with session:
         yield endpoint
+
+
+def environ_of(address):
+    """Return the variables by which programs without an address use this one."""
+    if address.startswith("dds:"):
+        domain = address.removeprefix("dds:")
+        return {"ROS_DOMAIN_ID": domain, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {"ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{address}"]'}
+
+
+@pytest.fixture(params=["dds", "zenoh"])
+def address(request):
+    """The address of each middleware, where no other test is."""
+    if request.param == "zenoh":
+        yield request.getfixturevalue("router")
+        return
+    with held_domain() as domain:
+        yield f"dds:{domain}"

@@ -3,7 +3,7 @@
 import copy
 import time
 from collections import deque
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Timer
@@ -80,11 +80,12 @@ def standard(name):
 class Robot:
     """A node `/driver` in a session of its own; `close` ends it."""
 
-    def __init__(self, endpoint, node="driver", files=FILES, domain=0):
-        self.session = open_session(endpoint, domain=domain, environ={})
+    def __init__(self, address, node="driver", files=FILES, domain=None):
+        self.address = address
+        self.session = open_session(address, domain=domain, environ={})
         self.transport = self.session.transport
         # another session, so that a test begins when the router knows what the robot announced
-        self.observer = open_session(endpoint, domain=domain, environ={})
+        self.observer = open_session(address, domain=domain, environ={})
         self.files = files
         self.node = node
         self.requests = []
@@ -93,7 +94,8 @@ class Robot:
         self.declared = []
         self.announce(Kind.NODE)
 
-    def announce(self, kind, name="", type_="", hash_=None, qos=None, wait=True):
+    def announce(self, kind, name="", type_="", hash_=None, qos=None, wait=True, declare=None):
+        """Show an entity; `declare` declares its end, without which DDS shows nothing."""
         if hash_ is None:
             hash_ = described(type_, tuple(self.files.items()))[0] if type_ else ""
         entity = Entity(
@@ -108,10 +110,22 @@ class Robot:
             hash=hash_,
             qos=qos or QoSProfile(depth=10),
         )
+        if declare is None and self.address.startswith("dds") and kind is not Kind.NODE:
+            declare = self.declare_idle
+        if declare is not None:
+            self.declared.append(declare(entity))
         self.declared.append(self.transport.announce(entity))
         if wait:
             self.await_count(kind, name, 1)
         return entity
+
+    def declare_idle(self, entity):
+        """Declare an end that neither sends nor answers."""
+        if entity.kind is Kind.PUBLISHER:
+            return self.transport.publisher(entity)
+        if entity.kind is Kind.SERVICE:
+            return self.transport.service(entity, lambda request: request.drop())
+        return self.transport.subscriber(entity, lambda _: None)
 
     def await_count(self, kind, name, count):
         """Wait until the router knows this many entities of the robot's, of any name if empty."""
@@ -131,7 +145,6 @@ class Robot:
         self.like_rosidl = like_rosidl
         waiting = deque(maxlen=10)
         service = standard(DESCRIBE)
-        entity = self.announce(Kind.SERVICE, f"/{self.node}/get_type_description", DESCRIBE)
 
         def receive(request):
             waiting.append(request)  # what is dropped for it ends without a reply
@@ -147,7 +160,9 @@ class Robot:
             else:
                 request.drop()
 
-        self.declared.append(self.transport.service(entity, receive if like_rosidl else reply))
+        name, callback = f"/{self.node}/get_type_description", receive if like_rosidl else reply
+        declare = partial(self.transport.service, callback=callback)
+        self.announce(Kind.SERVICE, name, DESCRIBE, declare=declare)
 
     def description(self, service, asked):
         hash_, description, interface = described(asked.type_name, tuple(self.files.items()))
@@ -173,9 +188,9 @@ class Robot:
 
     def publisher(self, name, type_, qos=None, hash_=None):
         """Return a function that publishes a message or bytes."""
-        entity = self.announce(Kind.PUBLISHER, name, type_, hash_, qos)
-        sender = self.transport.publisher(entity)
-        self.declared.append(sender)
+        declare = self.transport.publisher
+        entity = self.announce(Kind.PUBLISHER, name, type_, hash_, qos, declare=declare)
+        sender = self.declared[-2]
         count = iter(range(1, 1 << 30))
 
         def publish(message, attachment=None):
@@ -188,7 +203,6 @@ class Robot:
 
     def service(self, name, type_, kind, answer):
         """Serve requests of class `kind.Request`; `answer` returns a response or bytes."""
-        entity = self.announce(Kind.SERVICE, name, type_)
 
         def reply(request):
             made = answer(kind.Request.deserialize(request.payload))
@@ -198,7 +212,8 @@ class Robot:
                 data = made if isinstance(made, bytes) else made.serialize()
                 request.reply(data, request.attachment)
 
-        self.declared.append(self.transport.service(entity, reply))
+        declare = partial(self.transport.service, callback=reply)
+        self.announce(Kind.SERVICE, name, type_, declare=declare)
 
     def action(self, name, type_):
         """Announce the five parts of an action server."""

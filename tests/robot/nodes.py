@@ -37,7 +37,7 @@ def spin_until(condition, *nodes):
 
 
 def pass_on(left, right):
-    """Return when the router has passed on all that `left` sent so far."""
+    """Return when the router has passed on all that `left`, a session on Zenoh, sent so far."""
     passed = SimpleQueue()
     right.transport.subscriber(Keyed("0/last", QoSProfile(depth=1)), passed.put)
     last = left.transport.publisher(Keyed("0/last", QoSProfile(depth=1)))

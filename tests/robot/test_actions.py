@@ -29,9 +29,9 @@ RESULT = Fibonacci.Impl.GetResultService
 
 
 @pytest.fixture
-def pair(router):
+def pair(address):
     """The nodes of a server and of a client, in two sessions."""
-    with node_at(router, "server") as server, node_at(router, "client") as client:
+    with node_at(address, "server") as server, node_at(address, "client") as client:
         yield server, client
 
 
@@ -206,12 +206,12 @@ def test_a_deferred_goal_begins_when_the_node_wants(pair):
     assert ends.result(handle.get_result_async()).status == GoalState.SUCCEEDED
 
 
-def test_late_clients_get_the_states_of_goals(pair, router):
+def test_late_clients_get_the_states_of_goals(pair, address):
     ends = Ends(pair)
     ends.send()
     ends.until(lambda: ends.goals)
     states = []
-    with node_at(router, "late") as late:
+    with node_at(address, "late") as late:
         kind = standard("action_msgs/msg/GoalStatusArray").kind
         late.create_subscription(kind, "count/_action/status", states.append, LATCHED)
         spin_until(
@@ -230,9 +230,9 @@ def test_results_are_forgotten_after_their_time(pair):
     assert ends.result(handle.get_result_async()).status == GoalState.UNKNOWN
 
 
-def test_a_server_that_goes_is_noticed(router):
-    with node_at(router, "client") as client:
-        with node_at(router, "server") as server:
+def test_a_server_that_goes_is_noticed(address):
+    with node_at(address, "client") as client:
+        with node_at(address, "server") as server:
             ends = Ends((server, client))
             handle = ends.send()
             future = handle.get_result_async()
@@ -241,13 +241,13 @@ def test_a_server_that_goes_is_noticed(router):
         assert not future.done() or future.exception()
 
 
-def test_a_client_that_goes_disturbs_nobody(router):
-    with node_at(router, "server") as server:
-        with node_at(router, "client") as client:
+def test_a_client_that_goes_disturbs_nobody(address):
+    with node_at(address, "server") as server:
+        with node_at(address, "client") as client:
             ends = Ends((server, client))
             ends.send().get_result_async()
             ends.until(lambda: ends.goals)
-        with node_at(router, "another") as another:
+        with node_at(address, "another") as another:
             other = ActionClient(another, Fibonacci, "count")
             spin_until(other.server_is_ready, server, another)
             ends.release.set_result(None)
@@ -258,11 +258,11 @@ def test_a_client_that_goes_disturbs_nobody(router):
             assert future.result().status == GoalState.SUCCEEDED
 
 
-def test_names_of_actions_are_replaced(router):
+def test_names_of_actions_are_replaced(address):
     arguments = ["--ros-args", "-r", "count:=/other/count"]
     with (
-        node_at(router, "server", cli_args=arguments) as server,
-        node_at(router, "client") as client,
+        node_at(address, "server", cli_args=arguments) as server,
+        node_at(address, "client") as client,
     ):
         ActionServer(server, Fibonacci, "count", lambda _: Fibonacci.Result())
         spin_until(ActionClient(client, Fibonacci, "/other/count").server_is_ready, client)

@@ -1,6 +1,5 @@
 """Nodes of idlc.robot on DDS, over sockets on loopback, in participants of their own."""
 
-import random
 import subprocess
 import sys
 
@@ -11,6 +10,7 @@ from idlc.robot import ActionClient, ActionServer, DurabilityPolicy, QoSProfile
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Kind
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
+from tests.support.domains import held_domain
 from tests.support.waiting import wait_for
 
 LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -19,9 +19,11 @@ Fibonacci = idlc.load("test_msgs/action/Fibonacci")["test_msgs/action/Fibonacci"
 
 @pytest.fixture
 def pair():
-    # the domains of the tests with rclpy are below
-    address = f"dds:{random.SystemRandom().randrange(102, 230)}"
-    with node_at(address, "left") as left, node_at(address, "right") as right:
+    with (
+        held_domain() as domain,
+        node_at(f"dds:{domain}", "left") as left,
+        node_at(f"dds:{domain}", "right") as right,
+    ):
         yield left, right
 
 
@@ -100,7 +102,7 @@ print(received[0].data)
 
 
 def test_a_first_message_needs_no_other_package():
-    domain = random.SystemRandom().randrange(102, 230)
-    command = [sys.executable, "-c", BARE, f"dds:{domain}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=True)
+    with held_domain() as domain:
+        command = [sys.executable, "-c", BARE, f"dds:{domain}"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=True)
     assert done.stdout == "hello\n"

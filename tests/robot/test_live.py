@@ -25,40 +25,40 @@ def _in_folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def robot(router):
-    with running(router) as robot:
+def robot(address):
+    with running(address) as robot:
         robot.describe_types()
         yield robot
 
 
 @contextmanager
-def running(router, *arguments):
-    robot = Robot(router, *arguments)
+def running(address, *arguments):
+    robot = Robot(address, *arguments)
     try:
         yield robot
     finally:
         robot.close()
 
 
-def test_the_types_that_a_robot_uses_are_compiled(robot, router, capsys):
+def test_the_types_that_a_robot_uses_are_compiled(robot, address, capsys):
     robot.publisher("/drive", "demo_msgs/msg/Drive")
     robot.publisher("/nothing", "demo_msgs/msg/Nothing")
     robot.announce(Kind.SERVICE, "/gear", "demo_msgs/srv/Gear")
     robot.action("/move", "demo_msgs/action/Move")
-    assert main(["gen", router, "-o", "out"]) == 0
+    assert main(["gen", address, "-o", "out"]) == 0
     assert "demo_msgs: 5 interfaces" in capsys.readouterr().out
     assert "[m/s]" in Path("out/demo_msgs/msg/_wheel.py").read_text(encoding="utf-8")
-    assert main(["check", router]) == 0
+    assert main(["check", address]) == 0
     write_files("mine")
-    assert main(["breaking", "mine", "--against", router]) == 0
+    assert main(["breaking", "mine", "--against", address]) == 0
     write_files("mine", {**FILES, "srv/Gear.srv": "int8 gear\n---\nbool done\n"})
-    assert main(["breaking", "mine", "--against", router]) == 1
+    assert main(["breaking", "mine", "--against", address]) == 1
     out = capsys.readouterr().out
     assert "`demo_msgs/srv/Gear_Request` has 2 versions: in `/driver`; in your files" in out
     assert "field `wheel` was added" in out
 
 
-def test_definitions_with_another_hash_are_refused(router, capsys):
+def test_definitions_with_another_hash_are_refused(address, capsys):
     service = standard("type_description_interfaces/srv/GetTypeDescription")
 
     def lie(asked):
@@ -67,10 +67,10 @@ def test_definitions_with_another_hash_are_refused(router, capsys):
             {"successful": True, "type_sources": [{"type_name": asked.type_name, **source}]}
         ).serialize()
 
-    with running(router) as robot:
+    with running(address) as robot:
         robot.describe_types(lie)
         robot.publisher("/drive", "demo_msgs/msg/Drive")
-        assert main(["gen", router, "-o", "out"]) == 0
+        assert main(["gen", address, "-o", "out"]) == 0
     assert not Path("out/demo_msgs").exists()
     err = capsys.readouterr().err
     assert "idlc skips `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
@@ -78,15 +78,15 @@ def test_definitions_with_another_hash_are_refused(router, capsys):
 
 
 @pytest.mark.parametrize("reply", [b"", b"\0", b"\0\1\0\0" + b"\xff" * 50, b"x" * 5_000_000])
-def test_garbage_instead_of_definitions_is_reported(router, capsys, reply):
-    with running(router) as robot:
+def test_garbage_instead_of_definitions_is_reported(address, capsys, reply):
+    with running(address) as robot:
         robot.describe_types(lambda _: reply)
         robot.publisher("/drive", "demo_msgs/msg/Drive")
-        assert main(["check", router]) == 0
+        assert main(["check", address]) == 0
     assert "does not define `demo_msgs/msg/Drive`" in capsys.readouterr().out
 
 
-def test_sources_cannot_name_files(router, tmp_path):
+def test_sources_cannot_name_files(address, tmp_path):
     service = standard("type_description_interfaces/srv/GetTypeDescription")
 
     def lie(asked):
@@ -96,25 +96,25 @@ def test_sources_cannot_name_files(router, tmp_path):
             {"successful": True, "type_sources": [{"type_name": n, **source} for n in names]}
         ).serialize()
 
-    with running(router) as robot:
+    with running(address) as robot:
         robot.describe_types(lie)
         robot.publisher("/nothing", "demo_msgs/msg/Nothing")
-        assert main(["gen", router, "-o", "out"]) == 0
+        assert main(["gen", address, "-o", "out"]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert not [path for path in Path("out").rglob("*") if "vil" in path.name]
 
 
-def test_the_graph_is_shown_with_what_does_not_fit(robot, router, capsys):
+def test_the_graph_is_shown_with_what_does_not_fit(robot, address, capsys):
     robot.publisher("/drive", "demo_msgs/msg/Drive")
     robot.publisher("/nothing", "demo_msgs/msg/Nothing")
     robot.action("/move", "demo_msgs/action/Move")
-    with running(router, "teleop", {**FILES, "msg/Drive.msg": "int8 x\n"}) as other:
+    with running(address, "teleop", {**FILES, "msg/Drive.msg": "int8 x\n"}) as other:
         other.announce(Kind.SUBSCRIPTION, "/drive", "demo_msgs/msg/Drive")
         other.announce(Kind.SUBSCRIPTION, "/nothin", "demo_msgs/msg/Nothing")
         other.announce(Kind.SUBSCRIPTION, "/hum", "demo_msgs/msg/Humble", "")
-        assert main(["show", router]) == 0
+        assert main(["show", address]) == 0
         text = capsys.readouterr().out
-        assert main(["show", router, "--format", "json"]) == 0
+        assert main(["show", address, "--format", "json"]) == 0
         facts = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert "mismatch: /drive: /driver → /teleop differ in hash" in text
     assert "similar names: /nothing has no receiver, and /nothin no sender" in text
@@ -123,24 +123,25 @@ def test_the_graph_is_shown_with_what_does_not_fit(robot, router, capsys):
     assert (action["name"], action["receivers"]) == ("/move", ["/driver"])
 
 
-def test_a_slow_robot_is_noted(robot, router, capsys, monkeypatch):
+def test_a_slow_robot_is_noted(robot, address, capsys, monkeypatch):
     def too_late(*_):
         raise TimeoutError
         yield
 
-    monkeypatch.setattr("idlc.robot.zenoh_transport.ZenohTransport.tokens", too_late)
-    assert main(["show", router]) == 0
+    for name in ("zenoh_transport.ZenohTransport", "dds.transport.DdsTransport"):
+        monkeypatch.setattr(f"idlc.robot.{name}.tokens", too_late)
+    assert main(["show", address]) == 0
     assert "the robot answers too slowly; endpoints may be missing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("style", ["yaml", "json", "csv"])
-def test_messages_are_printed_and_malformed_ones_counted(robot, router, capsys, style):
+def test_messages_are_printed_and_malformed_ones_counted(robot, address, capsys, style):
     string = standard("std_msgs/msg/String")
     publish = robot.publisher("/words", "std_msgs/msg/String", LATCHED)
     publish(b"\0\1\0\0\xff\xff")
     for word in ("one", "two"):
         publish(string(data=word))
-    assert main(["echo", router, "words", "--count", "3", "--format", style]) == 0
+    assert main(["echo", address, "words", "--count", "3", "--format", style]) == 0
     out, err = capsys.readouterr()
     expected = {
         "yaml": "{data: one}\n---\n{data: two}\n---\n",
@@ -151,12 +152,12 @@ def test_messages_are_printed_and_malformed_ones_counted(robot, router, capsys, 
     assert "1 malformed messages" in err
 
 
-def test_fields_are_printed_without_the_rest(robot, router, capsys):
+def test_fields_are_printed_without_the_rest(robot, address, capsys):
     kind = standard("sensor_msgs/msg/JointState")
     publish = robot.publisher("/joints", "sensor_msgs/msg/JointState", LATCHED)
     for count in (0, 2):
         publish(kind(name=["a", "b"][:count], position=[0.5] * count))
-    words = ["echo", router, "/joints", "--count", "2", "--format", "json", "--fields"]
+    words = ["echo", address, "/joints", "--count", "2", "--format", "json", "--fields"]
     assert main([*words, "name[1], position,header.stamp"]) == 0
     assert list(map(json.loads, capsys.readouterr().out.splitlines())) == [
         {"name[1]": None, "position": [], "header.stamp": {"sec": 0, "nanosec": 0}},
@@ -166,20 +167,20 @@ def test_fields_are_printed_without_the_rest(robot, router, capsys):
     assert "did you mean `position`?" in capsys.readouterr().err
 
 
-def test_unknown_names_and_robots_are_errors(robot, router, capsys):
+def test_unknown_names_and_robots_are_errors(robot, address, capsys):
     robot.publisher("/words", "std_msgs/msg/String")
-    assert main(["echo", router, "/word"]) == 2
+    assert main(["echo", address, "/word"]) == 2
     assert "did you mean `/words`?" in capsys.readouterr().err
-    assert main(["call", router, "/word"]) == 2
-    assert main(["record", router, "-o", "a.mcap", "/word"]) == 2
+    assert main(["call", address, "/word"]) == 2
+    assert main(["record", address, "-o", "a.mcap", "/word"]) == 2
     assert not Path("a.mcap").exists()
     assert main(["show", "tcp/localhost"]) == 2
     assert "IDL642" in capsys.readouterr().err
-    assert main(["columns", router]) != 0
+    assert main(["columns", address]) != 0
     assert "idlc record" in capsys.readouterr().err
 
 
-def test_requests_are_checked_before_they_are_sent(robot, router, capsys):
+def test_requests_are_checked_before_they_are_sent(robot, address, capsys):
     gear = demo_classes().demo_msgs.srv.Gear
     seen = []
 
@@ -190,15 +191,15 @@ def test_requests_are_checked_before_they_are_sent(robot, router, capsys):
     robot.service("/gear", "demo_msgs/srv/Gear", gear, answer)
     wrong = ("gear=300", "gear=x", "gear", "wheel.x=1", "wheel.code=[1,2]", "gear.x=1", "wheel=1")
     for word in wrong:
-        assert main(["call", router, "/gear", word]) == 2, word
+        assert main(["call", address, "/gear", word]) == 2, word
     assert seen == []
     capsys.readouterr()
     words = ["gear=3", "wheel.speed=2.5", "wheel.code=[1,2,3]", "--format", "json"]
-    assert main(["call", router, "gear", *words]) == 0
+    assert main(["call", address, "gear", *words]) == 0
     assert json.loads(capsys.readouterr().out) == {"done": True, "reason": "3 2.5"}
 
 
-def test_a_recording_is_read_by_idlc_and_mcap(robot, router, capsys, monkeypatch):
+def test_a_recording_is_read_by_idlc_and_mcap(robot, address, capsys, monkeypatch):
     drive = demo_classes().demo_msgs.msg.Drive
     publish = robot.publisher("/drive", "demo_msgs/msg/Drive", LATCHED)
     for gear in range(3):
@@ -214,8 +215,8 @@ def test_a_recording_is_read_by_idlc_and_mcap(robot, router, capsys, monkeypatch
         "run",
         lambda self, is_over: run(self, lambda: is_over() or written(self)),
     )
-    assert main(["record", router, "-o", "a.mcap", "/drive", "--duration", "60"]) == 0
-    assert main(["record", router, "-o", "b.mcap", "/drive", "--duration", "0.01"]) == 0
+    assert main(["record", address, "-o", "a.mcap", "/drive", "--duration", "60"]) == 0
+    assert main(["record", address, "-o", "b.mcap", "/drive", "--duration", "0.01"]) == 0
     assert Path("b.mcap").stat().st_size > 0
     assert signal.getsignal(signal.SIGTERM) == handler
     with Recording("a.mcap") as recording:
@@ -224,14 +225,14 @@ def test_a_recording_is_read_by_idlc_and_mcap(robot, router, capsys, monkeypatch
         (channel,) = make_reader(file).get_summary().channels.values()
         assert "durability: transient_local" in channel.metadata["offered_qos_profiles"]
         assert channel.metadata["topic_type_hash"].startswith("RIHS01_")
-    assert main(["record", router, "-o", "a.mcap", "--duration", "1"]) == 1
+    assert main(["record", address, "-o", "a.mcap", "--duration", "1"]) == 1
     assert "exists" in capsys.readouterr().err
 
 
-def test_a_robot_with_many_endpoints_is_shown(robot, router, capsys):
+def test_a_robot_with_many_endpoints_is_shown(robot, address, capsys):
     for number in range(2000):
         robot.announce(Kind.PUBLISHER, f"/t{number}", "std_msgs/msg/String", wait=False)
     robot.await_count(Kind.PUBLISHER, "", 2000)
-    assert main(["show", router, "--format", "json"]) == 0
+    assert main(["show", address, "--format", "json"]) == 0
     assert capsys.readouterr().out.count('"type": "topic"') == 2000
     assert threading.active_count() < 100

@@ -32,8 +32,8 @@ def _in_folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def robot(router):
-    robot = Robot(router, files=FILES)
+def robot(address):
+    robot = Robot(address, files=FILES)
     robot.describe_types(like_rosidl=True)
     for name in ("Limit", "Retry", "Tab"):
         robot.publisher(f"/{name.lower()}", f"demo_msgs/msg/{name}")
@@ -41,8 +41,8 @@ def robot(router):
     robot.close()
 
 
-def test_nothing_wrong_is_taken_from_damaged_definitions(robot, router, capsys):
-    assert main(["gen", router, "-o", "out"]) == 0
+def test_nothing_wrong_is_taken_from_damaged_definitions(robot, address, capsys):
+    assert main(["gen", address, "-o", "out"]) == 0
     texts = {
         path.stem: path.read_text(encoding="utf-8")
         for path in Path("out/demo_msgs/msg").glob("_*.py")
@@ -54,21 +54,21 @@ def test_nothing_wrong_is_taken_from_damaged_definitions(robot, router, capsys):
     err = capsys.readouterr().err
     assert "constants, default values and comments may be missing in `demo_msgs/msg/Limit`" in err
     assert "-I DIR" in err
-    assert main(["show", router, "/limit"]) == 0
+    assert main(["show", address, "/limit"]) == 0
     assert "LIMIT" not in capsys.readouterr().out
 
 
-def test_definitions_with_constants_are_taken_from_this_machine(robot, router, capsys):
+def test_definitions_with_constants_are_taken_from_this_machine(robot, address, capsys):
     write_files("mine", FILES)
-    assert main(["gen", router, "-o", "out", "-I", "mine"]) == 0
+    assert main(["gen", address, "-o", "out", "-I", "mine"]) == 0
     assert "LIMIT" in Path("out/demo_msgs/msg/_limit.py").read_text(encoding="utf-8")
     assert "missing" not in capsys.readouterr().err
 
 
-def test_what_is_missing_is_no_change(robot, router, capsys):
+def test_what_is_missing_is_no_change(robot, address, capsys):
     longer = {name: f"{text}\nint8 more\n" for name, text in FILES.items() if "msg" in name}
     write_files("mine", longer)
-    assert main(["breaking", "mine", "--against", router]) == 1
+    assert main(["breaking", "mine", "--against", address]) == 1
     out = capsys.readouterr().out
     assert "field `more` was added" in out
     assert "constant `" not in out
@@ -76,13 +76,13 @@ def test_what_is_missing_is_no_change(robot, router, capsys):
     assert "idlc compares no constants and default values of `demo_msgs/msg/Limit`" in out
 
 
-def test_a_node_is_asked_again_for_what_it_dropped(router, capsys):
+def test_a_node_is_asked_again_for_what_it_dropped(address, capsys):
     files = {f"msg/T{number}.msg": f"int32 f{number}\n" for number in range(40)}
-    robot = Robot(router, files=files)
+    robot = Robot(address, files=files)
     robot.describe_types(like_rosidl=True)
     for number in range(40):
         robot.publisher(f"/t{number}", f"demo_msgs/msg/T{number}")
-    assert main(["check", router]) == 0
+    assert main(["check", address]) == 0
     assert "no problems" in capsys.readouterr().out
     robot.close()
 

@@ -1,4 +1,4 @@
-"""Nodes as programs: they meet at a router, and signals end them without a trace."""
+"""Nodes as programs: they meet, and signals end them without a trace."""
 
 import signal
 import subprocess
@@ -47,18 +47,18 @@ main()
 
 
 @pytest.fixture
-def program(router, tmp_path):
+def program(address, tmp_path):
     """A started program, of which the node's name is replaced."""
     file = tmp_path / "talker.py"
     file.write_text(PROGRAM, encoding="utf-8")
-    command = [sys.executable, file, router, "--ros-args", "-r", "__ns:=/robot", "--"]
+    command = [sys.executable, file, address, "--ros-args", "-r", "__ns:=/robot", "--"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         yield process
         process.kill()
 
 
-def test_two_programs_meet_at_a_router(router, program):
-    with node_at(router, "listener") as node:
+def test_two_programs_meet_at_a_router(address, program):
+    with node_at(address, "listener") as node:
         received = []
         node.create_subscription(String, "/robot/chatter", received.append, 10)
         client = node.create_client(SetBool, "/robot/set")
@@ -73,8 +73,8 @@ def talkers(graph):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signals_end_a_program_without_a_trace(router, program, number):
-    with node_at(router, "listener") as node:
+def test_signals_end_a_program_without_a_trace(address, program, number):
+    with node_at(address, "listener") as node:
         names = {"/robot/chatter"}
         graph = node.graph
         assert graph.wait_for(lambda _: names <= {*graph.types(Kind.PUBLISHER)}, LONG)
@@ -96,7 +96,7 @@ WAITING = {
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("kind", WAITING)
-def test_a_blocked_call_ends_with_the_program(router, tmp_path, kind, number):
+def test_a_blocked_call_ends_with_the_program(address, tmp_path, kind, number):
     wait, name = WAITING[kind]
     file = tmp_path / "waiting.py"
     file.write_text(
@@ -111,8 +111,8 @@ def test_a_blocked_call_ends_with_the_program(router, tmp_path, kind, number):
         "except KeyboardInterrupt:\n"
         "    pass\n"
     )
-    with node_at(router, "listener") as node:
-        command = [sys.executable, file, router]
+    with node_at(address, "listener") as node:
+        command = [sys.executable, file, address]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
             try:
                 assert node.graph.wait_for(lambda graph: graph.count(Kind.CLIENT, name), LONG)
@@ -124,7 +124,7 @@ def test_a_blocked_call_ends_with_the_program(router, tmp_path, kind, number):
         assert node.graph.wait_for(lambda graph: not graph.count(Kind.CLIENT, name), LONG)
 
 
-def test_an_exception_of_a_callback_ends_a_program(router, tmp_path):
+def test_an_exception_of_a_callback_ends_a_program(address, tmp_path):
     file = tmp_path / "failing.py"
     file.write_text(
         "import sys\n"
@@ -135,7 +135,7 @@ def test_an_exception_of_a_callback_ends_a_program(router, tmp_path):
         "spin(node)\n"
     )
     done = subprocess.run(
-        [sys.executable, file, router], capture_output=True, text=True, timeout=LONG, check=False
+        [sys.executable, file, address], capture_output=True, text=True, timeout=LONG, check=False
     )
     assert done.returncode == 1
     assert "ZeroDivisionError" in done.stderr

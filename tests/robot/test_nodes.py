@@ -1,4 +1,4 @@
-"""Nodes: topics, services, streams, events and the graph, over the real Zenoh on loopback."""
+"""Nodes: topics, services, streams, events and the graph, over each middleware on loopback."""
 
 import asyncio
 import gc
@@ -27,7 +27,7 @@ from idlc.robot.nodes.interfaces import _HASHES, interface_of, standard
 from idlc.runtime.names import ValidationError
 from idlc.runtime.typeinfo import types_of
 from tests.robot.conftest import start_router
-from tests.robot.nodes import LONG, SetBool, String, node_at, pass_on, spin_until
+from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
 from tests.support.generated import importable, write_package
 from tests.support.waiting import join
 
@@ -35,9 +35,9 @@ LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture
-def pair(router):
+def pair(address):
     """Two nodes in two sessions."""
-    with node_at(router, "left") as left, node_at(router, "right") as right:
+    with node_at(address, "left") as left, node_at(address, "right") as right:
         yield left, right
 
 
@@ -102,7 +102,9 @@ def test_latched_messages_reach_late_subscriptions(pair, reliability):
     publisher = left.create_publisher(String, "map", profile)
     for number in range(5):
         publisher.publish(String(data=str(number)))
-    pass_on(left.session, right.session)
+    passed, last = [], left.create_publisher(String, "last", 1)
+    right.create_subscription(String, "last", passed.append, 1)
+    spin_until(lambda: last.publish(String()) or passed, right)  # all others arrived before
     received = []
     right.create_subscription(String, "map", received.append, profile)
     spin_until(lambda: len(received) == 2, right)
@@ -114,7 +116,8 @@ def test_any_thread_may_publish(pair):
     samples = []
     publisher = left.create_publisher(String, "chatter", 10)
     right.create_subscription(String, "chatter", lambda _: None, 10)
-    right.transport.subscriber(publisher.entity, samples.append)
+    end = publisher.entity.replace(id=right.session.next_id(), kind=Kind.SUBSCRIPTION)
+    right.transport.subscriber(end, samples.append)
     spin_until(publisher.get_subscription_count, left)
 
     def publish():
@@ -355,7 +358,7 @@ def test_the_graph_is_listed_as_in_rclpy(pair):
     assert left.count_subscribers("chatter") == 0
 
 
-def test_names_are_as_rclpy_forms_them(router):
+def test_names_are_as_rclpy_forms_them(address):
     arguments = [
         "-r",
         "__node:=b",
@@ -366,7 +369,7 @@ def test_names_are_as_rclpy_forms_them(router):
         "-r",
         "s:=t",
     ]
-    with node_at(router, "a", namespace="n", cli_args=arguments) as node:
+    with node_at(address, "a", namespace="n", cli_args=arguments) as node:
         assert node.get_fully_qualified_name() == "/x/b"
         assert (node.get_name(), node.get_namespace()) == ("b", "/x")
         assert node.get_logger().name == "x.b"
@@ -375,9 +378,9 @@ def test_names_are_as_rclpy_forms_them(router):
         assert node.create_client(SetBool, "s").srv_name == "/x/t"
         assert node.resolve_topic_name("~/s") == "/x/b/s"
         assert node.resolve_service_name("s") == "/x/t"
-    with node_at(router, "a", namespace="n") as node:
+    with node_at(address, "a", namespace="n") as node:
         assert node.get_fully_qualified_name() == "/n/a"
-    session = open_session(router, environ={}, timeout=LONG)
+    session = open_session(address, environ={}, timeout=LONG)
     with session, pytest.raises(InvalidNameError, match="`a b` is not the name of a node"):
         Node("a b", session=session)
 
@@ -426,11 +429,11 @@ def test_announced_hashes_are_those_of_the_catalogue(name):
     assert standard(name).hash == types_of(standard(name).kind).hashes[name]
 
 
-def test_nothing_is_compiled_before_it_is_used(router):
+def test_nothing_is_compiled_before_it_is_used(address):
     code = f"""
 import sys
 from idlc.robot import Node, open_session
-with open_session({router!r}, environ={{}}) as session:
+with open_session({address!r}, environ={{}}) as session:
     node = Node("x", session=session)
     print("idlc.recordings.load" in sys.modules)
     node.get_logger().info("x")
@@ -482,16 +485,16 @@ def test_clock_simulates_the_time(pair):
     assert right.get_clock().now().seconds_nanoseconds()[0] > 10**9
 
 
-def test_use_sim_time_is_a_bool(router):
+def test_use_sim_time_is_a_bool(address):
     with (
         pytest.raises(RobotError, match=r"not a bool \(write `-p use_sim_time:=true`\)"),
-        node_at(router, "a", cli_args=["-p", "use_sim_time:=1"]),
+        node_at(address, "a", cli_args=["-p", "use_sim_time:=1"]),
     ):
         pass
 
 
-def test_use_sim_time_is_an_argument(router):
-    with node_at(router, "a", cli_args=["-p", "use_sim_time:=true"]) as node:
+def test_use_sim_time_is_an_argument(address):
+    with node_at(address, "a", cli_args=["-p", "use_sim_time:=true"]) as node:
         assert node.get_clock().simulated == 0
 
 
@@ -526,10 +529,10 @@ def start_router_at(endpoint):
     return open_router([endpoint], environ={})
 
 
-def test_a_destroyed_node_is_forgotten(router):
+def test_a_destroyed_node_is_forgotten(address):
     import weakref
 
-    with node_at(router, "left") as left:
+    with node_at(address, "left") as left:
         other = Node("other", context=left.context)
         other.create_subscription(String, "chatter", lambda _: None, 10)
         other.create_service(SetBool, "set", answer)

@@ -15,6 +15,7 @@ import pytest
 import idlc
 from idlc.cli.main import main
 from idlc.robot.offer import OFFERED
+from tests.robot.conftest import environ_of
 from tests.robot.nodes import LONG, node_at
 from tests.support.paths import EXAMPLE, GOLDEN, ROOT
 from tests.support.waiting import wait_for
@@ -77,13 +78,13 @@ class Program:
 
 
 @pytest.fixture
-def start(site, router, tmp_path):
+def start(site, address, tmp_path):
     """Return a function that starts a program in the example's folder."""
     programs = []
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)]),
-        "ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{router}"]',
+        **environ_of(address),
     }
 
     def started(*words, cwd=EXAMPLE):
@@ -287,10 +288,10 @@ def test_scaffolded_publishers_subscribers_timers_and_parameters(start, package)
 
 
 @pytest.mark.long
-def test_scaffolded_parameters_are_set_from_outside(start, package, router):
+def test_scaffolded_parameters_are_set_from_outside(start, package, address):
     talker = start("demo/talker.py", "--ros-args", "-p", "speed:=2.5", cwd=package)
     kind = idlc.load("rcl_interfaces/srv/GetParameters").GetParameters
-    with node_at(router, "observer") as node:
+    with node_at(address, "observer") as node:
         client = node.create_client(kind, "/talker/get_parameters")
         assert client.wait_for_service(timeout_sec=LONG), talker.output
         response = client.call(kind.Request(names=["speed", "names"]), LONG)

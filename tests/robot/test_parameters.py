@@ -19,15 +19,15 @@ ROS = idlc.load("rcl_interfaces").rcl_interfaces
 
 
 @pytest.fixture
-def node(router):
-    with node_at(router, "tuned", namespace="/ns") as node:
+def node(address):
+    with node_at(address, "tuned", namespace="/ns") as node:
         yield node
 
 
 @pytest.fixture
-def ask(node, router):
+def ask(node, address):
     """Return a function that calls a service of the node's parameters from another session."""
-    with node_at(router, "asker") as asker:
+    with node_at(address, "asker") as asker:
 
         def call(name, **fields):
             kind = getattr(ROS.srv, name)
@@ -179,9 +179,9 @@ def test_other_nodes_read_and_set_parameters(node, ask):
     assert node.get_parameter("arm.gain").value == 0.75
 
 
-def test_changes_are_published(node, router):
+def test_changes_are_published(node, address):
     events = []
-    with node_at(router, "observer") as observer:
+    with node_at(address, "observer") as observer:
         observer.create_subscription(
             ROS.msg.ParameterEvent, "/parameter_events", events.append, qos_profile_parameter_events
         )
@@ -346,7 +346,7 @@ def test_a_missing_file_is_an_error(tmp_path):
         overrides("--params-file", str(tmp_path / "none.yaml"))
 
 
-def test_overrides_replace_defaults(router):
+def test_overrides_replace_defaults(address):
     words = [
         "--ros-args",
         "-p",
@@ -358,7 +358,7 @@ def test_overrides_replace_defaults(router):
         "-p",
         "use_sim_time:=true",
     ]
-    with node_at(router, "tuned", cli_args=words) as node:
+    with node_at(address, "tuned", cli_args=words) as node:
         assert node.declare_parameter("gain", 0.5).value == 0.75
         assert node.declare_parameter("list", [0.5]).type_ is Type.DOUBLE_ARRAY
         assert node.declare_parameter("more", 1).value == 1
@@ -368,7 +368,7 @@ def test_overrides_replace_defaults(router):
         node.set_parameters([Parameter("use_sim_time", value=False)])
         assert node.get_clock().simulated is None
     with node_at(
-        router,
+        address,
         "all",
         parameter_overrides=[Parameter("x", value=1)],
         automatically_declare_parameters_from_overrides=True,

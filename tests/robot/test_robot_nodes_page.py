@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 from idlc.robot.keys import Kind
+from tests.robot.conftest import environ_of
 from tests.robot.nodes import LONG, SetBool, node_at
 from tests.support.paths import ROOT
 
@@ -14,14 +15,14 @@ TALKER, LISTENER = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 ARGUMENTS, *_ = re.findall(r"^python talker\.py (.*)$", PAGE, re.MULTILINE)
 
 
-def test_the_programs_of_the_page_talk_to_each_other(router, tmp_path):
-    environ = {**os.environ, "ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{router}"]'}
+def test_the_programs_of_the_page_talk_to_each_other(address, tmp_path):
+    environ = {**os.environ, **environ_of(address)}
     talker, listener = tmp_path / "talker.py", tmp_path / "listener.py"
     talker.write_text(TALKER, encoding="utf-8")
     listener.write_text(LISTENER, encoding="utf-8")
     command = [sys.executable, talker, *ARGUMENTS.split()]
     with (
-        node_at(router, "node") as node,
+        node_at(address, "node") as node,
         subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True) as process,
     ):
         try:

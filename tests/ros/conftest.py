@@ -2,17 +2,16 @@
 
 import json
 import os
-import random
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import pytest
 
+from tests.support.domains import held_domain
 from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
 from tests.support.paths import PROGRAMS
 from tests.support.sides import OURS
@@ -28,12 +27,8 @@ def pytest_collection_modifyitems(items):
 
 @contextmanager
 def _domain_of_its_own() -> Iterator[dict[str, str]]:
-    """Yield an environment in which DDS stays on this machine and meets no other run.
-
-    A domain is held by a port, as the tests of scaffolded packages do it.
-    """
-    with socket.socket() as held:
-        domain = next(filter(partial(_bound, held), random.sample(range(1, 101), 100)))
+    """Yield an environment in which DDS stays on this machine and meets no other run."""
+    with held_domain() as domain:
         yield {
             **os.environ,
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -54,14 +49,6 @@ def lonely_environment() -> Iterator[dict[str, str]]:
     """Yield an environment for one test, which sees no nodes of others, dead ones included."""
     with _domain_of_its_own() as environment:
         yield environment
-
-
-def _bound(held: socket.socket, domain: int) -> bool:
-    try:
-        held.bind(("127.0.0.1", 22119 + domain))
-    except OSError:
-        return False
-    return True
 
 
 @pytest.fixture

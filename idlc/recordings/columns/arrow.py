@@ -7,7 +7,17 @@ from typing import Any
 
 from idlc.recordings.columns.read import to_columns, type_of
 from idlc.recordings.columns.values import needing, record_batch
+from idlc.recordings.containers.compression import missing
 from idlc.runtime.typeinfo import FieldInfo, Structure
+
+
+def arrow() -> Any:
+    """Return pyarrow, or say how to install it."""
+    try:
+        import pyarrow
+    except ImportError:
+        raise missing("pyarrow", "tables are made by Arrow") from None
+    return pyarrow
 
 
 def to_arrow(

@@ -33,6 +33,7 @@ SEDP_QOS = QoSProfile(durability=DurabilityPolicy.TRANSIENT_LOCAL, history=Histo
 # the standard's ids of parameters
 _LEASE, _TOPIC, _TYPE, _VERSION, _VENDOR, _RELIABILITY = 0x02, 0x05, 0x07, 0x15, 0x16, 0x1A
 _LIVELINESS, _DURABILITY, _DEADLINE, _LIFESPAN, _USER_DATA = 0x1B, 0x1D, 0x23, 0x2B, 0x2C
+_HISTORY = 0x40
 _ENDPOINT_ADDRESS, _DEFAULT_ADDRESS, _META_ADDRESS = 0x2F, 0x31, 0x32
 _PARTICIPANT, _BUILTIN, _ENDPOINT, KEY, STATUS = 0x50, 0x58, 0x5A, 0x70, 0x71
 #: The parameters by which Fast DDS names the request of a reply; the second is its older one.
@@ -148,9 +149,14 @@ def _profile(parameters: wire.Parameters, order: str, is_writer: bool) -> QoSPro
         value = _first(parameters, name, 4)
         return default if value is None else int(struct.unpack_from(order + "I", value)[0])
 
+    kept = _first(parameters, _HISTORY, 8)
+    kind, depth = struct.unpack_from(order + "Ii", kept) if kept else (0, 0)
+    history = (HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_ALL)[kind % 2]
     reliable = word(_RELIABILITY, 2 if is_writer else 1) == 2
     manual = word(_LIVELINESS, 0) == 2
     return QoSProfile(
+        history=history if kept else HistoryPolicy.UNKNOWN,
+        depth=max(depth, 0),
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=(
             DurabilityPolicy.TRANSIENT_LOCAL if word(_DURABILITY, 0) else DurabilityPolicy.VOLATILE
@@ -270,6 +276,8 @@ def format_endpoint(end: Endpoint) -> bytes:
         yield _TYPE, _string(end.type)
         yield _RELIABILITY, struct.pack("<I", reliability) + _span(100_000_000)
         yield _DURABILITY, struct.pack("<I", int(qos.is_latched))
+        # others leave it out, and read it
+        yield _HISTORY, struct.pack("<Ii", qos.history is HistoryPolicy.KEEP_ALL, qos.depth)
         yield _DEADLINE, _span(qos.deadline)
         yield _LIVELINESS, struct.pack("<I", liveliness) + _span(qos.liveliness_lease_duration)
         if end.is_writer:

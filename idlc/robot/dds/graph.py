@@ -6,7 +6,8 @@ A topic `/a` is `rt/a`; a service `/a` is two topics, `rq/aRequest` and `rr/aRep
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 from idlc.robot.dds import info, wire
 from idlc.robot.dds.discovery import Endpoint
@@ -19,7 +20,9 @@ WRITER, READER = b"\x03", b"\x04"
 #: The ends of the names and types of a service's topics.
 HALVES = {"rq": ("Request", "Request_"), "rr": ("Reply", "Response_")}
 #: The node of an endpoint that no node owns, as rcl calls it.
-_UNKNOWN = info.NodeInfo("/", "_NODE_NAME_UNKNOWN_", (), ())
+_UNKNOWN = "_NODE_NAME_UNKNOWN_"
+#: Endpoints whose entities are not made again after each change.
+_MOST_CACHED = 2**14
 #: The kinds of endpoints; a service and a client are shown as their readers.
 _KINDS = {
     ("rt", True): Kind.PUBLISHER,
@@ -77,54 +80,67 @@ class RemoteNodes:
         DDS tells no hash of a service: `hashes` has those of the own ones by name and type.
         """
         self._nodes = {each: self._nodes[each] for each in prefixes if each in self._nodes}
-        owners: dict[bytes, tuple[int, info.NodeInfo]] = {}
+        owners: dict[bytes, _Owner] = {}
         for prefix, nodes in self._nodes.items():
-            for owner in enumerate(nodes):
-                if entity := self._entity(prefix, owner, owner[0], Kind.NODE):
+            for number, node in enumerate(nodes):
+                owner = _Owner(self._domain, number, node.namespace, node.name)
+                if entity := _entity(prefix, owner, number, Kind.NODE):
                     yield entity
-                for guid in (*owner[1].readers, *owner[1].writers):
-                    owners[guid] = owner
+                owners |= dict.fromkeys((*node.readers, *node.writers), owner)
+        unknown = _Owner(self._domain, 0, "/", _UNKNOWN)
         for end in endpoints:
-            if entity := self._endpoint(end, owners.get(end.guid, (0, _UNKNOWN)), hashes):
+            if entity := _endpoint(end, owners.get(end.guid, unknown), hashes.get(_names(end), "")):
                 yield entity
 
-    def _endpoint(
-        self, end: Endpoint, owner: tuple[int, info.NodeInfo], hashes: Mapping[tuple[str, str], str]
-    ) -> Entity | None:
-        """Return what ROS 2 shows of an endpoint; `None` if it shows nothing."""
-        half, _, name = end.topic.partition("/")
-        kind, type_, hash_ = _KINDS.get((half, end.is_writer)), end.type, end.hash
-        if kind is None:
-            return None
-        if half in HALVES:
-            name, type_ = map(str.removesuffix, (name, type_), HALVES[half])
-        names = f"/{name}", ros_type(type_) or ""
-        if half in HALVES and not end.guid.startswith(wire.VENDOR):
-            # others tell the hash of the request or of the response
-            hash_ = hashes.get(names, "")
-        number = int.from_bytes(end.guid[12:15], "big")
-        more = {"name": names[0], "type": names[1], "hash": hash_, "qos": end.qos}
-        return self._entity(end.guid[: wire.PREFIX], owner, number, kind, **more)
 
-    def _entity(
-        self,
-        prefix: bytes,
-        owner: tuple[int, info.NodeInfo],
-        number: int,
-        kind: Kind,
-        **more: Any,
-    ) -> Entity | None:
-        """Return an entity of another participant; `None` if its type has no valid name."""
-        try:
-            return Entity(
-                domain=self._domain,
-                session=prefix.hex(),
-                node_id=owner[0],
-                id=number,
-                kind=kind,
-                namespace=owner[1].namespace,
-                node=owner[1].name,
-                **more,
-            )
-        except ValueError:
-            return None
+class _Owner(NamedTuple):
+    """The node of an endpoint."""
+
+    domain: int
+    number: int
+    namespace: str
+    name: str
+
+
+def _names(end: Endpoint) -> tuple[str, str]:
+    """Return the names of an endpoint and of its type in ROS 2; the latter may be empty."""
+    half, _, name = end.topic.partition("/")
+    type_ = end.type
+    if half in HALVES:
+        name, type_ = map(str.removesuffix, (name, type_), HALVES[half])
+    return f"/{name}", ros_type(type_) or ""
+
+
+@lru_cache(_MOST_CACHED)
+def _endpoint(end: Endpoint, owner: _Owner, service: str) -> Entity | None:
+    """Return what ROS 2 shows of an endpoint; `None` if it shows nothing.
+
+    `service` is the hash of a service if the participant tells none.
+    """
+    half = end.topic.partition("/")[0]
+    kind, hash_ = _KINDS.get((half, end.is_writer)), end.hash
+    if kind is None:
+        return None
+    if half in HALVES and not end.guid.startswith(wire.VENDOR):
+        hash_ = service  # it told the hash of the request or of the response
+    number = int.from_bytes(end.guid[12:15], "big")
+    name, type_ = _names(end)
+    more = {"name": name, "type": type_, "hash": hash_, "qos": end.qos}
+    return _entity(end.guid[: wire.PREFIX], owner, number, kind, **more)
+
+
+def _entity(prefix: bytes, owner: _Owner, number: int, kind: Kind, **more: Any) -> Entity | None:
+    """Return an entity of another participant; `None` if its type has no valid name."""
+    try:
+        return Entity(
+            domain=owner.domain,
+            session=prefix.hex(),
+            node_id=owner.number,
+            id=number,
+            kind=kind,
+            namespace=owner.namespace,
+            node=owner.name,
+            **more,
+        )
+    except ValueError:
+        return None

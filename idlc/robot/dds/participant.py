@@ -140,8 +140,7 @@ class Participant:
     ) -> list[Outgoing]:
         if is_writer:
             size = self._fragment(address[0])
-            self._writers[name].match(guid, address, qos, size, now)
-            return self._writers[name].tick(now)
+            return self._writers[name].match(guid, address, qos, size, now)
         self._readers[name].match(guid, address, qos)
         question = self._readers[name].ask(guid)
         return [question] if question else []
@@ -338,9 +337,7 @@ class Participant:
     @property
     def is_told(self) -> bool:
         """True if each peer has told all of its endpoints."""
-        readers = [self._readers[reader] for _, reader in discovery.SEDP.values()]
-        writers = [writer for reader in readers for writer in reader.writers.values()]
-        told = all(writer.next is not None and not writer.early for writer in writers)
+        told = all(self._readers[reader].is_complete for _, reader in discovery.SEDP.values())
         return told and all(peer.is_known for peer in self.peers.values())
 
     def remote_endpoints(self) -> Iterator[Endpoint]:

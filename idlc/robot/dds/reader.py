@@ -79,6 +79,8 @@ class RemoteWriter:
         #: first heartbeat: the writer may know the reader, and send to it, before the reader knows
         #: the writer. Gaps tell what a late reader has missed.
         self.next: int | None = None
+        #: The number of the newest sample that it has told of.
+        self.last = 0
         self.early: dict[int, Received | None] = {}
         self.partial: OrderedDict[int, _Partial] = OrderedDict()
         self.bytes = 0
@@ -96,6 +98,15 @@ class Reader:
         self.writers: dict[bytes, RemoteWriter] = {}
         #: Samples that were not delivered, because they were too large or too many.
         self.lost = 0
+
+    @property
+    def is_complete(self) -> bool:
+        """True if each writer has told what it has, and nothing of that is missing."""
+        return all(
+            writer.next is not None and writer.next > writer.last
+            for writer in self.writers.values()
+            if writer.reliable
+        )
 
     def match(self, guid: bytes, address: Address, qos: QoSProfile) -> None:
         """Receive from a writer."""
@@ -226,6 +237,7 @@ class Reader:
         writer = self.writers.get(guid)
         if writer is None or not writer.reliable:
             return []
+        writer.last = part.last
         if writer.next is None:
             writer.next = part.first
         if writer.next < part.first:

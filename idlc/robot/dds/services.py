@@ -65,10 +65,11 @@ class _Client:
     def receive(self, received: Received) -> None:
         """Take a reply; those to other clients arrive, too."""
         named = discovery.related(received.parameters)
-        if named is None or received.is_key or named[0] not in {each.guid for each in self.pair}:
+        if named is None or named[0] not in {each.guid for each in self.pair}:
             return
         if (call := self.sent.pop(named[1], None)) is not None:
-            call.callback(Sample(received.payload, call.attachment))
+            if not received.is_key:
+                call.callback(Sample(received.payload, call.attachment))
             call.callback(None)
 
 
@@ -101,7 +102,9 @@ class _Request:
         self._services.reply(self._writer, self._target, payload, inline)
 
     def drop(self) -> None:
-        """Finish without a reply."""
+        """Finish without a reply; clients of idlc are told."""
+        if self._target.startswith(wire.VENDOR):
+            self.reply(b"", b"")
 
 
 class Services:
@@ -161,11 +164,8 @@ class Services:
         return client
 
     def withdraw_client(self, entity: Entity) -> None:
-        """Withdraw an announced client; its calls end."""
-        client = self._clients.pop(entity.id)
-        self.withdraw(client.pair)
-        for call in (*client.waiting, *client.sent.values()):
-            call.callback(None)
+        """Withdraw an announced client, which waits for nothing any more."""
+        self.withdraw(self._clients.pop(entity.id).pair)
 
     def call(
         self, client: _Client, payload: bytes, attachment: bytes, callback: OnReply, limit: float

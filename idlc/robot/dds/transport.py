@@ -12,7 +12,7 @@ from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
 from idlc.robot.dds.reader import Received
 from idlc.robot.dds.services import Services
-from idlc.robot.dds.writer import Writer
+from idlc.robot.dds.writer import Writer, unpadded
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import dds_type
 from idlc.robot.qos import DurabilityPolicy, QoSProfile
@@ -20,9 +20,11 @@ from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
 _INFO_ID = 0xFFFFF0
 _INFO_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-#: Seconds without a change after which the others have told all, and the most of them.
-_SETTLED = 0.3
-_PATIENCE = 3.0
+#: Seconds without a change after which the others have told all, nobody is there, or those that
+#: are there tell nothing more.
+_SETTLED, _ALONE, _PATIENCE = 0.3, 1.0, 3.0
+#: Seconds between two messages about the own nodes.
+_PERIOD = 0.05
 
 
 class _Closer:
@@ -67,6 +69,8 @@ class DdsTransport:
         self._shown: dict[str, None] = {}
         self._refreshed = 0.0
         self._is_stale = True
+        #: Whether the others have to be told about the own nodes, and when that is due.
+        self._is_news, self._news_at = False, 0.0
         self._connection = Connection(place, self._tick)
         self._services = Services(self._connection)
         self._started = time.monotonic()
@@ -76,7 +80,7 @@ class DdsTransport:
             for kind in (WRITER, READER)
         )
         self._info = self._connection.add_writer(writer)
-        self._connection.add_reader(reader, self._learn)
+        self._infos = self._connection.add_reader(reader, self._learn)
         self._connection.start()
 
     def _guid(self, number: int, kind: bytes) -> bytes:
@@ -89,13 +93,13 @@ class DdsTransport:
 
     # endpoints
 
-    def _topic(self, entity: Entity) -> Endpoint:
-        names = f"rt{entity.name}", dds_type(entity.type)
-        return Endpoint(self.gid(entity), *names, entity.qos, entity.hash)
+    def _topic(self, entity: Entity, kind: bytes) -> Endpoint:
+        guid, type_ = self._guid(entity.id + 1, kind), dds_type(entity.type)
+        return Endpoint(guid, f"rt{entity.name}", type_, entity.qos, entity.hash)
 
     def publisher(self, entity: Entity) -> Sender:
         """Declare a writer."""
-        return _Sender(self._connection, self._connection.add_writer(self._topic(entity)))
+        return _Sender(self._connection, self._connection.add_writer(self._topic(entity, WRITER)))
 
     def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
         """Declare a reader."""
@@ -104,9 +108,9 @@ class DdsTransport:
             if not received.is_key:
                 sent = received.time or time.time_ns()
                 attachment = pack_attachment(received.number, sent, received.writer)
-                callback(Sample(received.payload, attachment))
+                callback(Sample(unpadded(received.payload), attachment))
 
-        reader = self._connection.add_reader(self._topic(entity), deliver)
+        reader = self._connection.add_reader(self._topic(entity, READER), deliver)
         return _Closer(lambda: self._connection.remove(reader.guid))
 
     def service(self, entity: Entity, callback: Callable[[Request], None]) -> Closeable:
@@ -130,7 +134,10 @@ class DdsTransport:
 
     def _tick(self) -> None:
         """Do what is due."""
-        self._services.tick(time.monotonic())
+        now = time.monotonic()
+        self._services.tick(now)
+        if self._is_news and now >= self._news_at:
+            self._publish(now)
         if self._is_stale or self._connection.changed_at > self._refreshed:
             self._refresh()
 
@@ -142,7 +149,7 @@ class DdsTransport:
             self._own[entity.token] = entity
             if entity.kind is Kind.CLIENT:
                 self._services.client(entity, is_announced=True)
-            self._publish()
+            self._change()
         return _Closer(lambda: self._conceal(entity))
 
     def _conceal(self, entity: Entity) -> None:
@@ -150,14 +157,20 @@ class DdsTransport:
             del self._own[entity.token]
             if entity.kind is Kind.CLIENT:
                 self._services.withdraw_client(entity)
-            self._publish()
+            self._change()
 
-    def _publish(self) -> None:
+    def _change(self) -> None:
+        """Tell all about the own nodes; many changes at a time are one message."""
+        self._is_news = self._is_stale = True
+        if (now := time.monotonic()) >= self._news_at:
+            self._publish(now)
+
+    def _publish(self, now: float) -> None:
         """Send the own nodes and their endpoints."""
         prefix = self._connection.prefix
         payload = info.format_info(prefix, own_nodes(prefix, self._own.values()))
         self._connection.write(self._info, payload)
-        self._is_stale = True
+        self._is_news, self._news_at = False, now + _PERIOD
 
     def _learn(self, received: Received) -> None:
         self._is_stale |= self._remote.learn(received)
@@ -195,15 +208,21 @@ class DdsTransport:
 
     def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:  # noqa: ARG002
         """Yield the tokens that exist, as soon as the others have told all of theirs."""
-        end = self._started + min(timeout, _PATIENCE)
-        while (now := time.monotonic()) < end:
-            with self._connection.lock:
-                is_told = self._connection.participant.is_told
-            if is_told and now - max(self._started, self._connection.changed_at) > _SETTLED:
-                break
+        end, is_told, is_over = time.monotonic() + timeout, False, False
+        while not is_over and time.monotonic() < end:
             time.sleep(0.02)
+            with self._connection.lock:
+                participant = self._connection.participant
+                is_told = participant.is_told and self._infos.is_complete
+                patience = _SETTLED if participant.peers else _ALONE
+            if not is_told:
+                patience = _PATIENCE
+            quiet = time.monotonic() - max(self._started, self._connection.changed_at)
+            is_over = quiet > patience
         with self._connection.lock:
             yield from self._entities()
+        if not is_told:
+            raise TimeoutError
 
     def notes(self) -> list[str]:
         """Return the variables that idlc does not use, and where it did not find anybody."""

@@ -40,6 +40,18 @@ class Sample(NamedTuple):
     time: int
 
 
+def _padded(payload: bytes) -> bytes:
+    """Return a payload of whole words; the options of its encapsulation tell what was added."""
+    pad = -len(payload) % 4
+    return payload[:3] + bytes([pad]) + payload[4:] + bytes(pad) if pad else payload
+
+
+def unpadded(payload: bytes) -> bytes:
+    """Return a payload as its program wrote it."""
+    pad = payload[3] & 3 if len(payload) > 7 else 0
+    return payload[:3] + b"\0" + payload[4:-pad] if pad else payload
+
+
 class Writer:
     """Sends samples to the matched readers, and again to those that lack them."""
 
@@ -57,16 +69,23 @@ class Writer:
         self._bytes = 0
         self._depth = None if qos.history is HistoryPolicy.KEEP_ALL else qos.depth
 
-    def match(self, guid: bytes, address: Address, qos: QoSProfile, size: int, now: float) -> None:
+    def match(
+        self, guid: bytes, address: Address, qos: QoSProfile, size: int, now: float
+    ) -> list[Outgoing]:
         """Send to a reader from now on, and what is kept if both sides want that."""
+        out: list[Outgoing] = []
         if guid in self.readers:
-            return
+            return out
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         is_late = self.qos.is_latched and qos.is_latched
         first = next(iter(self.history), self.last + 1) if is_late else self.last + 1
-        self.readers[guid] = RemoteReader(guid, address, reliable, size, first)
+        reader = self.readers[guid] = RemoteReader(guid, address, reliable, size, first)
         if reliable:
             self.deadline = now
+        elif is_late:  # such a reader never asks
+            for number, sample in self.history.items():
+                self._send(reader, number, sample, out)
+        return out + self.tick(now)
 
     def match_local(self, reader: Reader) -> None:
         """Deliver to a reader of the same participant."""
@@ -81,9 +100,7 @@ class Writer:
 
     def write(self, payload: bytes, inline: bytes, time: int, now: float) -> list[Outgoing]:
         """Send a sample to all readers; it stays in the history."""
-        if pad := -len(payload) % 4:
-            # the options of the encapsulation say how many bytes were added
-            payload = payload[:3] + bytes([pad]) + payload[4:] + bytes(pad)
+        payload = _padded(payload)
         self.last += 1
         sample = self.history[self.last] = Sample(payload, inline, time)
         self._bytes += len(payload)

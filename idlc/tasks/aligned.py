@@ -1,0 +1,114 @@
+"""`idlc columns --grid`: several topics of a recording as one table, in one file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from idlc.api.recording import Recording
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.recordings.aligned.table import Summary
+from idlc.recordings.containers.source import RecordingError
+from idlc.tasks.columns import (
+    STDOUT,
+    STYLES,
+    TEXT,
+    ColumnsOptions,
+    Job,
+    Progress,
+    WrittenFile,
+    checked,
+    opened,
+    stdout_style,
+    write,
+)
+
+
+class Grid(msgspec.Struct, frozen=True):
+    """The clock of a table: a topic or a period, and how values are found.
+
+    Options are for all topics, or for one: `/imu=linear`.
+    """
+
+    clock_of_rows: str
+    how: tuple[str, ...] = ()
+    tolerance: tuple[str, ...] = ()
+    clock: tuple[str, ...] = ()
+
+
+def write_aligned(
+    grid: Grid,
+    announce: Callable[[list[Summary]], None],
+    recording: Recording,
+    options: ColumnsOptions,
+    report: Report,
+    progress: Progress,
+) -> Iterator[WrittenFile]:
+    """Announce how well the topics fit the clock, and write their table."""
+    topics = dict(_topic(word, recording) for word in options.topics or recording)
+    rows = grid.clock_of_rows
+    is_topic = rows in recording or rows.startswith("/")
+    names = [*topics, rows] if is_topic else [*topics]
+    try:
+        table = recording.aligned(
+            topics,
+            on=rows if is_topic else None,
+            every=None if is_topic else rows,
+            how=_by_topic(grid.how, names, "last"),
+            tolerance=_by_topic(grid.tolerance, names, None),
+            clock=_by_topic(grid.clock, names, "log"),
+            start=options.start,
+            end=options.end,
+        )
+    except RecordingError:
+        raise
+    except ValueError as error:
+        hint = f"`idlc show {options.recordings[0]} TOPIC` lists the fields"
+        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
+        return
+    style = _style(options)
+    job = Job(recording[names[0]], options.out, style)
+    if style != TEXT and not checked([job], options, report):
+        return
+    announce(table.summary())
+    if style == TEXT:
+        return
+    done = 0
+
+    def counted() -> Iterator[Any]:
+        nonlocal done
+        for batch in table.to_reader():
+            done += batch.num_rows
+            progress(rows, done, len(table))
+            yield batch
+
+    with opened(job.path) as file:
+        write(counted(), table.schema, file, style)
+    yield WrittenFile(", ".join(topics), job.path, len(table))
+
+
+def _style(options: ColumnsOptions) -> str:
+    """Return the format of the file; a terminal sees only the summary."""
+    if options.out == STDOUT:
+        return stdout_style(options)
+    return options.style or STYLES.get(Path(options.out).suffix.lower(), "")
+
+
+def _topic(word: str, recording: Recording) -> tuple[str, list[str] | None]:
+    """Return a topic and its fields, as `/joints:position,velocity` has them."""
+    name, colon, fields = word.rpartition(":")
+    if word in recording or not colon:
+        return word, None
+    return name, [field.strip() for field in fields.split(",")]
+
+
+def _by_topic(values: Sequence[str], names: Sequence[str], default: Any) -> dict[str, Any]:
+    """Return the value of each topic; the last one without a topic is for all others."""
+    pairs = [value.rpartition("=") for value in values]
+    common = [value for topic, _, value in pairs if not topic]
+    result: dict[str, Any] = dict.fromkeys(names, common[-1] if common else default)
+    return result | {topic: value for topic, _, value in pairs if topic}
