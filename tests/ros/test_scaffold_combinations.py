@@ -169,8 +169,9 @@ def _speaking(package: Path, name: str) -> str:
     spin = re.search(r"rclpy\.spin\((\w+)\(\)\)", text)
     if spin is None:
         return name
-    says = f"node = {spin[1]}()\n        node.create_timer(0.1, lambda: print('{SPINS}', flush=True))"
-    text = text.replace(spin[0], f"{says}\n        rclpy.spin(node)")
+    timer = f"node.create_timer(0.1, lambda: print('{SPINS}', flush=True))"
+    says = "\n        ".join([f"node = {spin[1]}()", timer, "rclpy.spin(node)"])
+    text = text.replace(spin[0], says)
     (package / "demo" / f"{name}_says.py").write_text(text)
     return f"{name}_says"
 
