@@ -87,7 +87,8 @@ class QoSProfile(msgspec.Struct, kw_only=True):
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Change a value; endpoints have a profile of their own, which stays as it is."""
-        changed = msgspec.structs.replace(self, **{name: value})
+        # `msgspec.structs.replace` calls `__post_init__` only in later versions
+        changed = type(self)(**{**msgspec.structs.asdict(self), name: value})
         msgspec.structs.force_setattr(self, name, getattr(changed, name))
 
     def __hash__(self) -> int:

@@ -14,7 +14,7 @@ from tests.support.domains import held_domain
 from tests.support.waiting import wait_for
 
 LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-Fibonacci = idlc.load("test_msgs/action/Fibonacci")["test_msgs/action/Fibonacci"]
+Fibonacci = idlc.load("example_interfaces/action/Fibonacci").Fibonacci
 
 
 @pytest.fixture

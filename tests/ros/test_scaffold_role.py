@@ -20,7 +20,8 @@ GUIDE = DOCS / "contributing" / "add.md"
 
 def blocks() -> dict[str, str]:
     """Return the guide's blocks of code by what they are marked with."""
-    text = GUIDE.read_text(encoding="utf-8").split("## Add a role\n")[1].split("\n## ")[0]
+    text = GUIDE.read_text(encoding="utf-8").partition("\n## Add a role\n")[2]
+    text = text.partition("\n## ")[0]
     found = re.findall(r"^   ```(\S+)\n(.*?)^   ```$", text, re.MULTILINE | re.DOTALL)
     return {head: re.sub(r"(?m)^ {3}", "", body) for head, body in found}
 

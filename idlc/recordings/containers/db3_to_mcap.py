@@ -53,7 +53,8 @@ class _Channels:
         for topic, number in file.topics:
             conversion = selected(conversions, topic.name, topic.schema)
             self.topics[number] = topic, conversion
-            self.numbers[number] = len(self.numbers)
+            # from 1: rosbags 0.11 reads no message of channel 0
+            self.numbers[number] = len(self.numbers) + 1
             self._add(self.numbers[number], topic, conversion)
 
     def _add(self, number: int, topic: Topic, new: Conversion | None) -> None:
