@@ -1,5 +1,6 @@
 """Sends goals to countdown."""
 
+import sys
 from typing import Any
 
 from my_robot_controller.action import Countdown
@@ -42,11 +43,12 @@ class CountdownActionClient(Node):
 def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
+        count = int(sys.argv[1]) if len(sys.argv) > 1 else 5
         node = CountdownActionClient()
         node.send_countdown_goal(
             Countdown.Goal(
                 # Where to start counting down
-                target_count=5,
+                target_count=count,
             ),
         )
     except (KeyboardInterrupt, ExternalShutdownException):

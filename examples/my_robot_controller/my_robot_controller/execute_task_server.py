@@ -1,28 +1,75 @@
-"""Executes goals of execute_task."""
+"""The node execute_task_server."""
+
+from __future__ import annotations
+
+from contextlib import suppress
 
 from my_robot_controller.action import ExecuteTask
 import rclpy
-from rclpy.action.server import ActionServer, CancelResponse, ServerGoalHandle
-from rclpy.executors import ExternalShutdownException
+from rclpy.action.server import (
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    ServerGoalHandle,
+)
+from rclpy.executors import (
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class ExecuteTaskServer(Node):
+    """
+    The node execute_task_server.
+
+    It executes goals of execute_task.
+    """
+
     def __init__(self) -> None:
+        """Create the node and its endpoints."""
         super().__init__('execute_task_server')
+        self.execute_task_goal: ServerGoalHandle | None = None
         self.execute_task_server = ActionServer(
             self,
             ExecuteTask,
             'execute_task',
-            self.execute_execute_task,
-            cancel_callback=lambda goal_handle: CancelResponse.ACCEPT,
+            execute_callback=self.run_execute_task_goal,
+            goal_callback=self.accept_execute_task_goal,
+            handle_accepted_callback=self.begin_execute_task_goal,
+            cancel_callback=self.cancel_execute_task_goal,
         )
 
-    async def execute_execute_task(self, goal_handle: ServerGoalHandle) -> ExecuteTask.Result:
+    def accept_execute_task_goal(self, goal: ExecuteTask.Goal) -> GoalResponse:
+        """Accept a goal for execute_task, or reject an unreachable one."""
+        return GoalResponse.ACCEPT if goal.task_name else GoalResponse.REJECT
+
+    def begin_execute_task_goal(self, goal_handle: ServerGoalHandle) -> None:
+        """Start an accepted goal, which replaces the one before it."""
+        before = self.execute_task_goal
+        if before is not None and before.is_active:
+            self.get_logger().info('execute_task: a newer goal takes over')
+            before.abort()
+        self.execute_task_goal = goal_handle
+        goal_handle.execute()
+
+    def cancel_execute_task_goal(self, goal_handle: ServerGoalHandle) -> CancelResponse:
+        """Allow every goal to be cancelled."""
+        self.get_logger().info('execute_task: cancel requested')
+        return CancelResponse.ACCEPT
+
+    async def run_execute_task_goal(
+        self,
+        goal_handle: ServerGoalHandle,
+    ) -> ExecuteTask.Result:
+        """Execute a goal step by step, until it succeeds, is cancelled or is aborted."""
         goal: ExecuteTask.Goal = goal_handle.request
+        result = ExecuteTask.Result(
+            success=False,
+        )
         self.get_logger().info(f'execute_task: {goal.task_name=}')
-        result = ExecuteTask.Result(success=False)
         for status in ('starting', 'working', 'finishing'):
             feedback = ExecuteTask.Feedback(
                 # What the robot is doing now, for people to read
@@ -30,6 +77,9 @@ class ExecuteTaskServer(Node):
             )
             goal_handle.publish_feedback(feedback)
             await self.pause(1.0)
+            if not goal_handle.is_active:
+                self.get_logger().info('execute_task: aborted')
+                return result
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()
                 self.get_logger().info('execute_task: cancelled')
@@ -48,11 +98,19 @@ class ExecuteTaskServer(Node):
 
 
 def main(args: list[str] | None = None) -> None:
+    """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    try:
-        rclpy.spin(ExecuteTaskServer())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        try:
+            executor = SingleThreadedExecutor()
+            node = ExecuteTaskServer()
+            executor.add_node(node)
+            while ok():
+                # not without end: rclpy can miss a signal that comes while it starts
+                executor.spin_once(timeout_sec=1.0)
+        except Exception:
+            if ok():  # otherwise a signal shut rclpy down before the node was complete
+                raise
 
 
 if __name__ == '__main__':
