@@ -113,9 +113,9 @@ def test_pip_installs_the_committed_classes(options, environment, tmp_path):
 
     borrowed = {**clean, "PYTHONPATH": str(Path(rclpy.__file__).parents[1])}
     said = run_with(
-        environment / "bin" / "countdown_action_client", "--help", cwd=tmp_path, **borrowed
+        environment / "bin" / "execute_task_client", "--help", cwd=tmp_path, **borrowed
     )
-    assert "Where to start counting down" in said
+    assert "The task to execute" in said
 
 
 def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp_path):
