@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections import Counter
 from contextlib import suppress
 
 import pytest
@@ -237,7 +238,7 @@ def test_mutated_containers_are_rewritten_or_an_error(tmp_path):
         before, use_index = path.read_bytes(), rng.random() < 0.7
         conversions = rng.choice([{}, {"/imu": NEW}, {"/imu": CONVERTED}, {"/joints": CONVERTED}])
         try:
-            fate = rewrite(str(path), str(target), conversions, index=use_index).topics
+            rewritten = rewrite(str(path), str(target), conversions, index=use_index)
         except RecordingError:
             errors += 1
         else:
@@ -249,8 +250,12 @@ def test_mutated_containers_are_rewritten_or_an_error(tmp_path):
                     else (topic, time, data)
                     for topic, time, data in expected
                 ]
-                assert read(target) == sorted(wanted), number
-                assert sum(one.messages for one in fate.values()) == len(expected)
+                written = read(target)
+                if rewritten.damage:  # of which it may write less than can be read
+                    assert Counter(written) <= Counter(wanted), number
+                else:
+                    assert written == sorted(wanted), number
+                assert sum(one.messages for one in rewritten.topics.values()) == len(written)
             target.unlink()
         assert path.read_bytes() == before
         assert sorted(one.name for one in tmp_path.iterdir()) == ["mutated", "sound"]
