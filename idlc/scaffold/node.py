@@ -334,10 +334,14 @@ def render_test(planned: Plan) -> str:
     node = planned.node
     parts, imports = _tested(planned)
     served = (endpoint for endpoint in node.endpoints if endpoint.role.kind and node.lifecycle)
+    plain = ["pytest", "signal"]
+    if planned.short:
+        acts = any(endpoint.role.name == "action_server" for endpoint in node.endpoints)
+        plain = ["pytest"] if acts else []
     view = TestView(
         node=Code(node.name),
         module=Code(f"{node.package}.{node.name}"),
-        imports=_import_groups(imports, () if planned.short else ("pytest", "signal")),
+        imports=_import_groups(imports, plain),
         constants=_constants(node),
         offered=tuple(map(Code, sorted({repr(_resolved(each, node.name)) for each in served}))),
         parameters=tuple(map(_parameter, node.parameters)),

@@ -112,9 +112,7 @@ def test_pip_installs_the_committed_classes(options, environment, tmp_path):
     import rclpy
 
     borrowed = {**clean, "PYTHONPATH": str(Path(rclpy.__file__).parents[1])}
-    said = run_with(
-        environment / "bin" / "execute_task_client", "--help", cwd=tmp_path, **borrowed
-    )
+    said = run_with(environment / "bin" / "execute_task_client", "--help", cwd=tmp_path, **borrowed)
     assert "The task to execute" in said
 
 

@@ -37,4 +37,4 @@ def observer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Observe
     request.addfinalizer(node.process.kill)
     yield node
     node.process.send_signal(request.param)
-    assert node.process.wait(20) == 0, node.log.read_text()
+    node.until(lambda: node.process.poll() == 0)

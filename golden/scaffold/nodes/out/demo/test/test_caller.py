@@ -11,7 +11,7 @@ def test_it_calls_ask(observer: Any) -> None:
     """The node calls ask, logs the response and ends."""
     observer.create_service(Ask, 'ask', lambda request, response: response)
     observer.until(lambda: 'ask: response' in observer.log.read_text())
-    assert observer.process.wait(20) == 0, observer.log.read_text()
+    observer.until(lambda: observer.process.poll() == 0)
 
 
 def test_it_waits_for_a_server(observer: Any) -> None:
