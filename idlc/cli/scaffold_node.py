@@ -160,6 +160,11 @@ def _role_options(function: Any) -> Any:
     help="Set the quality of service of the preceding endpoint.",
 )
 @click.option("--lifecycle", is_flag=True, help="Create a lifecycle node.")
+@click.option(
+    "--robust",
+    is_flag=True,
+    help="Handle signals while starting, replaced and cancelled goals, servers that do not answer.",
+)
 @click.option("--launch/--no-launch", default=True, help="Add the node to the launch file.")
 @common
 def command(name: str, **arguments: Any) -> int:
@@ -175,7 +180,7 @@ def command(name: str, **arguments: Any) -> int:
 
     shared = ("dry_run", "force", "include", "launch")
     settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
-    described = (*(role.name for role in ROLES), "parameters", "lifecycle")
+    described = (*(role.name for role in ROLES), "parameters", "lifecycle", "robust")
     try:
         spec.check_name(name)
         if not any(arguments[option] for option in described) and interactive():
@@ -188,8 +193,8 @@ def command(name: str, **arguments: Any) -> int:
                 for n, value in enumerate(arguments[role.name])
             )
             parameters = tuple(map(spec.parameter, arguments["parameters"]))
-            lifecycle = arguments["lifecycle"]
-            requested = spec.Node(name, "", tuple(endpoints), parameters, lifecycle)
+            forms = arguments["lifecycle"], arguments["robust"]
+            requested = spec.Node(name, "", tuple(endpoints), parameters, *forms)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
@@ -197,5 +202,7 @@ def command(name: str, **arguments: Any) -> int:
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
     python = Path(sys.executable).name
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)
-    test = f"{python} -m pytest {folder}test/test_{name}.py"
+    done = () if result is None else result.done
+    paths = [each.path for each in done if each.path.endswith(f"/test_{name}.py")]
+    test = f"{python} -m pytest {folder}{next(iter(paths), '')}"
     return finish(result, report, (*install, test))

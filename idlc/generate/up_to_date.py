@@ -10,7 +10,7 @@ from idlc.generate.target import Target
 from idlc.model.ir import TypeName
 from idlc.project import write
 from idlc.project.library import Library
-from idlc.project.lock import BUILD_STEP, FILE, Lock, Tree, Vendoring, digest, meaning
+from idlc.project.lock import BUILD_STEP, COPY_HEAD, FILE, Lock, Tree, Vendoring, digest, meaning
 from idlc.version import __version__
 
 _PACKAGE = Path(__file__).parents[1]
@@ -93,7 +93,7 @@ def _carries_this_runtime(lock: Lock) -> bool:
 def _runtime() -> dict[str, str]:
     runtime = _PACKAGE / "runtime"
     return {
-        path.relative_to(runtime).as_posix(): digest(path.read_bytes())
+        path.relative_to(runtime).as_posix(): digest(COPY_HEAD.encode() + path.read_bytes())
         for path in runtime.rglob("*.py")
     }
 

@@ -536,9 +536,12 @@ class _GroupMeta(InterfaceMeta):
         getattr(typesupport, cls._import)(cls._interface)
 
     def __call__(cls, *_values: object, **_named: object) -> Any:
-        raise NotImplementedError(
-            f"{cls.__name__} is a name for its messages, not a message"
+        name, is_service = cls.__name__, issubclass(cls, Service)
+        parts = (
+            ["Request", "Response"] if is_service else ["Goal", "Result", "Feedback"]
         )
+        uses = " or ".join(f"{name}.{part}(...)" for part in parts)
+        raise NotImplementedError(f"{name} cannot be created: use {uses}")
 
 
 class ServiceMeta(_GroupMeta):

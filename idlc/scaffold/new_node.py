@@ -32,7 +32,9 @@ from idlc.scaffold.spec import Plan, plan
 MANIFEST = "package.xml"
 SETUP = "setup.py"
 SETUP_FILES = ("pyproject.toml", "setup.cfg", SETUP)
-CONFTEST = "test/conftest.py"
+TESTS = "test"
+#: Tests of robust nodes have fixtures of their own.
+ROBUST_TESTS = "test/robust"
 LAUNCH_ENDING = "launch.py"
 
 
@@ -56,7 +58,8 @@ def paths(package: str, launch_files: Iterable[str], home: str = "") -> list[str
     usual = [f"{package}_launch.py", f"{package}.launch.py"]
     chosen = listed if len(listed) == 1 else [name for name in usual if name in listed]
     launch_file = f"launch/{next(iter(chosen), usual[0])}"
-    return [*SETUP_FILES, MANIFEST, CONFTEST, f"{home or package}/__init__.py", launch_file]
+    shared = [f"{folder}/conftest.py" for folder in (TESTS, ROBUST_TESTS)]
+    return [*SETUP_FILES, MANIFEST, *shared, f"{home or package}/__init__.py", launch_file]
 
 
 def node_entry(
@@ -94,8 +97,10 @@ def node_entry(
     notes = list(_installed_package(node.package, start, texts, edits, folders))
     # files that nodes need beside them
     added = {} if start in texts else {start: ""}
-    if CONFTEST not in texts:
-        added[CONFTEST] = rendered_for(node.package, "package/conftest.py.jinja")
+    conftest = f"{_tests(planned)}/conftest.py"
+    if conftest not in texts:
+        template = f"node/{'short/' if planned.short else ''}conftest.py.jinja"
+        added[conftest] = rendered_for(node.package, template)
     entry = Entry(added, edits, tuple(notes))
     return _with_launch(entry, node, texts) if launch else entry
 
@@ -150,6 +155,11 @@ def _installed_package(
         yield SETUP, f"may not install the node: {missing}"
 
 
+def _tests(planned: Plan) -> str:
+    """Return the folder of the node's test."""
+    return TESTS if planned.short else ROBUST_TESTS
+
+
 def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
     project = changes.find_package(settings, report)
@@ -168,7 +178,7 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     with stage("scaffold", name):
         files = {
             f"{home}/{name}.py": render(planned),
-            f"test/test_{name}.py": render_test(planned),
+            f"{_tests(planned)}/test_{name}.py": render_test(planned),
         }
         for path, text in files.items():
             compile(text, path, "exec", dont_inherit=True)

@@ -20,6 +20,7 @@ _TAKEN = (
     "TransitionCallbackReturn",
     *(name for preset in roles.QOS_PRESETS for name in (*preset.imports, preset.source)),
     *(name for role in roles.ROLES for names in role.imports.values() for name in names),
+    "ok",
 )
 #: Names that a test uses itself.
 _TAKEN_BY_TESTS = (
@@ -123,21 +124,26 @@ def render(planned: Plan) -> str:
     """Return the text of a node's module."""
     node = planned.node
     page = Page(planned.messages, clock=CLOCK, taken=_TAKEN, own=node.package)
-    parts = [_part(placed, page, placed.endpoint.role.samples) for placed in planned.endpoints]
+    parts = [
+        _part(placed, page, planned.short, placed.endpoint.role.samples)
+        for placed in planned.endpoints
+    ]
     page.clock = None  # there is none where the command line is read
-    requests = tuple(_requests(planned, page))
+    requests = tuple(_short_request(planned, page) if planned.short else _requests(planned, page))
     class_name = "".join(part.capitalize() for part in node.name.split("_"))
     class_name += "Node" if class_name in page.taken else ""
-    does = (
-        Code(f"{endpoint.role.summary} {part.title}")
+    does = [
+        f"{endpoint.role.summary} {part.title}"
         for endpoint, part in zip(node.endpoints, parts, strict=True)
         if endpoint.role.summary
-    )
+    ]
+    if planned.short:  # each is a sentence
+        does = [phrase[0].upper() + phrase[1:] for phrase in does]
     view = NodeView(
         name=Code(node.name),
         class_name=Code(class_name),
-        does=tuple(does),
-        imports=_imports(planned, page),
+        does=tuple(map(Code, does)),
+        imports=_short_imports(planned, page) if planned.short else _imports(planned, page),
         constants=_constants(node),
         parameters=tuple(map(_parameter, node.parameters)),
         parts=tuple(parts),
@@ -146,10 +152,12 @@ def render(planned: Plan) -> str:
         lifecycle=node.lifecycle,
         once=planned.once,
     )
+    if planned.short:
+        return compact(code().get_template("node/short/module.py.jinja").render(node=view))
     return code().get_template("node/module.py.jinja").render(node=view)
 
 
-def _part(placed: Placed, page: Page, spelled_out: Iterable[str] = ()) -> Part:
+def _part(placed: Placed, page: Page, short: bool, spelled_out: Iterable[str] = ()) -> Part:
     """Return an endpoint as its node or its test sees it, with values for some sections."""
     endpoint, word, interface = placed
     messages = derive.sections(interface) if interface else ()
@@ -160,7 +168,7 @@ def _part(placed: Placed, page: Page, spelled_out: Iterable[str] = ()) -> Part:
     if abs(float(period) - seconds) >= seconds * 1e-9:
         period = f"1.0 / {1.0 / seconds:.6g}"
     return Part(
-        template=f"node/{endpoint.role.name}.py.jinja",
+        template=f"node/{'short/' if short else ''}{endpoint.role.name}.py.jinja",
         word=Code(word),
         title=Code(endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word),
         name=Code(repr(endpoint.topic)),
@@ -214,6 +222,37 @@ def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
             sample=sample,
             arguments=arguments,
         )
+
+
+def _short_request(planned: Plan, page: Page) -> Iterator[RequestView]:
+    """Yield the request that a short node sends, if there is one, with sensible values."""
+    for endpoint, word, interface in planned.asking:
+        assert endpoint.role.request is not None
+        assert interface is not None
+        message = derive.sections(interface)[0]
+        yield RequestView(
+            title=Code(endpoint.role.request.title),
+            function=Code(),
+            type=Code(page.use(message.name)),
+            method=Code(endpoint.role.request.method.format(word)),
+            cancel=Code(),
+            sample=samples.sample(message, page),
+            arguments=(),
+        )
+
+
+def _short_imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
+    """Return the imports of a short node, in groups."""
+    imports = defaultdict(set, page.imports())
+    for endpoint in planned.node.endpoints:
+        for module, names in (endpoint.role.short or {}).items():
+            imports[module].update(names)
+        imports["rclpy.qos"].update(endpoint.qos.imports)
+    imports["rclpy.executors"].add("ExternalShutdownException")
+    imports["rclpy.node"].add("Node")
+    if planned.asking:
+        imports["rclpy.utilities"].add("ok")
+    return _import_groups(imports, ("rclpy",))
 
 
 def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
@@ -295,10 +334,14 @@ def render_test(planned: Plan) -> str:
     node = planned.node
     parts, imports = _tested(planned)
     served = (endpoint for endpoint in node.endpoints if endpoint.role.kind and node.lifecycle)
+    plain = ["pytest", "signal"]
+    if planned.short:
+        acts = any(endpoint.role.name == "action_server" for endpoint in node.endpoints)
+        plain = ["pytest"] if acts else []
     view = TestView(
         node=Code(node.name),
         module=Code(f"{node.package}.{node.name}"),
-        imports=_import_groups(imports, ("pytest", "signal")),
+        imports=_import_groups(imports, plain),
         constants=_constants(node),
         offered=tuple(map(Code, sorted({repr(_resolved(each, node.name)) for each in served}))),
         parameters=tuple(map(_parameter, node.parameters)),
@@ -307,7 +350,46 @@ def render_test(planned: Plan) -> str:
         once=planned.once,
         ends=planned.once and len(planned.asking) == 1,
     )
+    if planned.short:
+        return compact(code().get_template("node/short/test.py.jinja").render(test=view))
     return code().get_template("node/test.py.jinja").render(test=view)
+
+
+#: The longest line that ament_flake8 accepts.
+WIDTH = 99
+
+
+def compact(text: str) -> str:
+    """Return source whose brackets are on one line where it fits, as `ruff format` puts them.
+
+    The text has each item of a bracket on a line of its own, with a comma.
+    """
+    lines: list[str] = []
+    for line in text.splitlines():
+        closing = line.strip()
+        if closing[:1] not in tuple(")]}"):
+            lines.append(line)
+            continue
+        margin = line[: -len(closing)]
+        opening = max(n for n, other in enumerate(lines) if other and _indent(other) == margin)
+        items = lines[opening + 1 :]
+        inner = f"{margin}    "
+        body = " ".join(item.strip() for item in items).removesuffix(",")
+        joined = f"{lines[opening]}{body}{closing}"
+        if lines[opening].endswith("import ("):
+            joined = f"{lines[opening].removesuffix('(')}{body}"
+        flat = all(_indent(item) == inner and item.strip()[0] != "#" for item in items)
+        if flat and len(joined) <= WIDTH:
+            lines[opening:] = [joined]
+        elif flat and items and len(inner + body) <= WIDTH:
+            lines[opening + 1 :] = [inner + body, line]
+        else:
+            lines.append(line)
+    return "\n".join([*lines, ""])
+
+
+def _indent(line: str) -> str:
+    return line[: len(line) - len(line.lstrip())]
 
 
 def _resolved(endpoint: roles.Endpoint, node: str) -> str:
@@ -319,7 +401,9 @@ def _resolved(endpoint: roles.Endpoint, node: str) -> str:
 
 def test_packages(planned: Plan) -> list[str]:
     """Return the packages that the test and its conftest.py need besides those of the node."""
-    packages = {module.partition(".")[0] for module in _tested(planned)[1]} | {"rcl_interfaces"}
+    packages = {module.partition(".")[0] for module in _tested(planned)[1]} | {"rclpy"}
+    if not planned.short:
+        packages.add("rcl_interfaces")
     others = packages - sys.stdlib_module_names - {*planned.packages, planned.node.package}
     return ["python3-pytest", *sorted(others)]
 
@@ -329,21 +413,25 @@ def _tested(planned: Plan) -> tuple[tuple[Part, ...], Mapping[str, set[str]]]:
     node = planned.node
     page = Page(planned.messages, taken=_TAKEN_BY_TESTS)
     parts = [
-        _part(placed, page)._replace(name=Code(repr(placed.endpoint.topic.replace("~", node.name))))
+        _part(placed, page, planned.short)._replace(
+            name=Code(repr(placed.endpoint.topic.replace("~", node.name)))
+        )
         for placed in planned.endpoints
     ]
     imports = defaultdict(set, page.imports())
     for endpoint in node.endpoints:
-        for module, names in endpoint.role.test_imports.items():
+        role = endpoint.role
+        for module, names in (role.short_test if planned.short else role.test_imports).items():
             imports[module].update(names)
         imports["rclpy.qos"].update(endpoint.qos.imports)
     if node.lifecycle:
         imports["lifecycle_msgs.msg"].add("Transition")
         imports["lifecycle_msgs.srv"].add("ChangeState")
-    if node.parameters:
+    if node.parameters or (planned.short and not node.endpoints):
         imports["rcl_interfaces.srv"].add("GetParameters")
         imports["rclpy.parameter"].add("parameter_value_to_python")
-    imports["rclpy.node"].add("Node")
-    imports["collections.abc"].add("Callable")
+    if not planned.short:
+        imports["rclpy.node"].add("Node")
+        imports["collections.abc"].add("Callable")
     imports["typing"].add("Any")
     return tuple(parts), imports

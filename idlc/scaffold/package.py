@@ -73,7 +73,7 @@ _TEMPLATES = {
 #: Files of a package of nodes, and of one of interfaces; NAME stands for the package.
 _PYTHON_FILES = (
     *("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "launch/NAME_launch.py"),
-    *("test/conftest.py", "test/test_style.py", "README.md", ".gitattributes", ".gitignore"),
+    *("test/test_style.py", "README.md", ".gitattributes", ".gitignore"),
 )
 _CMAKE_FILES = ("package.xml", "CMakeLists.txt", "pyproject.toml", "README.md", ".gitignore")
 #: Files of a new package that are edited later on.

@@ -100,7 +100,8 @@ class Role(NamedTuple):
     that it speaks, if any, of which the template spells out the sections `samples`. Endpoints of
     roles of one `family` have different words, because their names in Python are made in the same
     way. `helpers` are the methods of the node that its own methods call: `pause`, `until`,
-    `retire`.
+    `retire`. `short` and `short_test` are the imports of a short node and its test; a role without
+    them has only a robust form.
     """
 
     name: str
@@ -117,6 +118,8 @@ class Role(NamedTuple):
     test_imports: Imports = NO_IMPORTS
     helpers: frozenset[str] = frozenset()
     request: Request | None = None
+    short: Imports | None = None
+    short_test: Imports = NO_IMPORTS
 
     @property
     def option(self) -> str:
@@ -162,18 +165,20 @@ _SERVER = ("ActionServer", "CancelResponse", "ServerGoalHandle")
 ROLES: tuple[Role, ...] = (
     Role(
         name="publisher",
+        short=NO_IMPORTS,
         kind="msg",
         metavar="TYPE:TOPIC[@HZ]",
         help="Publish messages, by default once per second.",
         read=_published,
         answer="publish",
         question=Question("Rate in Hz", "1", separator="@"),
-        summary="publishes",
+        summary="publishes to",
         family="timer",
         samples=("message",),
     ),
     Role(
         name="subscriber",
+        short=NO_IMPORTS,
         kind="msg",
         metavar="TYPE:TOPIC",
         help="Receive messages.",
@@ -183,6 +188,7 @@ ROLES: tuple[Role, ...] = (
     ),
     Role(
         name="service",
+        short=NO_IMPORTS,
         kind="srv",
         help="Answer requests.",
         answer="serve",
@@ -192,8 +198,9 @@ ROLES: tuple[Role, ...] = (
     ),
     Role(
         name="client",
+        short=NO_IMPORTS,
         kind="srv",
-        help="Call a service. The node's command line sets the fields of the request.",
+        help="Call a service. If robust, the node has arguments for the fields of the request.",
         answer="call",
         summary="calls",
         family="action",
@@ -202,8 +209,13 @@ ROLES: tuple[Role, ...] = (
     ),
     Role(
         name="action_server",
+        short={"rclpy.action.server": _SERVER, "rclpy.task": ("Future",)},
+        short_test={
+            "action_msgs.msg": ("GoalStatus",),
+            "rclpy.action.client": ("ActionClient",),
+        },
         kind="action",
-        help="Execute goals, which clients can cancel and replace.",
+        help="Execute goals, which clients can cancel and, if robust, replace.",
         answer="act",
         summary="executes goals of",
         family="action",
@@ -214,8 +226,10 @@ ROLES: tuple[Role, ...] = (
     ),
     Role(
         name="action_client",
+        short={"rclpy.action.client": ("ActionClient",), "typing": ("Any",)},
+        short_test={"rclpy.action.server": ("ActionServer", "ServerGoalHandle")},
         kind="action",
-        help="Send a goal. The node's command line sets the fields of the goal.",
+        help="Send a goal. If robust, the node has arguments for the fields of the goal.",
         answer="send goals",
         summary="sends goals to",
         family="action",
@@ -231,6 +245,7 @@ ROLES: tuple[Role, ...] = (
     ),
     Role(
         name="timer",
+        short=NO_IMPORTS,
         kind=None,
         metavar="SECONDS",
         help="Call a method periodically.",

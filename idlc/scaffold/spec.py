@@ -54,6 +54,7 @@ class Node(NamedTuple):
     endpoints: tuple[Endpoint, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     lifecycle: bool = False
+    robust: bool = False
 
 
 def check_name(name: str) -> str:
@@ -142,10 +143,20 @@ class Plan(NamedTuple):
         return bool(endpoints) and only and not self.node.lifecycle
 
     @property
+    def short(self) -> bool:
+        """True if the node has the short form, which has at most one request and nothing else."""
+        roles = [endpoint.role for endpoint in self.node.endpoints]
+        if self.node.robust or self.node.lifecycle or any(role.short is None for role in roles):
+            return False
+        return not self.asking or len(roles) == 1
+
+    @property
     def packages(self) -> list[str]:
         """The packages that the node's module imports, rclpy among them; its own is not."""
         used = {placed.interface.name.package for placed in self.endpoints if placed.interface}
-        modules = {module for endpoint in self.node.endpoints for module in endpoint.role.imports}
+        roles = [endpoint.role for endpoint in self.node.endpoints]
+        imports = [(role.short if self.short else role.imports) or {} for role in roles]
+        modules = {module for names in imports for module in names}
         libraries = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names
         return sorted(({"rclpy"} | used | libraries) - {self.node.package})
 

@@ -82,6 +82,19 @@ _COMMANDS = [
             *("--action-client", "example_interfaces/Fibonacci:count"),
         ),
     ),
+    ("robot", ("scaffold", "node", "caller", "--client", "std_srvs/SetBool:power")),
+    (
+        "robot",
+        ("scaffold", "node", "sender", "--action-client", "example_interfaces/Fibonacci:count"),
+    ),
+    (
+        "robot",
+        (
+            *("scaffold", "node", "careful", "--robust", "--publisher", "std_msgs/String:chatter"),
+            *("--subscriber", "std_msgs/Bool:stop", "--service", "std_srvs/SetBool:power"),
+            *("--action-server", "example_interfaces/Fibonacci:count", "--param", "gain:float=1.0"),
+        ),
+    ),
     (
         "robot",
         (

@@ -15,6 +15,7 @@ import pytest
 from idlc.generate.python.render import PACKAGE, render_package
 from idlc.model import derive
 from idlc.model.distros import BY_NAME, DEFAULT
+from idlc.project.lock import COPY_HEAD
 from tests.support import generated, refresh, values
 from tests.support.paths import GOLDEN
 
@@ -40,7 +41,7 @@ def outputs(case):
     support = {path for path in files if path.startswith("_idlc/")}
     for path in support:
         source = PACKAGE / "runtime" / path.removeprefix("_idlc/")
-        assert files.pop(path) == source.read_text(encoding="utf-8")
+        assert files.pop(path) == COPY_HEAD + source.read_text(encoding="utf-8")
     assert len(support) == len(list((PACKAGE / "runtime").rglob("*.py")))
     return files
 

@@ -116,7 +116,8 @@ def test_every_node_of_the_tutorial_is_there():
     launch = (EXAMPLE / "launch" / "my_robot_controller_launch.py").read_text(encoding="utf-8")
     for node in nodes:
         assert (EXAMPLE / EXAMPLE.name / f"{node}.py").is_file()
-        assert (EXAMPLE / "test" / f"test_{node}.py").is_file()
+        tests = "test/robust" if node.startswith("execute_task") else "test"
+        assert (EXAMPLE / tests / f"test_{node}.py").is_file()
         assert f"'{node} = my_robot_controller.{node}:main'," in setup
         once = node.endswith("_client")  # does one thing and ends, so nothing launches it
         assert (f"executable='{node}'" in launch) == (not once)

@@ -114,14 +114,14 @@ def test_publisher_and_subscriber(start):
 
 def test_service_and_client(start):
     start(file("add_two_ints_server"))
-    client = start(file("add_two_ints_client"), "20", "22", "--server-timeout", LONG)
+    client = start(file("add_two_ints_client"), "20", "22")
     assert client.ends() == 0, client.output
     assert "42 = 20 + 22" in client.output
 
 
 def test_action_with_feedback(start):
     server = start("-m", "my_robot_controller.countdown_action_server")
-    client = start(file("countdown_action_client"), "2", "--server-timeout", LONG)
+    client = start(file("countdown_action_client"), "2")
     assert client.ends() == 0, client.output
     assert client.output.count("feedback.current_count=") == 2
     assert "success=True" in client.output
@@ -129,15 +129,25 @@ def test_action_with_feedback(start):
 
 
 def test_action_that_is_cancelled_and_one_that_is_rejected(start):
-    server = start(file("countdown_action_server"))
-    client = start(file("countdown_action_client"), "1000", "--server-timeout", LONG)
-    client.until("feedback.current_count=")
+    server = start(file("execute_task_server"))
+    client = start(file("execute_task_client"), "--server-timeout", LONG)
+    client.until("feedback.current_status=")
     client.process.send_signal(signal.SIGINT)
     assert client.ends() == 130, client.output
-    server.until("countdown: cancelled")
-    client = start(file("countdown_action_client"), "0", "--server-timeout", LONG)
+    server.until("execute_task: cancelled")
+    client = start(file("execute_task_client"), "", "--server-timeout", LONG)
     assert client.ends() == 1, client.output
     assert "the goal was rejected" in client.output
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_client_that_is_ended_while_it_waits(start, number):
+    for name in ("add_two_ints_client", "countdown_action_client"):
+        client = start(file(name))
+        client.until("waiting for a server")
+        client.process.send_signal(number)
+        assert client.ends() == 0, client.output
+        assert "Traceback" not in client.output
 
 
 TUNED = """\

@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -42,6 +43,8 @@ ROLES = {
     "action-server": "action",
     "action-client": "action",
 }
+SPINS = "the node spins"
+WAITS = "waiting for a server"
 WORDS = ("alpha", "handle", "timer", "tick", "self", "data", "configure", "x", "timeout", "goal")
 FIELDS = {
     "msg Odd": (
@@ -92,6 +95,7 @@ def options(chance: random.Random) -> list[str]:
     for name in chance.sample(WORDS, chance.choice([0, 0, 1, 2])):
         value = chance.choice(["bool=true", "int=-3", "double=1e-3", "string=a'b", "int[]=1,2"])
         words += ["--param", f"{name}:{value}"]
+    words += ["--robust"] * (chance.random() < 0.4)
     return words + ["--lifecycle"] * (chance.random() < 0.25)
 
 
@@ -143,7 +147,7 @@ def test_they_start_and_end(package, tmp_path, ros_environment):
         logs.mkdir()
         with nodes(package, logs, ros_environment) as start:
             batch = [
-                start(f"demo.{name}", *_patience(package / "demo" / f"{name}.py"))
+                start(f"demo.{_speaking(package, name)}", *_patience(package / f"demo/{name}.py"))
                 for name in names[first : first + AT_ONCE]
             ]
             for node, how in zip(batch, _signals(), strict=False):
@@ -153,6 +157,23 @@ def test_they_start_and_end(package, tmp_path, ros_environment):
                 # the moment is the earliest one, in which a signal may still find no handler
                 assert status in ((0, 1, 130) if once else (0, -how)), node.output
                 assert not node.fails, node.output
+
+
+def _speaking(package: Path, name: str) -> str:
+    """Return the name of a module that says when a short node spins; robust ones end earlier, too.
+
+    A short node that calls a server says that it waits.
+    """
+    path = package / "demo" / f"{name}.py"
+    text = path.read_text()
+    spin = re.search(r"rclpy\.spin\((\w+)\(\)\)", text)
+    if spin is None:
+        return name
+    timer = f"node.create_timer(0.1, lambda: print('{SPINS}', flush=True))"
+    says = "\n        ".join([f"node = {spin[1]}()", timer, "rclpy.spin(node)"])
+    text = text.replace(spin[0], says)
+    (package / "demo" / f"{name}_says.py").write_text(text)
+    return f"{name}_says"
 
 
 def _patience(module: Path) -> list[str]:
@@ -172,9 +193,11 @@ def _signals():
 
 
 def _is_up(node) -> bool:
-    """Whether the node handles signals already, or has ended."""
-    if node.process.poll() is not None:
+    """Whether the node handles signals already, or has ended; whether it spins if it is short."""
+    if node.process.poll() is not None or SPINS in node.output or WAITS in node.output:
         return True
+    if node.process.args[3].endswith("_says"):
+        return False
     status = Path(f"/proc/{node.process.pid}/status").read_text()
     caught = next(line for line in status.splitlines() if line.startswith("SigCgt:"))
     return bool(int(caught.split()[1], 16) & (1 << (signal.SIGTERM - 1)))

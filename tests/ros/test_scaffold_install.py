@@ -74,7 +74,7 @@ def test_colcon_builds_it_and_compiles_its_interfaces(name, scaffolded, tmp_path
     said = run_with(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(site))
     assert ("Drive" if name == "demo" else "RobotCommand") in said
     commands = {path.name for path in (prefix / "lib" / name).iterdir()}
-    tests = {path.stem.removeprefix("test_") for path in package.glob("test/test_*")}
+    tests = {path.stem.removeprefix("test_") for path in package.glob("test/**/test_*")}
     assert commands == tests - {"interfaces", "style"}
 
 
@@ -112,10 +112,8 @@ def test_pip_installs_the_committed_classes(options, environment, tmp_path):
     import rclpy
 
     borrowed = {**clean, "PYTHONPATH": str(Path(rclpy.__file__).parents[1])}
-    said = run_with(
-        environment / "bin" / "countdown_action_client", "--help", cwd=tmp_path, **borrowed
-    )
-    assert "Where to start counting down" in said
+    said = run_with(environment / "bin" / "execute_task_client", "--help", cwd=tmp_path, **borrowed)
+    assert "The task to execute" in said
 
 
 def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp_path):

@@ -1,4 +1,4 @@
-"""What every scaffolded `main` shares: how a node ends, whatever ends it."""
+"""What every robust `main` shares: how a node ends, whatever ends it."""
 
 import os
 import signal
@@ -61,8 +61,9 @@ def package(tmp_path_factory) -> Path:
         os.chdir(folder)
         assert main(["scaffold", "package", "demo"]) == 0
         os.chdir("demo")
-        assert main(["scaffold", "node", "stays", "--timer", "0.1"]) == 0
-        assert main(["scaffold", "node", "once", "--client", "std_srvs/Empty:reset"]) == 0
+        assert main(["scaffold", "node", "stays", "--timer", "0.1", "--robust"]) == 0
+        once = ["scaffold", "node", "once", "--client", "std_srvs/Empty:reset", "--robust"]
+        assert main(once) == 0
     finally:
         os.chdir(here)
     return folder / "demo"

@@ -1,7 +1,7 @@
 """The generated test of a node notices what a person, or a changed interface, breaks in the node.
 
-Each mutant is a generated node with one thing broken. Its test must fail, and show what the node
-printed. `make test-long` takes every sixth mutant, `make fuzz` all of them.
+Each mutant is a generated node with one thing broken. Its test must fail, and show what the
+node printed. `make test-long` takes every sixth mutant, `make fuzz` all of them.
 """
 
 import os
@@ -42,6 +42,7 @@ NODES = {
     ],
     "managed_actor": ["--action-server", "test_msgs/Fibonacci:count", "--lifecycle"],
 }
+SHORT = ("publisher", "subscriber", "service", "client", "action_server", "action_client", "timed")
 RAISES = "raise RuntimeError('broken')"
 ENDS = "                raise\n"
 ENDING = {
@@ -141,7 +142,32 @@ TIMED = {
     "has a default of another type": ("'names', ['a', 'b']", "'names', 'a, b'"),
     "has a parameter of another name": ("_parameter('speed'", "_parameter('sped'"),
 }
+SHORT_ENDING = {
+    "dies at its start": ENDING["dies at its start"],
+    "does not end": ("        pass\n", "        __import__('time').sleep(99)\n"),
+    "ends with a traceback": ("except (KeyboardInterrupt, ", "except ("),
+    "ends with another status": ("        pass\n", "        raise SystemExit(3)\n"),
+    "has another name": ENDING["has another name"],
+}
+#: In a short node, this code is elsewhere or is not there.
+GONE = {"rejects goals", "never begins", "goes on with the goal before", "raises at the end"}
+SHORT_CALLING = {"makes no request": ("SetBool.Request(data", "SetBool.Response(data")}
+SHORT_SENDING = {"ignores reports": (", feedback_callback=self.follow_count_goal", "")}
+SHORT_TIMED = {"never ticks": ("create_timer(0.1,", "create_timer(1e6,")}
+
+
+def without_gone(mutants: dict[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
+    return {name: change for name, change in mutants.items() if name not in GONE}
+
+
 MUTANTS = {
+    "short_publisher": {**PUBLISHING, **SHORT_ENDING},
+    "short_subscriber": {**SUBSCRIBING, **SHORT_ENDING},
+    "short_service": {**SERVING, **SHORT_ENDING},
+    "short_client": {**CALLING, **SHORT_CALLING, **SHORT_ENDING},
+    "short_action_server": {**without_gone(ACTING), **SHORT_ENDING},
+    "short_action_client": {**without_gone(SENDING), **SHORT_SENDING, **SHORT_ENDING},
+    "short_timed": {**TIMED, **SHORT_TIMED, **SHORT_ENDING},
     "publisher": {**ENDING, **PUBLISHING},
     "subscriber": {**SUBSCRIBING, **ENDING},
     "service": {**SERVING, **ENDING},
@@ -169,7 +195,9 @@ def package(tmp_path_factory) -> Path:
         assert main(["scaffold", "package", "demo"]) == 0
         os.chdir("demo")
         for name, words in NODES.items():
-            assert main(["scaffold", "node", f"{name}_node", *words]) == 0
+            assert main(["scaffold", "node", f"{name}_node", "--robust", *words]) == 0
+        for name in SHORT:
+            assert main(["scaffold", "node", f"short_{name}_node", *NODES[name]]) == 0
     finally:
         os.chdir(here)
     return folder / "demo"
@@ -177,20 +205,24 @@ def package(tmp_path_factory) -> Path:
 
 def run(package: Path, folder: Path, node: str, change: tuple[str, str]) -> tuple[int, str]:
     """Return the status of a node's test after a change, and what it printed."""
-    module, test = f"demo/{node}_node.py", f"test/test_{node}_node.py"
-    for path in ("demo/__init__.py", module, "test/conftest.py", test):
+    short = node.startswith("short_")
+    tests = "test" if short else "test/robust"
+    module, test = f"demo/{node}_node.py", f"{tests}/test_{node}_node.py"
+    for path in ("demo/__init__.py", module, f"{tests}/conftest.py", test):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(package / path, folder / path)
     text = (folder / module).read_text()
     assert change[0] in text, f"{node}: nothing to break: {change[0]}"
     if change[0]:
-        head = "from __future__ import annotations\n"
         text = text.replace(*change)
-        (folder / module).write_text(text.replace(head, f"{head}import sys\nprint('{MARK}')\n", 1))
-        conftest = (folder / "test/conftest.py").read_text()
-        shorter = conftest.replace("PATIENCE = 20.0", f"PATIENCE = {PATIENCE}")
-        assert shorter != conftest
-        (folder / "test/conftest.py").write_text(shorter)
+        (folder / module).write_text(
+            text.replace("\nimport rclpy\n", f"\nprint('{MARK}')\nimport rclpy\n", 1)
+        )
+        conftest = (folder / tests / "conftest.py").read_text()
+        patience = "seconds: float = " if short else "PATIENCE = "
+        assert f"{patience}20.0" in conftest
+        shorter = conftest.replace(f"{patience}20.0", f"{patience}{PATIENCE}")
+        (folder / tests / "conftest.py").write_text(shorter)
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
     plain = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     return programs.ended(*command, cwd=folder, environment={**os.environ, **plain})
@@ -202,7 +234,8 @@ def test_nodes_that_nobody_broke_pass(package, tmp_path):
         return next_without_drop(attempts)
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        for node, (status, said) in zip(NODES, pool.map(one, NODES), strict=True):
+        everything = [*NODES, *(f"short_{node}" for node in SHORT)]
+        for node, (status, said) in zip(everything, pool.map(one, everything), strict=True):
             assert status == 0, f"{node}: {said}"
 
 

@@ -79,7 +79,7 @@ def test_the_command_line_knows_it(idlc, tmp_path):
         ["ruff", "check", "--no-cache", "."],
         ["ruff", "format", "--check", "--no-cache", "."],
         pytest.param(["mypy", "--strict"], marks=pytest.mark.jazzy),
-        ["pytest", "-q", "-p", "no:cacheprovider", "test/test_plain.py", "test/test_managed.py"],
+        ["pytest", "-q", "-p", "no:cacheprovider", "test/robust"],
     ],
     ids=["ruff check", "ruff format", "mypy", "pytest"],
 )

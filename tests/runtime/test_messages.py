@@ -425,8 +425,11 @@ def test_from_dict_fills_in_defaults():
 
 def test_services_and_actions_are_names_for_their_messages():
     service, action = get("srv/Go"), get("action/Walk")
-    for group in (service, action):
-        with pytest.raises(NotImplementedError):
+    for group, uses in (
+        (service, "use Go.Request(...) or Go.Response(...)"),
+        (action, "use Walk.Goal(...) or Walk.Result(...) or Walk.Feedback(...)"),
+    ):
+        with pytest.raises(NotImplementedError, match=re.escape(uses)):
             group()
     assert service.Request is get("srv/Go_Request")
     assert service.Response is get("srv/Go_Response")

@@ -518,6 +518,26 @@ def test_a_package_for_both_versions_of_ros_is_one_of_ros_2(project, capsys):
     assert "bot is an ament_python package" in capsys.readouterr().out
 
 
+def test_an_authors_own_tools_stay_green(project, unproved):
+    """Linters and type checkers without settings report nothing in what idlc writes."""
+    fields = "std_msgs/Header header\nfloat32[] ranges\nuint8[3] colour\n"
+    for name, files in (("library", library(SETUPTOOLS)), ("ament", ament())):
+        folder = project / name
+        folder.mkdir()
+        os.chdir(folder)
+        write_all({**files, ("interfaces/" * (name == "library") + "msg/A.msg"): fields})
+        assert main(["init", "--yes"]) == 0
+        own = ("--exclude", "setup.py", "--exclude", "talker.py")
+        for words in (
+            ("ruff", "check", "--isolated", "--no-cache", ".", *own),
+            ("ruff", "format", "--isolated", "--no-cache", "--check", ".", *own),
+            # as where neither numpy nor ROS 2 is installed
+            ("mypy", "--no-site-packages", "--strict", "--exclude", "(setup|talker).py$", "."),
+        ):
+            status, printed = ended(sys.executable, "-m", *words, cwd=folder)
+            assert status == 0, f"{name}: {printed}"
+
+
 def test_settings_join_the_table_that_exists(project, capsys):
     text = f"{SETUPTOOLS}\n[tool.idlc]  # ours\ndistro = 'jazzy'\n\n[tool.ruff]\nline-length = 99"
     write_all(library(text))

@@ -155,7 +155,8 @@ def main(args: list[str] | None = None) -> int:
     while ok() and not interrupted.is_set() and not all(task.done() for task in tasks):
         executor.spin_once(timeout_sec=0.1)
     if interrupted.is_set():
-        executor.spin_until_future_complete(executor.create_task(node.cancel_execute_task_goal))
+        task = executor.create_task(node.cancel_execute_task_goal)
+        executor.spin_until_future_complete(task)
     try_shutdown()
     if interrupted.is_set():
         return 130

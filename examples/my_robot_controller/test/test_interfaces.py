@@ -26,13 +26,11 @@ def succeeds(*words: str) -> None:
         pytest.fail(f'idlc {" ".join(words)}\n{done.stdout}', pytrace=False)
 
 
-@pytest.mark.linter
 def test_the_interfaces_are_valid() -> None:
     """`idlc check` reports no errors; `idlc explain CODE` explains a code."""
     succeeds('check', '.')
 
 
-@pytest.mark.linter
 def test_the_classes_are_current() -> None:
     """The generated code is up to date; if not, run `idlc gen` and commit the result."""
     succeeds('gen', '--check')

@@ -26,6 +26,7 @@ from idlc.model import derive, ir, link, python_names
 from idlc.model.idl_text import idl_text
 from idlc.model.names import snake_case
 from idlc.model.type_data import content
+from idlc.project.lock import COPY_HEAD
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
 from idlc.runtime import PROTOCOL
@@ -255,11 +256,12 @@ def template(name: str) -> jinja2.Template:
 
 @cache
 def carried_runtime() -> tuple[RenderedFile, ...]:
-    """Return the support package, a verbatim copy of idlc.runtime."""
+    """Return the support package, a copy of idlc.runtime that tools of its users leave alone."""
     runtime = PACKAGE / "runtime"
     return tuple(
         RenderedFile(
-            f"_idlc/{path.relative_to(runtime).as_posix()}", path.read_text(encoding="utf-8")
+            f"_idlc/{path.relative_to(runtime).as_posix()}",
+            COPY_HEAD + path.read_text(encoding="utf-8"),
         )
         for path in sorted(runtime.rglob("*.py"))
     )

@@ -1,55 +1,28 @@
-"""The node listener."""
-
-from __future__ import annotations
-
-from contextlib import suppress
+"""Listens to chatter."""
 
 import rclpy
-from rclpy.executors import (
-    ExternalShutdownException,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.utilities import ok
 from std_msgs.msg import String
 
 
 class Listener(Node):
-    """
-    The node listener.
-
-    It listens to chatter.
-    """
-
     def __init__(self) -> None:
-        """Create the node and its endpoints."""
         super().__init__('listener')
         self.chatter_subscription = self.create_subscription(
-            String,
-            'chatter',
-            self.receive_chatter,
-            10,
+            String, 'chatter', self.receive_chatter, 10
         )
 
     def receive_chatter(self, message: String) -> None:
-        """Handle a message from chatter."""
         self.get_logger().info(f'chatter: {message.data=}')
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        try:
-            executor = SingleThreadedExecutor()
-            node = Listener()
-            executor.add_node(node)
-            while ok():
-                # not without end: rclpy can miss a signal that comes while it starts
-                executor.spin_once(timeout_sec=1.0)
-        except Exception:
-            if ok():  # otherwise a signal shut rclpy down before the node was complete
-                raise
+    try:
+        rclpy.spin(Listener())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
 
 
 if __name__ == '__main__':

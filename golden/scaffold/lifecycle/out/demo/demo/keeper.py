@@ -39,7 +39,7 @@ class Keeper(LifecycleNode):
     """
     The lifecycle node keeper.
 
-    It publishes beat.
+    It publishes to beat.
     It listens to beat.
     It serves reset.
     It calls switch.

@@ -1,41 +1,17 @@
-"""The node oracle."""
-
-from __future__ import annotations
-
-from contextlib import suppress
+"""Serves ask."""
 
 from demo.srv import Ask
 import rclpy
-from rclpy.executors import (
-    ExternalShutdownException,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.utilities import ok
 
 
 class Oracle(Node):
-    """
-    The node oracle.
-
-    It serves ask.
-    """
-
     def __init__(self) -> None:
-        """Create the node and its endpoints."""
         super().__init__('oracle')
-        self.ask_service = self.create_service(
-            Ask,
-            'ask',
-            self.handle_ask,
-        )
+        self.ask_service = self.create_service(Ask, 'ask', self.handle_ask)
 
-    def handle_ask(
-        self,
-        request: Ask.Request,
-        response: Ask.Response,
-    ) -> Ask.Response:
-        """Answer a request to ask."""
+    def handle_ask(self, request: Ask.Request, response: Ask.Response) -> Ask.Response:
         self.get_logger().info(f'ask: {request.question=}')
         # the truth
         response.answer = ''
@@ -44,19 +20,11 @@ class Oracle(Node):
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=args)
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        try:
-            executor = SingleThreadedExecutor()
-            node = Oracle()
-            executor.add_node(node)
-            while ok():
-                # not without end: rclpy can miss a signal that comes while it starts
-                executor.spin_once(timeout_sec=1.0)
-        except Exception:
-            if ok():  # otherwise a signal shut rclpy down before the node was complete
-                raise
+    try:
+        rclpy.spin(Oracle())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
 
 
 if __name__ == '__main__':
