@@ -32,6 +32,10 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
         "Executor ExternalShutdownException MultiThreadedExecutor SingleThreadedExecutor"
     ),
     "rclpy.guard_condition": "GuardCondition",
+    "rclpy.lifecycle": (
+        "LifecycleNode LifecycleNodeMixin LifecyclePublisher LifecycleState ManagedEntity Node"
+        " NodeMixin Publisher SimpleManagedEntity State TransitionCallbackReturn"
+    ),
     "rclpy.logging": "LoggingSeverity get_logger",
     "rclpy.parameter": "Parameter parameter_value_to_python",
     "rclpy.qos": (
@@ -45,7 +49,12 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.utilities": "get_default_context ok remove_ros_args shutdown try_shutdown",
 }
 #: The modules of idlc that provide the names.
-_HOMES = "robot robot.nodes.context robot.nodes.node robot.parameters robot.qos".split()
+_HOMES = "robot robot.lifecycle robot.nodes.context robot.nodes.node robot.parameters robot.qos"
+#: The names that rclpy gives to what has another name in idlc, or in another module of rclpy.
+_ALIASES = {
+    f"rclpy.lifecycle.{name}": f"Lifecycle{name}"
+    for name in "Node NodeMixin Publisher State".split()
+}
 
 
 def _attribute(module: str, name: str) -> Any:
@@ -55,7 +64,8 @@ def _attribute(module: str, name: str) -> Any:
         return import_module(full_name)
     if name not in OFFERED[module].split():
         raise AttributeError(not_offered(full_name), name=name)
-    homes = (vars(import_module(f"idlc.{home}")) for home in _HOMES)
+    name = _ALIASES.get(full_name, name)
+    homes = (vars(import_module(f"idlc.{home}")) for home in _HOMES.split())
     return next(home[name] for home in homes if name in home)
 
 

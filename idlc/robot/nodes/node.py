@@ -201,9 +201,12 @@ class Node(HasParameters):
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: EventCallbacks | None = None,
+        publisher_class: type[Publisher[Any]] = Publisher,
     ) -> Publisher[M]:
         """Return a publisher; a number is the depth of the default profile."""
-        publisher = Publisher[M](self, topic, msg_type, qos_profile, callback_group)
+        publisher: Publisher[M] = publisher_class(
+            self, topic, msg_type, qos_profile, callback_group
+        )
         publisher.watch(event_callbacks)
         return publisher
 
