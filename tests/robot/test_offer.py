@@ -241,7 +241,7 @@ def test_the_page_lists_the_names():
     page = (ROOT / "docs/robot-nodes.md").read_text(encoding="utf-8")
     for module, names in OFFERED.items():
         words = ", ".join(f"`{name}`" for name in sorted(names.split()))
-        assert f"| `{module}` | {words} |" in page
+        assert not words or f"| `{module}` | {words} |" in page
 
 
 def test_scaffolded_nodes_use_only_offered_names():
