@@ -142,11 +142,12 @@ TIMED = {
     "has a default of another type": ("'names', ['a', 'b']", "'names', 'a, b'"),
     "has a parameter of another name": ("_parameter('speed'", "_parameter('sped'"),
 }
+ENDED = "        if ok() and not isinstance("
 SHORT_ENDING = {
     "dies at its start": ENDING["dies at its start"],
-    "does not end": ("        pass\n", "        __import__('time').sleep(99)\n"),
-    "ends with a traceback": ("except (KeyboardInterrupt, ", "except ("),
-    "ends with another status": ("        pass\n", "        raise SystemExit(3)\n"),
+    "does not end": (ENDED, f"        __import__('time').sleep(99)\n{ENDED}"),
+    "ends with a traceback": (ENDED, "        if not isinstance("),
+    "ends with another status": (ENDED, f"        raise SystemExit(3)\n{ENDED}"),
     "has another name": ENDING["has another name"],
 }
 #: In a short node, this code is elsewhere or is not there.
