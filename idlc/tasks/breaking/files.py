@@ -28,7 +28,6 @@ from idlc.project.find import (
     list_files,
     no_interfaces,
 )
-from idlc.project.git import GIT, Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
@@ -48,6 +47,7 @@ from idlc.versions.packages import (
     part_to_raise,
     raised,
 )
+from idlc.versions.revision import GIT, Revision, checked_out, is_revision
 from idlc.wire.layout import oversized
 
 #: The inputs of packages.
