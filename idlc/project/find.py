@@ -309,6 +309,26 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
         return False
 
 
+def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
+    """Return the .idl files of a package without a .msg, .srv or .action file beside, sorted."""
+    unread = []
+    for folder in folders:
+        for kind in KINDS:
+            inside = folder / kind[1:]
+            try:
+                names = {entry.name for entry in os.scandir(inside)}
+            except OSError:
+                continue
+            unread += [
+                f"{kind[1:]}/{name}"
+                for name in names
+                if name.endswith(".idl")
+                and f"{name.removesuffix('.idl')}{kind}" not in names
+                and not exclude.has(str(inside / name))
+            ]
+    return sorted(unread)
+
+
 #: When a file was written and last changed, its size and its number: all 0 if there is none.
 Stamp: TypeAlias = tuple[int, int, int, int]
 #: Nanoseconds; changes within a tick of a file system's clock may have the same time.
