@@ -648,6 +648,22 @@ def test_a_service_looks_for_no_code_that_is_not_committed(service, project):
     assert yaml.safe_load(text)
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "obstacle"),
+    [
+        ("package.xml", "<build_type>ament_cmake</build_type>", "", "has no `<build_type>`"),
+        ("CMakeLists.txt", "rosidl_generate_interfaces", "message", "installs no interface"),
+        ("CMakeLists.txt", "ament_package()", "add_library(field_msgs a.cpp)", "two targets"),
+    ],
+)
+def test_an_obstacle_to_the_build_is_reported(file, old, new, obstacle, project, capsys):
+    write_all(SAMPLES["ament_cmake"].files)
+    path = project / file
+    path.write_text(path.read_text().replace(old, new))
+    assert main(["init"]) == 1  # the changes are shown
+    assert obstacle in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def python(tmp_path_factory):
     """Python in an environment with the tools that build packages, which can import idlc."""
