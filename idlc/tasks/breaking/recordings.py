@@ -97,7 +97,8 @@ def compare_with_recordings(
         Skipped(tuple(sorted(earlier.undefined)), "the recording contains no definition"),
     ]
     if later:
-        skipped.append(Skipped(tuple(sorted(later.undefined)), "the recording contains no definition"))
+        undefined = tuple(sorted(later.undefined))
+        skipped.append(Skipped(undefined, "the recording contains no definition"))
     if not seen:
         reason = "the recordings contain none of these interfaces"
         hint = "`idlc show` lists the types of a recording; name the folder of these interfaces"
