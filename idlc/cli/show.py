@@ -113,9 +113,9 @@ def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
         )
         profiles = dict.fromkeys(map(_qos, each.qos or each.requested))
         qos = first_few(profiles, LISTED) if each.noun == "topic" else ""
-        hash_ = (each.hash or "-")[:SHORT]
+        hash_, installed = (each.hash or "-")[:SHORT], INSTALLED[each.here]
         rows.append(
-            (each.noun, each.name, each.type_name, hash_, INSTALLED[each.here], senders, receivers, qos)
+            (each.noun, each.name, each.type_name, hash_, installed, senders, receivers, qos)
         )
     yield from _aligned(ROBOT_HEAD, rows)
 

@@ -71,7 +71,8 @@ def execute(*folders, code, options=("-I", "-S")):
 def test_one_field_is_little(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(write(tmp_path / "demo", ONE_FIELD).parent)
     assert main(["gen", "demo", "-o", "out/demo", "--runtime", "installed"]) == 0
-    assert capsys.readouterr().out == "wrote out/demo: 7 files from 1 interface; imports idlc_runtime\n"
+    line = "wrote out/demo: 7 files from 1 interface; imports idlc_runtime\n"
+    assert capsys.readouterr().out == line
     files = [path for path in Path("out").rglob("*") if path.is_file()]
     texts = {path.name: path.read_text(encoding="utf-8") for path in files}
     assert len(files) <= 8
