@@ -246,10 +246,8 @@ def _short_imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
         for module, names in (endpoint.role.short or {}).items():
             imports[module].update(names)
         imports["rclpy.qos"].update(endpoint.qos.imports)
-    imports["rclpy.executors"].add("ExternalShutdownException")
     imports["rclpy.node"].add("Node")
-    if planned.asking:
-        imports["rclpy.utilities"].add("ok")
+    imports["rclpy.utilities"].add("ok")
     return _import_groups(imports, ("rclpy",))
 
 

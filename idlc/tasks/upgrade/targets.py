@@ -91,6 +91,7 @@ class Target:
             own={} if self.texts else inputs.nearby_packages(scope.root),
             exclude=scope.exclude,
             distro=self.distro or scope.distro,
+            idl=True,
         )
         return Compiler(library)
 
