@@ -1,8 +1,8 @@
 """`python -m maintenance.documents`: count the pages and words that people write for users.
 
 The words are those of README.md and docs/, without docs/contributing/, which only people who change
-idlc read, and without what programs write: parts between `<!-- … -->` and `<!-- end -->` that a command
-or a test rewrites, and the results after the arrows in docs/language.md.
+idlc read, and without what programs write: the parts after `<!-- commands -->` and
+`<!-- benchmarks -->`, and the results after the arrows in docs/language.md.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def main() -> None:
     counts = {page: words(page) for page in pages()}
     for page, count in counts.items():
         print(f"{count:6} {page.relative_to(ROOT).as_posix()}")
-    contributing = sum(count for page, count in counts.items() if page.parent.name == "contributing")
+    contributing = sum(counts[page] for page in counts if page.parent.name == "contributing")
     users = sum(counts.values()) - contributing
     print(f"{len(counts)} pages, {users:,} words; docs/contributing/: {contributing:,} words more")
 
