@@ -102,6 +102,15 @@ def file(name):
     return f"my_robot_controller/{name}.py"
 
 
+@pytest.mark.parametrize("address", ["dds"], indirect=True)
+def test_the_demo(start):
+    """`make demo ROS=no` but for its environment."""
+    demo = start(ROOT / "examples/demo.py")
+    assert demo.ends() == 0, demo.output
+    assert demo.output.splitlines()[-1].startswith("All of it agreed"), demo.output
+    assert "Traceback" not in demo.output
+
+
 def test_publisher_and_subscriber(start):
     subscriber = start(file("sensor_subscriber"))
     publisher = start(file("sensor_publisher"))
