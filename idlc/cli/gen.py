@@ -44,7 +44,19 @@ def once(request: GenOptions, style: str) -> int:
             sys.stdout.writelines([_line(package, request.check, paint) for package in packages])
     else:
         _document(report, style, packages, check=request.check)
-    return output.status(report)
+    return max(output.status(report), _lacks_types(report))
+
+
+def _lacks_types(report: Report) -> bool:
+    """Return whether idlc skipped topics of a robot, whose nodes did not send the definitions."""
+    from idlc.diagnostics import codes
+    from idlc.project.find import is_address
+
+    return any(
+        problem.code == codes.MISSING_DEFINITION.id and "idlc skips" in problem.message
+        for problem in report
+        if is_address(problem.where[0])
+    )
 
 
 def _document(
