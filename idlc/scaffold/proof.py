@@ -136,8 +136,8 @@ def prove(
     missing = missing_tool(backend) if backend else ""
     with tempfile.TemporaryDirectory(prefix="idlc-") as scratch:
         if not backend or missing:
-            why = f" ({missing} is not installed here, so idlc built nothing)" if missing else ""
-            tried = f"import {count} from the generated code in a new interpreter{why}"
+            why = f" (not tested: pip install, because `{missing}` is missing)" if missing else ""
+            tried = f"import {count} from the generated code{why}"
             return _imported(Path(scratch), source, classes, tried) if classes else Proof("")
         tried = "install a copy with pip"
         failure, wheel = _built(folder, backend, Path(scratch))
@@ -149,7 +149,7 @@ def prove(
         failure = _failure(Path(scratch), "-m", "pip", *_PIP, "--target", site, wheel)
         if failure or not classes:
             return Proof(tried, failure)
-        tried += f", and import {count} from it in a new interpreter"
+        tried += f", and import {count} from it"
         return _imported(Path(scratch), site, classes, tried)
 
 

@@ -602,7 +602,7 @@ def test_it_asks_once_on_a_terminal(project):
             print(text.decode(), os.waitpid(pid, 0)[1])
         """
         said = run(sys.executable, "-c", talk, cwd=project)
-        assert said.count("The test runs the package's own build (setup.py). [y/N]: ") == 1
+        assert said.count("The test runs the package's own build. [y/N]: ") == 1
         assert Path("bot/msg").exists() == is_written, said
         assert ("`setup.py` was changed while idlc was running" in said) == (answer == "edit")
         assert Path("setup.py").read_text().endswith("# mine") == (answer != "n")

@@ -386,7 +386,8 @@ def _moved(
             moved += _moved_files(files, names, [earlier.home / part for part in parts])
         elif submodules:
             gone_from = first_few((f"`{each}`" for each in sorted(submodules)), NAMED)
-            skipped.append(Skipped(listed, f"the old version may be in the submodule {gone_from}"))
+            reason = f"the earlier version may be in the submodule {gone_from}"
+            skipped.append(Skipped(listed, reason))
     return tuple(moved), skipped
 
 

@@ -94,10 +94,11 @@ def compare_with_recordings(
         }
     skipped = [
         Skipped(tuple(map(str, sorted(unknown))), where),
-        Skipped(tuple(sorted(earlier.undefined)), "no definition is recorded"),
+        Skipped(tuple(sorted(earlier.undefined)), "the recording contains no definition"),
     ]
     if later:
-        skipped.append(Skipped(tuple(sorted(later.undefined)), "no definition is recorded"))
+        undefined = tuple(sorted(later.undefined))
+        skipped.append(Skipped(undefined, "the recording contains no definition"))
     if not seen:
         reason = "the recordings contain none of these interfaces"
         hint = "`idlc show` lists the types of a recording; name the folder of these interfaces"
