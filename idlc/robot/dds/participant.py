@@ -314,15 +314,12 @@ class Participant:
     @property
     def deadline(self) -> float:
         """When `tick` has something to do."""
-        times = [end.deadline for end in self._ends.values() if isinstance(end, Writer)]
-        return min([self._announce_at, *(time for time in times if time is not None)])
+        return min([self._announce_at, *self.shared.due.values()])
 
     def tick(self, now: float) -> list[Outgoing]:
         """Do what is due; return the packets to send."""
         self.shared.now = now
-        for end in self._ends.values():
-            if isinstance(end, Writer):
-                end.tick()
+        self.shared.tick()
         if now >= self._announce_at:
             self._announce_at = now + next(self._periods, _PERIOD)
             self._greetings = 0

@@ -20,6 +20,8 @@ _OVERHEAD = 256
 _AHEAD = 256
 _MOST_PARTIAL = 8
 _MOST_REMEMBERED = 256
+#: Seconds until a writer is told that nothing is missing.
+_ANSWER = 0.01
 #: Cyclone DDS as a vendor.
 _CYCLONE = b"\x01\x10"
 
@@ -52,12 +54,20 @@ class Shared:
     def __init__(self, fragment: Callable[[str], int]) -> None:
         self.fragment = fragment
         self.now = 0.0
+        #: What the ends have to do, and when.
+        self.due: dict[Callable[[], None], float] = {}
         self._packets: list[Outgoing] = []
         self._used: Counter[bytes] = Counter()
 
     def send(self, end: Remote, *parts: bytes) -> None:
         """Send parts of a packet to an end."""
         self._packets.append(Outgoing(end.address, end.prefix, parts))
+
+    def tick(self) -> None:
+        """Do what is due."""
+        for action in [action for action, time in self.due.items() if time <= self.now]:
+            del self.due[action]
+            action()
 
     def collect(self) -> list[Outgoing]:
         """Return the packets to send, once."""
@@ -87,26 +97,6 @@ class Received(NamedTuple):
     payload: bytes
     is_key: bool
     time: int
-
-
-class Room:
-    """The bytes of the samples that wait, by the participant that sent them."""
-
-    def __init__(self) -> None:
-        self._used: Counter[bytes] = Counter()
-
-    def take(self, prefix: bytes, size: int) -> bool:
-        """Take bytes; a participant gets at most as many as are left for the others."""
-        if self._used[prefix] + size > MOST_WAITING - self._used.total():
-            return False
-        self._used[prefix] += size
-        return True
-
-    def free(self, prefix: bytes, size: int) -> None:
-        """Give bytes back."""
-        self._used[prefix] -= size
-        if not self._used[prefix]:
-            del self._used[prefix]
 
 
 class _Partial:
@@ -155,6 +145,8 @@ class RemoteWriter(Remote):
         self.partial: OrderedDict[int, _Partial] = OrderedDict()
         self.bytes = 0
         self.count = 0
+        #: True if it waits to be told that nothing is missing.
+        self.waits = False
 
 
 class Reader:
@@ -335,11 +327,27 @@ class Reader:
         if writer.next < part.first:
             self._skip(writer, part.first)
         self._drain(writer)
-        base = writer.next
-        ahead = range(base, min(part.last, base + _AHEAD - 1) + 1)
-        missing = [number for number in ahead if number not in writer.early]
-        if part.is_final and not missing:
-            return
+        missing = self._missing(writer, writer.next)
+        if missing:
+            self._answer(writer, missing)
+        elif not part.is_final:
+            writer.waits = True
+            self._shared.due.setdefault(self.tick, self._shared.now + _ANSWER)
+
+    def tick(self) -> None:
+        """Tell the writers that wait that nothing is missing, or what is missing now."""
+        for writer in self.writers.values():
+            if writer.waits and writer.next is not None:
+                self._answer(writer, self._missing(writer, writer.next))
+
+    def _missing(self, writer: RemoteWriter, base: int) -> list[int]:
+        """Return the numbers that a writer has told of and that have not arrived, of 256."""
+        ahead = range(base, min(writer.last, base + _AHEAD - 1) + 1)
+        return [number for number in ahead if number not in writer.early]
+
+    def _answer(self, writer: RemoteWriter, missing: list[int]) -> None:
+        """Ask a writer for what is missing, and tell it that all before has arrived."""
+        writer.waits = False
         writer.count += 1
         ids = self.id, writer.id
         parts = []
@@ -348,5 +356,7 @@ class Reader:
                 lacking = writer.partial[number].missing()
                 parts.append(formats.format_nack_fragment(*ids, number, lacking, writer.count))
         whole = [number for number in missing if number not in writer.partial]
-        acknack = formats.format_acknack(*ids, base, whole, writer.count, is_final=not whole)
+        acknack = formats.format_acknack(
+            *ids, writer.next or 0, whole, writer.count, is_final=not whole
+        )
         self._shared.send(writer, *parts, acknack)
