@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 
 from idlc.robot.dds import address, formats, wire
 from idlc.robot.dds.participant import Participant
-from idlc.robot.dds.reader import Outgoing
+from idlc.robot.dds.shared import Outgoing
 from idlc.robot.dds.writer import Writer
 
 #: The longest sleep of the thread, in which another thread may make something due.

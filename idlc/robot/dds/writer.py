@@ -6,8 +6,9 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from idlc.robot.dds import formats, wire
-from idlc.robot.dds.reader import Address, Reader, Received, Remote, Shared
+from idlc.robot.dds import cyclone, formats, wire
+from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 #: Seconds between heartbeats for readers that lack something.
@@ -150,6 +151,8 @@ class Writer:
         `tail` follows in the same packet.
         """
         payload, inline, time = self.history[number]
+        if inline and payload and is_cyclone(reader.guid):
+            payload, inline = cyclone.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
         if len(payload) <= size:
             self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
