@@ -231,7 +231,13 @@ class LocalTypes:
         self.scope = scope
         self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
-            scope.include, scope.root, report, own=self.near, distro=scope.distro, texts=texts
+            scope.include,
+            scope.root,
+            report,
+            own=self.near,
+            distro=scope.distro,
+            texts=texts,
+            idl=True,
         )
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
@@ -301,7 +307,7 @@ class RecordedTypes:
         self.texts = texts
         scope, own, texts = local.scope, local.near, {**local.library.texts, **texts}
         self.library = Library(
-            scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts
+            scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts, idl=True
         )
         self.topics = tuple(self._typed(version, report))
         compiler = Compiler(self.library)
