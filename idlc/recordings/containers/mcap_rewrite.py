@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, TypeAlias
@@ -26,7 +27,7 @@ from idlc.recordings.containers.conversion import (
 )
 from idlc.recordings.containers.file import Schema, check_count, full_name
 from idlc.recordings.containers.mcap import Facts, read_facts
-from idlc.recordings.containers.mcap_messages import MESSAGE
+from idlc.recordings.containers.mcap_messages import MESSAGE, indexed_messages
 from idlc.recordings.containers.mcap_writer import (
     Content,
     McapWriter,
@@ -42,6 +43,7 @@ from idlc.recordings.containers.records import (
     MAGIC,
     MESSAGE_OP,
     SCHEMA_OP,
+    Chunk,
     Fields,
     heads,
     sound_heads,
@@ -250,7 +252,7 @@ class Rewriting:
             # without a checksum, the messages before the damage are as good as any
             is_cut = True
             self.damage.add(error.message, at, at + size)
-            content = Content(data[: records.sound_size(data)], self.room)
+            content = Content(memoryview(self._salvaged(at, data)), self.room)
         self._define_channels(content)
         edits = self._edits(content, set())
         if edits or is_cut:
@@ -259,6 +261,24 @@ class Rewriting:
             content, crc = Content(new), zlib.crc32(new)
             stored = memoryview(compress(new, head.compression))
         self.writer.add_chunk(content, head.compression, stored, crc)
+
+    @cached_property
+    def _chunks(self) -> dict[int, Chunk]:
+        """The known chunks, by their places."""
+        return {chunk.at: chunk for chunk in self.facts.chunks}
+
+    def _salvaged(self, at: int, data: memoryview) -> bytes:
+        """Return the records of a damaged chunk before the damage, and messages in its indexes."""
+        end = records.sound_size(data)
+        parts: list[Raw] = [data[:end]]
+        chunk = self._chunks.get(at)
+        if chunk is not None:
+            indexed = indexed_messages(self.source, chunk, data, self.facts.channels)
+            for start, stop in sorted(indexed):
+                if start >= end:
+                    parts.append(data[start:stop])
+                    end = stop
+        return b"".join(parts)
 
     def _other(self, op: int, at: int, size: int) -> None:
         """Copy a record, of any size."""
@@ -298,13 +318,29 @@ class Rewriting:
         for op, at, number, data in content.definitions:
             if (op, number) not in self.facts.raws:
                 raise _UnlistedError
-            self.facts.add(op, data)
+            is_sound = self._is_sound(op, data)
             new = self._definition(op, number, known)
+            if new is None and not is_sound:
+                new = record(op, self.plan.contents[op, number])
             end = at + HEAD.size + len(data)
             if new is not None and new != content.data[at:end]:
                 edits.append((at, end, new))
         edits += self._messages(content)
         return sorted(edits)
+
+    def _is_sound(self, op: int, data: memoryview) -> bool:
+        """Return whether a definition is the known one; if it is damaged, that takes its place."""
+        try:
+            self.facts.add(op, data)
+        except DamageError as error:
+            self.damage.add(error.message)
+        except RecordingError as error:
+            if self.facts.loose is None and not self.damage:  # nothing says which one is right
+                raise
+            self.damage.add(error.message)
+        else:
+            return True
+        return False
 
     def _definition(self, op: int, number: int, known: set[int]) -> bytes | None:
         """Return what takes the place of a definition, None if it stays."""
@@ -326,7 +362,13 @@ class Rewriting:
         return new
 
     def _messages(self, content: Content) -> Iterator[Edit]:
-        """Yield the messages with new payloads."""
+        """Yield the messages with new payloads, and those of channels without a definition."""
+        for number in content.by_channel.keys() - self.facts.channels.keys():
+            mine = content.by_channel[number]
+            starts = content.places[mine]
+            stops = starts + HEAD.size + content.heads["size"][mine].astype(np.int64)
+            for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+                yield start, stop, b""
         by_topic: dict[tuple[str, str | None], list[Any]] = {}
         for number, mine in content.by_channel.items():
             change = self.plan.changed.get(number)
