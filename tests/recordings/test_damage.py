@@ -191,6 +191,25 @@ def test_a_copy_has_what_is_read_of_a_damaged_file_and_no_damage(tmp_path):
     assert copied > 0
 
 
+#: Numbers of damages by one generator, for kinds that one in a hundred shows.
+RARE = (98, 123, 178, 399, 496, 596, 816, 1245)
+
+
+@pytest.mark.long
+def test_copies_of_rare_damage_have_what_is_read(tmp_path):
+    path, rng = tmp_path / "a.mcap", random.Random(992026)
+    sound = list(mcap_files(tmp_path))
+    for number in range(RARE[-1] + 1):
+        raw = damaged(sound[number % len(sound)][0], rng)
+        if number in RARE:
+            path.write_bytes(raw)
+            messages, _ = read(path, check=True)
+            rewrite(str(path), str(tmp_path / f"{number}.mcap"), {})
+            again, copy = read(tmp_path / f"{number}.mcap")
+            assert again == messages, number
+            assert not copy.damage, number
+
+
 def split_with_metadata(folder, storage, style):
     """Write a bag of three files with a metadata.yaml, as rosbag2 does."""
     folder.mkdir()
