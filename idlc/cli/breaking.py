@@ -237,9 +237,9 @@ def _compare_files(
     import msgspec
 
     from idlc.cli import output
-    from idlc.project.git import GIT
     from idlc.tasks.breaking.files import breaking
     from idlc.versions.distribution import is_distro
+    from idlc.versions.revision import GIT
 
     against = comparison.against
     if is_distro(against) or against.startswith(GIT):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from idlc.scaffold.init import Draft, Preparation
     from idlc.scaffold.layouts import Layout
 
-TEST = "The test runs the package's own build (setup.py)."
+TEST = "The test runs the package's own build."
 CONSENT = f"Write these changes, compile and test? {TEST}"
 
 
@@ -81,7 +81,7 @@ def command(path: str, service: str | None, yes: bool) -> int:
         if not click.confirm(CONSENT, default=False):
             return max(status, 1)
     for draft in extras:
-        note = "note: idlc's docs/ci.md describes what this file installs, and from where\n"
+        note = "next: see docs/ci.md in idlc's repository, for how the job gets idlc\n"
         status = max(status, _write(draft, note * (draft is checks)))
     for preparation in planned:
         status = max(status, _finish(preparation, root, again=yes))

@@ -20,10 +20,12 @@ if TYPE_CHECKING:
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8
-HEAD = ("topic", "type", "messages", "rate", "size", "QoS", "hash", "here")
+HEAD = ("topic", "type", "messages", "rate", "size", "QoS", "hash", "installed")
 #: Columns of numbers.
 NUMBERS = {"messages", "rate", "size"}
-ROBOT_HEAD = ("", "name", "type", "hash", "here", "from", "to", "QoS")
+ROBOT_HEAD = ("", "name", "type", "hash", "installed", "from", "to", "QoS")
+#: How text says whether the type of this machine is that of the recording or robot.
+INSTALLED = {"same": "same", "differs": "different", "unknown": "-"}
 #: Nodes, profiles and mismatches that text lists.
 LISTED = 3
 MISMATCHES = 20
@@ -45,7 +47,7 @@ def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
         type_ = one_line(facts.type_name)
         rate = "-" if facts.rate is None else f"{facts.rate:.4g} Hz"
         size = "-" if facts.size is None else size_text(facts.size)
-        qos, here = one_line(facts.qos or "-"), facts.here + no_definition
+        qos, here = one_line(facts.qos or "-"), INSTALLED[facts.here] + no_definition
         rows.append((name, type_, count, rate, size, qos, hash_[:SHORT], here))
     yield from _aligned(HEAD, rows)
 
@@ -111,9 +113,9 @@ def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
         )
         profiles = dict.fromkeys(map(_qos, each.qos or each.requested))
         qos = first_few(profiles, LISTED) if each.noun == "topic" else ""
-        hash_ = (each.hash or "-")[:SHORT]
+        hash_, installed = (each.hash or "-")[:SHORT], INSTALLED[each.here]
         rows.append(
-            (each.noun, each.name, each.type_name, hash_, each.here, senders, receivers, qos)
+            (each.noun, each.name, each.type_name, hash_, installed, senders, receivers, qos)
         )
     yield from _aligned(ROBOT_HEAD, rows)
 

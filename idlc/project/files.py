@@ -150,6 +150,13 @@ def too_large(name: str) -> Diagnostic:
     return codes.TOO_LARGE.of(name, message, hint=hint)
 
 
+def leading_out(name: str) -> Diagnostic:
+    """Return the problem with a link of a git repository that leads out of it."""
+    message = f"idlc does not follow `{name}`, a link that leads out of its git repository"
+    hint = "replace the link with what it leads to, or remove it from the repository"
+    return codes.UNREADABLE.of(name, message, hint=hint)
+
+
 def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
     """Return the problem with a path that cannot be read."""
     if isinstance(error, OSError) and error.errno == errno.ENOENT:

@@ -250,7 +250,7 @@ def prepare(
     if layout.kind in ("ament_python", "empty"):
         note = _ament_python(draft, layout, model, files, report)
     elif layout.kind == "ament_cmake":
-        _ament_cmake(draft, inputs)
+        _ament_cmake(draft, inputs, report)
     elif layout.backend.startswith("setuptools."):
         _setuptools(draft, out, files, report)
     if layout.kind == "library" and _has_arrays(model):
@@ -449,8 +449,8 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
     return note
 
 
-def _ament_cmake(draft: Draft, inputs: Inputs) -> None:
-    """Fix package.xml and CMakeLists.txt as `idlc check --fix` does."""
+def _ament_cmake(draft: Draft, inputs: Inputs, report: Report) -> None:
+    """Fix package.xml and CMakeLists.txt as `idlc check --fix` does; report why no build works."""
     reasons = {
         MANIFEST: "the package declares the packages that its interfaces use",
         "CMakeLists.txt": "rosidl receives each interface and the packages that it uses",
@@ -468,6 +468,7 @@ def _ament_cmake(draft: Draft, inputs: Inputs) -> None:
                 draft.put(path, apply(own[0].span.source.text, own)[0], reason)
         if not edits:
             break
+    report.extend(each for each in problems if each.code == codes.CANNOT_BUILD.id)
 
 
 def _place(source: Source, error: BaseException) -> Span:

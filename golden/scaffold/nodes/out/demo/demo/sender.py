@@ -1,4 +1,4 @@
-"""Sends goals to dock."""
+"""Sends dock goals."""
 
 from typing import Any
 

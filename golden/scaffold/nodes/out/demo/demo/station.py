@@ -1,4 +1,4 @@
-"""Executes goals of dock."""
+"""Executes dock goals."""
 
 from demo.action import Dock
 import rclpy
