@@ -3,12 +3,11 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from idlc.robot.dds.reader import Reader
 from idlc.robot.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from tests.robot.test_dds_network import ALL, Network, text
+from tests.support.examples import given, settings, st
 from tests.support.rounds import ALL as WHOLE
 from tests.support.rounds import SEED, rounds
 
