@@ -637,6 +637,7 @@ def test_a_service_gets_the_file_of_the_documents(service, after, path, project,
     assert tree(project) == before
 
 
+@pytest.mark.usefixtures("unproved")
 def test_a_service_gets_the_idlc_that_it_runs(project, capsys):
     """A workflow needs idlc in the repository; pre-commit needs a fixed commit of a clone."""
     (block,) = re.findall(r"(?ms)^```sh\n(python3 -I.*?)^```$", (DOCS / "ci.md").read_text())
