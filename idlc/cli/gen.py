@@ -48,12 +48,12 @@ def once(request: GenOptions, style: str) -> int:
 
 
 def _lacks_types(report: Report) -> bool:
-    """Return whether idlc skipped topics of a robot, whose nodes did not send the definitions."""
+    """Return whether nodes of a robot did not send the definitions of some topics."""
     from idlc.diagnostics import codes
     from idlc.project.find import is_address
 
     return any(
-        problem.code == codes.MISSING_DEFINITION.id and "idlc skips" in problem.message
+        problem.code == codes.MISSING_DEFINITION.id and "does not define" in problem.message
         for problem in report
         if is_address(problem.where[0])
     )

@@ -147,17 +147,17 @@ def test_no_silent_node_costs_a_message_or_a_second(router, capsys, monkeypatch)
         robot.close()
 
 
-def test_the_time_without_a_robot_is_in_the_file(address, capsys, monkeypatch):
+def test_the_time_without_a_robot_is_in_the_file(router, capsys, monkeypatch):
     """A robot that goes away and comes back, as behind a router that restarts."""
-    robots = [Robot(address)]
+    robots = [Robot(router)]
     publish = robots[0].publisher("/words", "std_msgs/msg/String", LATCHED)
     publish(standard("std_msgs/msg/String")(data="before"))
-    run, note, steps = Recorder.run, Recorder._note_gap, iter(range(10_000))
+    run, note, steps = Recorder.run, Recorder._note_gap, iter(range(1000))
 
     def went_away(recorder, is_there):
         note(recorder, is_there)
         if not is_there and len(robots) == 1:
-            robots.append(Robot(address))
+            robots.append(Robot(router))
             robots[1].publisher("/words", "std_msgs/msg/String", LATCHED)
         elif is_there and len(robots) == 2:
             robots.append(None)  # the gap is over
@@ -171,7 +171,7 @@ def test_the_time_without_a_robot_is_in_the_file(address, capsys, monkeypatch):
     monkeypatch.setattr("idlc.robot.live.recorder.TICK", 0.05)
     monkeypatch.setattr(Recorder, "_note_gap", went_away)
     monkeypatch.setattr(Recorder, "run", lambda recorder, _: run(recorder, is_over))
-    assert main(["record", address, "-o", "a.mcap"]) == 0
+    assert main(["record", router, "-o", "a.mcap"]) == 0
     assert "note: the robot was not there for " in capsys.readouterr().err
     with Path("a.mcap").open("rb") as file:
         (gap,) = make_reader(file).iter_metadata()
