@@ -1,5 +1,6 @@
 """The executor, futures, tasks, timers, clocks, arguments and loggers, without a network."""
 
+import asyncio
 import sys
 import threading
 import time
@@ -62,6 +63,26 @@ def simulated():
 
 
 # futures and tasks
+
+
+def test_asyncio_awaits_futures_while_it_spins_the_executor(executor):
+    async def add(future):
+        return await future + 1
+
+    async def main():
+        first = Future()
+        task = asyncio.create_task(add(first))
+        other = executor.create_task(add(first))
+        for _ in range(3):
+            executor.spin_once(timeout_sec=0)
+            await asyncio.sleep(0)
+        assert (task.done(), other.done()) == (False, False)
+        first.set_result(1)
+        while not other.done():
+            executor.spin_once(timeout_sec=0)
+        return await task, other.result()
+
+    assert asyncio.run(asyncio.wait_for(main(), LIMIT)) == (2, 2)
 
 
 def test_a_coroutine_goes_on_when_what_it_awaits_is_there(executor):

@@ -6,6 +6,7 @@ Threads of the transport only append to bounded queues and wake it.
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Generator
 from concurrent import futures
@@ -31,7 +32,7 @@ class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
 
 
 class Future(futures.Future[T]):
-    """A result that comes later; `await` it in a coroutine that an executor runs.
+    """A result that comes later; `await` it in a coroutine that an executor or asyncio runs.
 
     Callbacks run in the executor, or at once on the thread that sets the result if there is none.
     """
@@ -42,7 +43,8 @@ class Future(futures.Future[T]):
 
     def __await__(self) -> Generator[Any, None, T]:
         while not self.done():
-            yield self
+            # a task of asyncio asks again, as in rclpy; an executor waits for the future
+            yield None if _is_in_asyncio() else self
         return self.result()  # type: ignore[return-value] # as in rclpy, `None` if cancelled
 
     def result(self, timeout: float | None = None) -> T | None:  # type: ignore[override]
@@ -77,6 +79,17 @@ class Future(futures.Future[T]):
     def wake_at_end(self, waiter: Callback) -> None:
         """Call `waiter` on the thread that ends the future, or now."""
         super().add_done_callback(lambda _: waiter())
+
+
+def _is_in_asyncio() -> bool:
+    if "asyncio" not in sys.modules:
+        return False
+    import asyncio
+
+    with suppress(RuntimeError):
+        asyncio.get_running_loop()
+        return True
+    return False
 
 
 async def call(callback: Callable[..., Any], *args: Any) -> Any:
