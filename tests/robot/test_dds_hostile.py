@@ -8,10 +8,12 @@ from collections import Counter
 import pytest
 
 from idlc.robot.dds import cyclone, discovery, formats, info, wire
+from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.shared import MOST_WAITING, Received
-from tests.robot.test_dds_network import ALL, LATCHED, PORT, Network, text
+from tests.robot.test_dds_network import ALL, LATCHED, PORT, TYPE, Network, text
 from tests.support.rounds import SEED, rounds
 
 #: A head, from a participant that a test makes known.
@@ -116,6 +118,19 @@ def test_what_a_peer_draws_and_keeps_is_bounded():
         answers = own.receive(head + question + ask + pieces, ("10.0.0.2", PORT), network.now)
         drawn += sum(len(each) for answer in answers for each in answer.parts)
     assert 1_000_000 < drawn < 10_000_000
+    # and with one packet, for all small samples many times
+    for number in range(200):
+        network.write(own, writer, text(number))
+    network.now += 60
+    asks = [
+        formats.format_acknack(
+            reader.id, writer.id, writer.last - 2, [*range(writer.last - 2, writer.last + 1)],
+            count, is_final=False,
+        )
+        for count in range(2000, 3300)
+    ]  # fmt: skip
+    answers = own.receive(head + b"".join(asks), ("10.0.0.2", PORT), network.now)
+    assert 0 < len(answers) < 5000
     # it sends the second half of everything
     far = next(end for end in own._ends.values() if end.qos is ALL and hasattr(end, "writers"))
     theirs = next(iter(far.writers.values()))
@@ -198,6 +213,53 @@ def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order)
         assert (named is None) == (end < 20)
         assert named in (None, (b"a name of 16 byt", 2**40))
     assert payload == body
+
+
+def test_many_heartbeats_draw_one_answer_at_a_time():
+    network, _ = conversation()
+    own = network.hosts["10.0.0.1"]
+    reader = next(end for end in own._ends.values() if end.qos is ALL and hasattr(end, "writers"))
+    (theirs,) = reader.writers.values()
+    beats = [
+        formats.format_heartbeat(reader.id, theirs.id, theirs.next, theirs.next + 9, count)
+        for count in range(1000, 3000)
+    ]
+    head = HEAD + formats.for_participant(own.prefix)
+    answers = own.receive(head + b"".join(beats), ("10.0.0.2", PORT), network.now)
+    assert len(answers) == 1
+    assert len(own.tick(network.now + 0.02)) in (1, 2)
+
+
+def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():
+    topics = ("rt/a", "rt/\x1b[2J", "rt/a%b", "rt/a/", "rt/", "a", "rt//a")
+    ends = [
+        Endpoint(SOURCE + bytes([0, 0, number, 3]), topic, TYPE, ALL)
+        for number, topic in enumerate(topics)
+    ]
+    names = (("/", "a"), ("/a%b", "c"), ("/", "a%b"), ("", "b\n"))
+    nodes = [info.NodeInfo(*each, (), ()) for each in names]
+    remote = RemoteNodes(0)
+    payload = info.format_info(SOURCE, nodes)
+    assert remote.learn(Received(SOURCE + bytes(4), 1, wire.NONE, payload, False, 0))
+    shown = [*remote.entities([SOURCE], ends, {})]
+    assert [(entity.node, entity.name) for entity in shown] == [
+        ("a", ""), ("_NODE_NAME_UNKNOWN_", "/a"),
+    ]  # fmt: skip
+
+
+def test_what_participants_tell_of_nodes_is_bounded():
+    remote = RemoteNodes(0)
+    nodes = [info.NodeInfo("/", "a", (bytes(16),) * 4000, ()) for _ in range(10)]
+    payload = info.format_info(SOURCE, nodes)
+    taken = 0
+    for number in range(10):
+        name = bytes([number]) * 12
+        told = payload[:4] + name + payload[16:]
+        for _ in range(2):
+            taken += remote.learn(Received(name + bytes(4), 1, wire.NONE, told, False, 0))
+    assert taken == 2
+    with pytest.raises(wire.WireError):
+        info.parse_info(bytes(2_000_000))
 
 
 def test_other_packets_than_rtps_are_counted():

@@ -13,7 +13,7 @@ from idlc.robot.dds import info, wire
 from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.shared import Received
 from idlc.robot.keys import Entity, Kind
-from idlc.robot.names import ros_type
+from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
 
 #: The last byte of the id of a writer and of a reader.
 WRITER, READER = b"\x03", b"\x04"
@@ -23,6 +23,8 @@ HALVES = {"rq": ("Request", "Request_"), "rr": ("Reply", "Response_")}
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 #: Endpoints whose entities are not made again after each change.
 _MOST_CACHED = 2**14
+#: Nodes and their endpoints, of all participants.
+_MOST_OF_ALL = 2**16
 #: The kinds of endpoints; a service and a client are shown as their readers.
 _KINDS = {
     ("rt", True): Kind.PUBLISHER,
@@ -63,10 +65,12 @@ class RemoteNodes:
             guid, nodes = info.parse_info(received.payload)
         except wire.WireError:
             return False
+        prefix = guid[: wire.PREFIX]
+        others = sum(_size(each) for name, each in self._nodes.items() if name != prefix)
         # nobody speaks for another participant
-        if guid[: wire.PREFIX] != received.writer[: wire.PREFIX]:
+        if prefix != received.writer[: wire.PREFIX] or others + _size(nodes) > _MOST_OF_ALL:
             return False
-        self._nodes[guid[: wire.PREFIX]] = nodes
+        self._nodes[prefix] = nodes
         return True
 
     def entities(
@@ -91,6 +95,10 @@ class RemoteNodes:
         for end in endpoints:
             if entity := _endpoint(end, owners.get(end.guid, unknown), hashes.get(_names(end), "")):
                 yield entity
+
+
+def _size(nodes: tuple[info.NodeInfo, ...]) -> int:
+    return sum(1 + len(node.readers) + len(node.writers) for node in nodes)
 
 
 class _Owner(NamedTuple):
@@ -130,7 +138,10 @@ def _endpoint(end: Endpoint, owner: _Owner, service: str) -> Entity | None:
 
 
 def _entity(prefix: bytes, owner: _Owner, number: int, kind: Kind, **more: Any) -> Entity | None:
-    """Return an entity of another participant; `None` if its type has no valid name."""
+    """Return an entity of another participant; `None` if a name or its type is not valid."""
+    is_valid = is_namespace(owner.namespace) and is_node_name(owner.name)
+    if not is_valid or (kind is not Kind.NODE and not is_absolute(more["name"])):
+        return None
     try:
         return Entity(
             domain=owner.domain,

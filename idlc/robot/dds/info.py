@@ -13,6 +13,8 @@ TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
 _MOST_NODES = 1024
 _MOST_ENDS = 4096
 _MOST_NAME = 512
+#: Bytes of a message.
+_MOST = 2**20
 
 
 class NodeInfo(NamedTuple):
@@ -65,6 +67,8 @@ def parse_info(payload: bytes) -> tuple[bytes, tuple[NodeInfo, ...]]:
 
     The ids have 24 bytes on Humble and 16 since; only one of the two fits the payload.
     """
+    if len(payload) > _MOST:
+        raise WireError("too large")
     try:
         return _parse(payload, GUID)
     except WireError:

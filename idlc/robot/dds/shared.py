@@ -12,6 +12,9 @@ from idlc.robot.dds import wire
 Address: TypeAlias = tuple[str, int]
 #: Bytes of all samples that cannot be delivered yet.
 MOST_WAITING = 512 << 20
+#: Bytes that the questions of a participant draw at once, and in a second; those that a packet
+#: costs besides; and the participants for which that is remembered.
+_MOST_DRAWN, _DRAWN, _PACKET, _MOST_KNOWN = 4 << 20, 64 << 20, 1024, 4096
 
 
 def is_cyclone(guid: bytes) -> bool:
@@ -51,6 +54,8 @@ class Shared:
         self.due: dict[Callable[[], None], float] = {}
         self._packets: list[Outgoing] = []
         self._used: Counter[bytes] = Counter()
+        #: The bytes that participants may draw, and when that was so.
+        self._drawn: dict[bytes, tuple[int, float]] = {}
 
     def send(self, end: Remote, *parts: bytes) -> None:
         """Send parts of a packet to an end."""
@@ -66,6 +71,16 @@ class Shared:
         """Return the packets to send, once."""
         packets, self._packets = self._packets, []
         return packets
+
+    def may_draw(self, prefix: bytes, size: int) -> bool:
+        """Return whether a participant that asks for it gets a sample of this size now."""
+        room, at = self._drawn.pop(prefix, (_MOST_DRAWN, self.now))
+        room = min(_MOST_DRAWN, room + int((self.now - at) * _DRAWN))
+        is_free = room > 0
+        self._drawn[prefix] = room - (size + _PACKET if is_free else 0), self.now
+        if len(self._drawn) > _MOST_KNOWN:
+            del self._drawn[next(iter(self._drawn))]
+        return is_free
 
     def take(self, prefix: bytes, size: int) -> bool:
         """Take bytes for samples of a participant; return whether there was room."""

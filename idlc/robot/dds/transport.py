@@ -67,7 +67,7 @@ class DdsTransport:
         self._remote = RemoteNodes(place.domain)
         self._watchers: list[Callable[[str, bool], None]] = []
         self._shown: dict[str, None] = {}
-        self._refreshed = 0.0
+        self._refreshed = self._refresh_at = 0.0
         self._is_stale = True
         #: Whether the others have to be told about the own nodes, and when that is due.
         self._is_news, self._news_at = False, 0.0
@@ -141,7 +141,8 @@ class DdsTransport:
         self._services.tick(now)
         if self._is_news and now >= self._news_at:
             self._publish(now)
-        if self._is_stale or self._connection.changed_at > self._refreshed:
+        is_changed = self._is_stale or self._connection.changed_at > self._refreshed
+        if is_changed and now >= self._refresh_at:
             self._refresh()
 
     # the graph
@@ -195,6 +196,9 @@ class DdsTransport:
             for token in self._shown:
                 if token not in shown:
                     watcher(token, True)
+        # a graph that takes long, as somebody makes it large, takes a part of the time
+        now = time.monotonic()
+        self._refresh_at = now + 4 * (now - self._refreshed)
 
     def watch(
         self,
