@@ -110,10 +110,15 @@ def _check_files(options: CheckOptions, report: Report) -> CheckResult:
     report.extend((*looked, *problems))
     report.notes += looked.notes
     first = next(iter(checking.values()))
-    looked_at = [*filter(None, map(first.package_facts, packages))]
-    unjudged = (note(each) for each in looked_at for note in (cmake_lists.unknown, builds.unjudged))
-    notes = (*filter(None, unjudged), *filter(None, (_unread(each, scope) for each in packages)))
+    looked_at = filter(None, map(first.package_facts, packages))
+    notes = (*_unjudged(looked_at), *filter(None, (_unread(each, scope) for each in packages)))
     return CheckResult(files, len(packages), fixed, distros, notes, texts)
+
+
+def _unjudged(packages: Iterable[Facts]) -> Iterator[str]:
+    """Yield what `check` cannot judge in the builds of packages."""
+    for package in packages:
+        yield from filter(None, (cmake_lists.unknown(package), builds.unjudged(package)))
 
 
 def _unread(package: inputs.Inputs, scope: Scope) -> str:
@@ -155,11 +160,11 @@ def _with_recordings(
     problems = Report()
     check_recordings(recordings, options.scope, problems)
     report.extend(problem for problem in problems if options.selection.wants(problem))
-    report.notes += problems.notes
     checked = CheckResult(())
     if others:
         checked = check(msgspec.structs.replace(options, paths=tuple(others)), report)
-    return msgspec.structs.replace(checked, files=(*recordings, *checked.files))
+    files, notes = (*recordings, *checked.files), (*problems.notes, *checked.notes)
+    return msgspec.structs.replace(checked, files=files, notes=notes)
 
 
 def keep_layout(name: str, old: str, new: str) -> str:

@@ -118,7 +118,7 @@ def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys
     printed = capsys.readouterr().out
     assert sample.words in printed
     assert tree(project) == before
-    warning = r"The test runs the package's own build \(setup.py\)\."
+    warning = r"The test runs the package's own build\."
     assert re.search(rf"{warning}\nnothing was written; next: idlc init --yes\n$", printed)
     assert main(["init", "--yes"]) == 0
     printed, problems = capsys.readouterr()

@@ -61,6 +61,8 @@ class _Sender(_Closer):
 class DdsTransport:
     """The declarations of one participant."""
 
+    connects_all = False
+
     def __init__(self, place: Place) -> None:
         self.place = place
         self._own: dict[str, Entity] = {}
