@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from idlc.robot.dds import cyclone, discovery, formats, info, wire
+from idlc.robot.dds import discovery, formats, graph, wire
 from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
@@ -206,10 +206,10 @@ def test_extremes_are_refused_at_once(case, order):
 def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order):
     inline = discovery.format_related(b"a name of 16 byt", 2**40)
     body = order + b"\0\0" + b"body"
-    sent = cyclone.wrap(body, inline)
+    sent = discovery.wrap(body, inline)
     for end in range(len(sent) + 1):
         sample = Received(b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
-        payload, named = cyclone.unwrap(sample, b"a name o")
+        payload, named = discovery.unwrap(sample, b"a name o")
         assert (named is None) == (end < 20)
         assert named in (None, (b"a name of 16 byt", 2**40))
     assert payload == body
@@ -237,9 +237,9 @@ def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():
         for number, topic in enumerate(topics)
     ]
     names = (("/", "a"), ("/a%b", "c"), ("/", "a%b"), ("", "b\n"))
-    nodes = [info.NodeInfo(*each, (), ()) for each in names]
+    nodes = [graph.NodeInfo(*each, (), ()) for each in names]
     remote = RemoteNodes(0)
-    payload = info.format_info(SOURCE, nodes)
+    payload = graph.format_info(SOURCE, nodes)
     assert remote.learn(Received(SOURCE + bytes(4), 1, wire.NONE, payload, False, 0))
     shown = [*remote.entities([SOURCE], ends, {})]
     assert [(entity.node, entity.name) for entity in shown] == [
@@ -249,8 +249,8 @@ def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():
 
 def test_what_participants_tell_of_nodes_is_bounded():
     remote = RemoteNodes(0)
-    nodes = [info.NodeInfo("/", "a", (bytes(16),) * 4000, ()) for _ in range(10)]
-    payload = info.format_info(SOURCE, nodes)
+    nodes = [graph.NodeInfo("/", "a", (bytes(16),) * 4000, ()) for _ in range(10)]
+    payload = graph.format_info(SOURCE, nodes)
     taken = 0
     for number in range(10):
         name = bytes([number]) * 12
@@ -259,7 +259,7 @@ def test_what_participants_tell_of_nodes_is_bounded():
             taken += remote.learn(Received(name + bytes(4), 1, wire.NONE, told, False, 0))
     assert taken == 2
     with pytest.raises(wire.WireError):
-        info.parse_info(bytes(2_000_000))
+        graph.parse_info(bytes(2_000_000))
 
 
 def test_other_packets_than_rtps_are_counted():
@@ -269,17 +269,17 @@ def test_other_packets_than_rtps_are_counted():
     assert own.malformed == 5
 
 
-NODES = [info.NodeInfo("/ns", "talker", (b"r" * 16,), (b"w" * 16, b"x" * 16))]
+NODES = [graph.NodeInfo("/ns", "talker", (b"r" * 16,), (b"w" * 16, b"x" * 16))]
 
 
 def test_nodes_are_read_as_they_were_written_and_cut_off_ones_are_refused():
-    payload = info.format_info(b"p" * 12, NODES)
-    assert info.parse_info(payload) == (b"p" * 12 + b"\0\0\1\xc1", tuple(NODES))
+    payload = graph.format_info(b"p" * 12, NODES)
+    assert graph.parse_info(payload) == (b"p" * 12 + b"\0\0\1\xc1", tuple(NODES))
     for end in range(len(payload) - 4):
         with pytest.raises(wire.WireError):
-            info.parse_info(payload[:end])
+            graph.parse_info(payload[:end])
     with pytest.raises(wire.WireError):
-        info.parse_info(payload[:20] + b"\xff\xff\xff\xff" + payload[24:])
+        graph.parse_info(payload[:20] + b"\xff\xff\xff\xff" + payload[24:])
 
 
 def test_the_ids_of_humble_have_24_bytes():
@@ -289,4 +289,4 @@ def test_the_ids_of_humble_have_24_bytes():
     payload = b"\0\1\0\0" + gid(b"p") + struct.pack("<I", 1) + struct.pack("<I", 4) + b"/ns\0"
     payload += struct.pack("<I", 7) + b"talker\0\0" + struct.pack("<I", 1) + gid(b"r")
     payload += struct.pack("<I", 2) + gid(b"w") + gid(b"x")
-    assert info.parse_info(payload) == (b"p" * 16, tuple(NODES))
+    assert graph.parse_info(payload) == (b"p" * 16, tuple(NODES))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.robot.dds import cyclone, discovery, wire
+from idlc.robot.dds import discovery, wire
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.graph import HALVES, READER, WRITER, guid_of
@@ -60,7 +60,7 @@ class _Client:
     def receive(self, received: Received) -> None:
         """Take a reply; those to other clients arrive, too."""
         start = self.pair.reader.guid[:8]
-        payload, named = cyclone.unwrap(received, start)
+        payload, named = discovery.unwrap(received, start)
         if named is None or named[0] not in {each.guid for each in self.pair}:
             return
         if (call := self.calls.pop(named[1], None)) is not None:
@@ -91,7 +91,7 @@ class _Request:
     def __init__(self, services: Services, writer: Writer, received: Received) -> None:
         self._services = services
         self._writer = writer
-        self.payload, named = cyclone.unwrap(received, bytes(8))
+        self.payload, named = discovery.unwrap(received, bytes(8))
         # Fast DDS names the reader of the reply
         self._target = named[0] if named else received.writer
         self._number = named[1] if named and is_cyclone(received.writer) else received.number

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
-from idlc.robot.dds import info
+from idlc.robot.dds import graph
 from idlc.robot.dds.address import Place
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
@@ -78,7 +78,7 @@ class DdsTransport:
         self._started = time.monotonic()
         self.id = self._connection.prefix.hex()
         writer, reader = (
-            Endpoint(self._guid(_INFO_ID, kind), info.TOPIC, info.TYPE, _INFO_QOS)
+            Endpoint(self._guid(_INFO_ID, kind), graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS)
             for kind in (WRITER, READER)
         )
         with self._connection.acting() as participant:
@@ -174,7 +174,7 @@ class DdsTransport:
     def _publish(self, now: float) -> None:
         """Send the own nodes and their endpoints."""
         prefix = self._connection.prefix
-        payload = info.format_info(prefix, own_nodes(prefix, self._own.values()))
+        payload = graph.format_info(prefix, own_nodes(prefix, self._own.values()))
         self._connection.write(self._info, payload)
         self._is_news, self._news_at = False, now + _PERIOD
 

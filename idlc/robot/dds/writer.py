@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from idlc.robot.dds import cyclone, formats, wire
+from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -141,7 +141,7 @@ class Writer:
         """
         payload, inline, time = self.history[number]
         if inline and payload and is_cyclone(reader.guid):
-            payload, inline = cyclone.wrap(payload, inline), b""
+            payload, inline = discovery.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
         if len(payload) <= size:
             self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
