@@ -9,10 +9,10 @@ import pytest
 
 from idlc.robot.dds import discovery, formats, graph, wire
 from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.formats import MOST_WAITING, Received
 from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import MOST_WAITING, Received
 from tests.robot.test_dds_network import ALL, LATCHED, PORT, TYPE, Network, text
 from tests.support.rounds import SEED, rounds
 

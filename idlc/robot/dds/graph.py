@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from idlc.robot.dds import wire
 from idlc.robot.dds.discovery import Endpoint
-from idlc.robot.dds.shared import Received
+from idlc.robot.dds.formats import Received
 from idlc.robot.dds.wire import GUID, WireError
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type

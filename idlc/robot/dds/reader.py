@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
+from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 
 #: Bytes of a sample.

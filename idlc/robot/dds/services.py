@@ -14,9 +14,9 @@ import msgspec
 from idlc.robot.dds import discovery, wire
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.formats import Received, is_cyclone
 from idlc.robot.dds.graph import HALVES, READER, WRITER, guid_of
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import Received, is_cyclone
 from idlc.robot.dds.writer import Writer
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import dds_type

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from idlc.robot.dds import discovery, formats, wire
+from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 #: Seconds between heartbeats for readers that lack something.
