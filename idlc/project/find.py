@@ -216,7 +216,8 @@ def _files_of(
     except (OSError, ValueError) as error:
         problem = unreadable(argument, error)
         close = closest(path.name, [entry.name for entry in entries(Path(root.path(path.parent)))])
-        hint = f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+        near = f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+        hint = problem.hint or near
         report.add(codes.CODES[problem.code].of(argument, problem.message, hint=hint))
         return
     if stat.S_ISDIR(mode):

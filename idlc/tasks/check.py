@@ -160,11 +160,11 @@ def _with_recordings(
     problems = Report()
     check_recordings(recordings, options.scope, problems)
     report.extend(problem for problem in problems if options.selection.wants(problem))
-    report.notes += problems.notes
     checked = CheckResult(())
     if others:
         checked = check(msgspec.structs.replace(options, paths=tuple(others)), report)
-    return msgspec.structs.replace(checked, files=(*recordings, *checked.files))
+    files, notes = (*recordings, *checked.files), (*problems.notes, *checked.notes)
+    return msgspec.structs.replace(checked, files=files, notes=notes)
 
 
 def keep_layout(name: str, old: str, new: str) -> str:

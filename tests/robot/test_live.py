@@ -73,7 +73,7 @@ def test_definitions_with_another_hash_are_refused(address, capsys):
         assert main(["gen", address, "-o", "out"]) == 0
     assert not Path("out/demo_msgs").exists()
     err = capsys.readouterr().err
-    assert "idlc skips `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
+    assert "idlc does not read `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
     assert "`/driver` sends an unusable type description" in err
 
 
