@@ -7,7 +7,7 @@ a queue, return at once, and never close anything. All `close` methods may be ca
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from idlc.robot.keys import Entity
 
@@ -17,6 +17,19 @@ class Sample(NamedTuple):
 
     payload: bytes
     attachment: bytes
+
+
+#: Middlewares pad messages to a multiple of four bytes.
+MOST_PADDING = 3
+
+
+def unread_bytes(payload: bytes, message: Any) -> int:
+    """Return how many bytes of a payload its message does not have, 0 if it may be padding."""
+    try:
+        unread = len(payload) - len(message.serialize())
+    except (TypeError, ValueError):  # what others sent need not be valid
+        return 0
+    return unread if unread > MOST_PADDING else 0
 
 
 #: Receives each reply, and at the end once `None`.
