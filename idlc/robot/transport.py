@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from idlc.robot.keys import Entity
+from idlc.runtime.typeinfo import structure_of
 
 
 class Sample(NamedTuple):
@@ -29,7 +30,12 @@ def unread_bytes(payload: bytes, message: Any) -> int:
         unread = len(payload) - len(message.serialize())
     except (TypeError, ValueError):  # what others sent need not be valid
         return 0
-    return unread if unread > MOST_PADDING else 0
+    if unread <= MOST_PADDING:
+        return 0
+    from idlc.recordings.lengths import estimated_size
+
+    estimated = estimated_size(structure_of(type(message)), payload)
+    return 0 if 0 <= len(payload) - estimated <= MOST_PADDING else unread
 
 
 #: Receives each reply, and at the end once `None`.
