@@ -70,7 +70,10 @@ def test_definitions_with_another_hash_are_refused(address, capsys):
     with running(address) as robot:
         robot.describe_types(lie)
         robot.publisher("/drive", "demo_msgs/msg/Drive")
-        assert main(["gen", address, "-o", "out"]) == 0
+        robot.publisher("/words", "std_msgs/msg/String")
+        # the others are there all the same
+        assert main(["gen", address, "-o", "out"]) == 1
+    assert Path("out/std_msgs").exists()
     assert not Path("out/demo_msgs").exists()
     err = capsys.readouterr().err
     assert "idlc does not read `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
