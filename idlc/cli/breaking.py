@@ -13,6 +13,7 @@ from idlc.cli import options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.project.settings import Config
     from idlc.tasks.breaking.files import BreakingOptions, Verdict
     from idlc.tasks.breaking.graph import GraphVerdict
@@ -127,7 +128,8 @@ EPILOG += "\n" + options.example(
     "recording, or the standard interfaces of a distribution. For several recordings, write a "
     "pattern, such as 'bags/*.mcap'. To compare with running nodes, write the word "
     "'graph', or the address of a robot, such as tcp/robot:7447. For a folder named graph, write "
-    "./graph.",
+    "./graph. By default, idlc compares with the setting `against`, or with git:origin/HEAD or "
+    "git:HEAD.",
 )
 @click.option(
     "--timeout",
@@ -173,7 +175,7 @@ def command(
     from idlc.versions import packages
 
     settings, report = settings_here()
-    against = against or packages.against(settings, report)
+    against = against or packages.against(settings, report) or _committed(settings.root, report)
     levels = packages.levels(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
@@ -196,6 +198,17 @@ def command(
             verdict = _compare_files(comparison, paths, settings, levels, report)
     _show(verdict, style, levels, report)
     return output.status(report)
+
+
+def _committed(root: Root, report: Report) -> str | None:
+    """Return what the files of a repository are compared with if nothing is named."""
+    from idlc.project.git import commit
+
+    for name in ("origin/HEAD", "HEAD"):
+        if not report.had_errors and commit(name, root.base):
+            sys.stderr.write(f"note: idlc compares with `git:{name}`\n")
+            return f"git:{name}"
+    return None
 
 
 def _comparison(
@@ -237,9 +250,9 @@ def _compare_files(
     import msgspec
 
     from idlc.cli import output
-    from idlc.project.git import GIT
     from idlc.tasks.breaking.files import breaking
     from idlc.versions.distribution import is_distro
+    from idlc.versions.revision import GIT
 
     against = comparison.against
     if is_distro(against) or against.startswith(GIT):

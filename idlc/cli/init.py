@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,7 +49,7 @@ def command(path: str, service: str | None, yes: bool) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
-    from idlc.scaffold.init import continuous, recommendation
+    from idlc.scaffold.init import continuous, obtaining, recommendation
     from idlc.scaffold.layouts import layout_of
 
     try:
@@ -81,8 +82,7 @@ def command(path: str, service: str | None, yes: bool) -> int:
         if not click.confirm(CONSENT, default=False):
             return max(status, 1)
     for draft in extras:
-        note = "next: see docs/ci.md in idlc's repository, for how the job gets idlc\n"
-        status = max(status, _write(draft, note * (draft is checks)))
+        status = max(status, _write(draft, obtaining(draft) if draft is checks else []))
     for preparation in planned:
         status = max(status, _finish(preparation, root, again=yes))
     if not changed and not status:
@@ -162,17 +162,24 @@ def _show(draft: Draft, out: str, root: Root) -> None:
     sys.stdout.flush()
 
 
-def _write(draft: Draft, note: str) -> int:
-    """Write a file that belongs to no package, and return the exit status."""
+def _write(draft: Draft, next_commands: Sequence[str]) -> int:
+    """Write a file that belongs to no package, and return the exit status.
+
+    The next commands belong into the file's repository.
+    """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
 
     report = Report()
     if not draft.reasons:
         return 0
     is_written = draft.write(report) is not None
     output.show(report, "text", sys.stderr)
-    sys.stdout.write(note if is_written else "")
+    if is_written and next_commands:
+        folder = Root.here().shown(draft.path)
+        start = [] if draft.path == Path.cwd() else [f"cd {shlex.quote(folder)}"]
+        sys.stdout.writelines(f"next: {line}\n" for line in (*start, *next_commands))
     return output.status(report)
 
 

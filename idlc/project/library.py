@@ -235,6 +235,13 @@ class Library:
                 return f"it is in `{Path(folder, package).as_posix()}`: {including(folder)}"
         return None
 
+    def idl_file(self, name: ir.TypeName) -> str | None:
+        """Return the path of the .idl file that defines a message, if there is one."""
+        if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
+            return None
+        paths = (root / "msg" / f"{name.name}.idl" for root in self._roots(name.package))
+        return next((self._root.shown(path) for path in paths if is_file(path)), None)
+
     def _interfaces(self, root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each interface file of a folder and of its folders for kinds."""
         interfaces: set[tuple[ir.Kind, str]] = set()

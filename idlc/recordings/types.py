@@ -354,9 +354,8 @@ class RecordedTypes:
         for (recording, why), names in missing.items():
             listed = first_few((f"`{name}`" for name in names), NAMED)
             advice = f"{including('DIR')}, where DIR contains the package's sources"
-            is_other = "not as ROS 2 writes them" in why
-            hint = None if is_other or "no type of" in why else advice
-            message = f"idlc {'does not read' if is_other else 'skips'} {listed}: {why}"
+            hint = advice if "does not define" in why else None
+            message = f"idlc does not read {listed}: {why}"
             report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
 
     def _substitutions(self) -> Iterator[Diagnostic]:

@@ -66,6 +66,14 @@ SERVICES = {
     "gitlab": (".gitlab-ci.yml", "ci/gitlab.yml.jinja"),
     "pre-commit": (".pre-commit-config.yaml", "ci/pre_commit.yaml.jinja"),
 }
+#: A revision that pre-commit warns of, and each revision.
+_MOVING, _REVISION = "rev: HEAD", re.compile(r"(?m)^ *rev: .*$")
+#: Commands by which a repository gets idlc's wheel and action from a clone beside it.
+_WHEEL = "python3 -I -m pip wheel --no-deps --wheel-dir wheels ../idlc"
+_ACTION = (
+    "mkdir -p tools/idlc && git -C ../idlc archive HEAD action.yml .ci README.md LICENSE "
+    "pyproject.toml idlc templates | tar -x -C tools/idlc"
+)
 #: Edits of setup.py make room for others.
 _ROUNDS = 3
 #: The package of a field's type.
@@ -250,7 +258,7 @@ def prepare(
     if layout.kind in ("ament_python", "empty"):
         note = _ament_python(draft, layout, model, files, report)
     elif layout.kind == "ament_cmake":
-        _ament_cmake(draft, inputs)
+        _ament_cmake(draft, inputs, report)
     elif layout.backend.startswith("setuptools."):
         _setuptools(draft, out, files, report)
     if layout.kind == "library" and _has_arrays(model):
@@ -449,8 +457,8 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
     return note
 
 
-def _ament_cmake(draft: Draft, inputs: Inputs) -> None:
-    """Fix package.xml and CMakeLists.txt as `idlc check --fix` does."""
+def _ament_cmake(draft: Draft, inputs: Inputs, report: Report) -> None:
+    """Fix package.xml and CMakeLists.txt as `idlc check --fix` does; report why no build works."""
     reasons = {
         MANIFEST: "the package declares the packages that its interfaces use",
         "CMakeLists.txt": "rosidl receives each interface and the packages that it uses",
@@ -468,6 +476,7 @@ def _ament_cmake(draft: Draft, inputs: Inputs) -> None:
                 draft.put(path, apply(own[0].span.source.text, own)[0], reason)
         if not edits:
             break
+    report.extend(each for each in problems if each.code == codes.CANNOT_BUILD.id)
 
 
 def _place(source: Source, error: BaseException) -> Span:
@@ -570,13 +579,25 @@ def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
     is_committed = top == layout.folder and layout.kind not in ("ament_cmake", "workspace")
     text = code().get_template(template).render(is_committed=is_committed)
     draft = Draft(Project(".", Settings(Root(top)), report))
-    if draft.text(path) in (None, text):
+    if _MOVING in text and (commit := git.commit("HEAD", top.parent / "idlc")):
+        text = text.replace(_MOVING, f"rev: {commit}")
+    present = draft.text(path)
+    if present is None or _REVISION.sub("", present) == _REVISION.sub("", text):
+        text = present or text
         draft.put(path, text, "CI checks the interfaces")
         return draft
     message = f"`{path}` exists, and idlc does not edit it"
     hint = "add the missing lines"
     report.add(codes.EXISTING_FILE.of(path, message, hint=hint, detail=text.rstrip()))
     return None
+
+
+def obtaining(draft: Draft) -> list[str]:
+    """Return the commands after which a repository contains what its CI runs."""
+    text = "".join(draft.text(path) or "" for path in draft.reasons)
+    if "./tools/idlc" in text:  # the action installs the wheel
+        return [_WHEEL, _ACTION, "git add --force wheels tools/idlc"]
+    return [_WHEEL, "git add --force wheels"] if "wheels/idlc" in text else []
 
 
 def recommendation(root: Root, report: Report) -> Draft:

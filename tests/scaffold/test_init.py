@@ -32,6 +32,7 @@ from tests.support.projects import (
     backend,
     library,
 )
+from tests.support.repositories import git
 
 BIN = Path(sys.executable).parent
 
@@ -118,7 +119,7 @@ def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys
     printed = capsys.readouterr().out
     assert sample.words in printed
     assert tree(project) == before
-    warning = r"The test runs the package's own build \(setup.py\)\."
+    warning = r"The test runs the package's own build\."
     assert re.search(rf"{warning}\nnothing was written; next: idlc init --yes\n$", printed)
     assert main(["init", "--yes"]) == 0
     printed, problems = capsys.readouterr()
@@ -636,6 +637,33 @@ def test_a_service_gets_the_file_of_the_documents(service, after, path, project,
     assert tree(project) == before
 
 
+@pytest.mark.usefixtures("unproved")
+def test_a_service_gets_the_idlc_that_it_runs(project, capsys):
+    """A workflow needs idlc in the repository; pre-commit needs a fixed commit of a clone."""
+    (block,) = re.findall(r"(?ms)^```sh\n(python3 -I.*?)^```$", (DOCS / "ci.md").read_text())
+    wheel, action, added = block.splitlines()
+    git("init", "-q")
+    git("init", "-q", "../idlc")
+    git("commit", "-q", "--allow-empty", "-m", "one", cwd="../idlc")
+    write_all(SAMPLES["ament_cmake"].files)
+    expected = {
+        "github": [wheel, action, added],
+        "gitlab": [wheel, added.removesuffix(" tools/idlc")],
+        "pre-commit": [],
+    }
+    for service, commands in expected.items():
+        assert main(["init", "--ci", service, "--yes"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        shown = [line.removeprefix("next: ") for line in lines if line.startswith("next: ")]
+        assert shown[:-2] == commands  # the last two are commands of idlc
+    settings = yaml.safe_load((project / ".pre-commit-config.yaml").read_text())
+    commit = git("rev-parse", "HEAD", cwd="../idlc").decode().strip()
+    assert settings["repos"][0]["rev"] == commit
+    git("commit", "-q", "--allow-empty", "-m", "two", cwd="../idlc")
+    assert main(["init", "--ci", "pre-commit", "--yes"]) == 0
+    assert "nothing to do" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("service", ["github", "gitlab", "pre-commit"])
 def test_a_service_looks_for_no_code_that_is_not_committed(service, project):
     write_all(SAMPLES["ament_cmake"].files)
@@ -646,6 +674,22 @@ def test_a_service_looks_for_no_code_that_is_not_committed(service, project):
     assert "id: idlc-gen" not in text
     assert ('generated: "false"' in text) == (service == "github")
     assert yaml.safe_load(text)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "obstacle"),
+    [
+        ("package.xml", "<build_type>ament_cmake</build_type>", "", "has no `<build_type>`"),
+        ("CMakeLists.txt", "rosidl_generate_interfaces", "message", "installs no interface"),
+        ("CMakeLists.txt", "ament_package()", "add_library(field_msgs a.cpp)", "two targets"),
+    ],
+)
+def test_an_obstacle_to_the_build_is_reported(file, old, new, obstacle, project, capsys):
+    write_all(SAMPLES["ament_cmake"].files)
+    path = project / file
+    path.write_text(path.read_text().replace(old, new))
+    assert main(["init"]) == 1  # the changes are shown
+    assert obstacle in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

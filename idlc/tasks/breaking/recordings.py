@@ -85,7 +85,7 @@ def compare_with_recordings(
                 **changes,
             }
     unknown = (earlier.names - seen) if later else local.unknown
-    where = "the other recordings do not contain them" if later else "idlc did not find them"
+    where = "absent from the other recordings" if later else "not found"
     if packages and not later:  # what else was recorded is not meant
         earlier.undefined = {
             topic: name
@@ -94,10 +94,11 @@ def compare_with_recordings(
         }
     skipped = [
         Skipped(tuple(map(str, sorted(unknown))), where),
-        Skipped(tuple(sorted(earlier.undefined)), "their types are not defined"),
+        Skipped(tuple(sorted(earlier.undefined)), "the recording contains no definition"),
     ]
     if later:
-        skipped.append(Skipped(tuple(sorted(later.undefined)), "their types are not defined"))
+        undefined = tuple(sorted(later.undefined))
+        skipped.append(Skipped(undefined, "the recording contains no definition"))
     if not seen:
         reason = "the recordings contain none of these interfaces"
         hint = "`idlc show` lists the types of a recording; name the folder of these interfaces"
