@@ -141,7 +141,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
             sys.stderr.write(f"{within}nothing was written\n")
         else:
             planned.append(preparation)
-            sys.stdout.write(f"note: {one_line(preparation.note)}\n" if preparation.note else "")
+            sys.stdout.writelines(f"note: {one_line(note)}\n" for note in preparation.notes)
         status = max(status, output.status(report), int(preparation is None))
     return planned, status
 
