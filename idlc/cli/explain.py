@@ -23,8 +23,7 @@ WIDTH = 88
 
 @click.command("explain", epilog=options.example("idlc explain wide-string"))
 @click.argument("code", metavar="[CODE]", required=False, shell_complete=completion.codes)
-@click.option("--all", "everything", is_flag=True, help="Print all rules as one Markdown document.")
-def command(code: str | None, everything: bool) -> int:
+def command(code: str | None) -> int:
     """Explain what a rule reports and why, with a bad and a good example.
 
     CODE is an id such as IDL201 or a name such as unknown-type. Without CODE, idlc lists all rules.
@@ -32,9 +31,6 @@ def command(code: str | None, everything: bool) -> int:
     from idlc.cli import output
     from idlc.diagnostics import explain
 
-    if everything:
-        sys.stdout.write(explain.document())
-        return 0
     if code is None:
         paint = output.painter(sys.stdout)
         *lines, advice = explain.overview()

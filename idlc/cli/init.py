@@ -141,7 +141,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
             sys.stderr.write(f"{within}nothing was written\n")
         else:
             planned.append(preparation)
-            sys.stdout.write(f"note: {one_line(preparation.note)}\n" if preparation.note else "")
+            sys.stdout.writelines(f"note: {one_line(note)}\n" for note in preparation.notes)
         status = max(status, output.status(report), int(preparation is None))
     return planned, status
 
@@ -229,7 +229,7 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
         sys.stdout.write(f"{within}{result}{proof.tried}\n")
     sys.stdout.writelines(f"  {line}\n" for line in proof.failure.splitlines())
     if proof.obstacle:
-        sys.stdout.write(f"{within}not tested: the import, because {proof.obstacle}\n")
+        sys.stdout.write(f"{within}not tested: {proof.obstacle}\n")
     if not is_complete:
         names = ", ".join(f"`{name}`" for name in done[0].needs) or "a package"
         verb = "are" if len(done[0].needs) > 1 else "is"

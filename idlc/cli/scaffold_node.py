@@ -171,7 +171,6 @@ def _role_options(function: Any) -> Any:
     is_flag=True,
     help="Handle signals while starting, replaced and cancelled goals, servers that do not answer.",
 )
-@click.option("--launch/--no-launch", default=True, help="Add the node to the launch file.")
 @common
 def command(name: str, **arguments: Any) -> int:
     """Create a node in the package that contains the working folder.
@@ -184,7 +183,7 @@ def command(name: str, **arguments: Any) -> int:
     from idlc.project.root import Root
     from idlc.scaffold import changes, new_node
 
-    shared = ("dry_run", "force", "include", "launch")
+    shared = ("dry_run", "force", "include")
     settings = changes.Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle", "robust")
     try:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from idlc.scaffold.package import Package
 
 EPILOG = options.example(
-    "idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com",
+    "idlc scaffold package my_robot --maintainer 'Ada <ada@example.com>'",
     "idlc scaffold package --interfaces my_msgs Drive srv/Ask",
     title="Examples",
 )
@@ -24,9 +24,12 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.command("package", epilog=EPILOG)
 @click.argument("name", metavar="NAME")
 @click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
-@click.option("--description", default="", help="Description of the package, in one sentence.")
-@click.option("--maintainer", help="Name of the maintainer.  [default: git's user.name]")
-@click.option("--email", help="Email address of the maintainer.  [default: git's user.email]")
+@click.option(
+    "--maintainer",
+    metavar="'NAME <EMAIL>'",
+    default="",
+    help="Maintainer of the package.  [default: git's user.name and user.email]",
+)
 @click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
 @click.option(
     "--interfaces",
@@ -65,6 +68,8 @@ def command(
         raise click.UsageError(str(error)) from error
     report, root = Report(), Root.here()
     build_type = "ament_cmake" if interfaces_only else "ament_python"
+    maintainer, _, email = arguments["maintainer"].partition("<")
+    arguments |= {"maintainer": maintainer.strip(), "email": email.strip(" >")}
     requested = _requested(name, arguments, build_type, root)
     shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
@@ -81,7 +86,7 @@ def _requested(name: str, arguments: dict[str, Any], build_type: str, root: Root
 
     return Package(
         name,
-        arguments["description"] or f"The package {name}.",
+        f"The package {name}.",
         arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
         arguments["email"] or setting("user.email", root.base) or "you@example.com",
         arguments["licence"] or LICENSES[0],

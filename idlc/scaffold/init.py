@@ -78,6 +78,8 @@ _ACTION = (
 _ROUNDS = 3
 #: The package of a field's type.
 _USED = re.compile(r"(?m)^[ \t]*([a-z][a-z0-9_]*)/[A-Z]")
+#: A requirement of builds that compile the interfaces.
+_IDLC = re.compile(r"idlc(?![\w.-])")
 #: The distribution's name in pyproject.toml or setup.cfg.
 _NAME = re.compile(r"(?ms)^\[(?:project|metadata)\](?:(?!^\[).)*?^\s*name\s*[=:]")
 _BUILD_SYSTEM = '[build-system]\nrequires = ["setuptools"]\nbuild-backend = '
@@ -147,15 +149,15 @@ class Draft:
 class Preparation(NamedTuple):
     """The planned changes to one package; `classes` are the generated ones, in the folder `out`.
 
-    `note` is on what idlc cannot see. Where `is_packed` is false, a report said by which line of
-    yours the build takes the classes.
+    `notes` are on what idlc cannot see or prevent. Where `is_packed` is false, a report said by
+    which line of yours the build takes the classes.
     """
 
     layout: Layout
     draft: Draft
     out: str
     classes: tuple[str, ...]
-    note: str = ""
+    notes: tuple[str, ...] = ()
     is_packed: bool = True
 
     def source(self) -> Path:
@@ -253,8 +255,23 @@ def prepare(
     if report.had_errors or not compiled:
         return None
     inputs, model = next((each for each in compiled if each[0].package == layout.name), compiled[0])
+    notes = _built(draft, layout, inputs, model, out, report)
+    _ignored(draft, layout, out)
+    draft.write(report, dry_run=True)  # which reports links and others that are in the way
+    _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
+    module = module_of(out) if layout.kind == "library" else layout.name
+    classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
+    is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
+    plan = Preparation(layout, draft, out, classes, notes, is_packed)
+    return None if report.had_errors else plan
+
+
+def _built(
+    draft: Draft, layout: Layout, inputs: Inputs, model: Model, out: str, report: Report
+) -> tuple[str, ...]:
+    """Have the package's build install interfaces and classes; return notes."""
+    root, note, more = draft.root(), "", ""
     files = {entry.file.key: root.shown(entry.file.path) for entry in inputs.files}
-    note = ""
     if layout.kind in ("ament_python", "empty"):
         note = _ament_python(draft, layout, model, files, report)
     elif layout.kind == "ament_cmake":
@@ -263,14 +280,9 @@ def prepare(
         _setuptools(draft, out, files, report)
     if layout.kind == "library" and _has_arrays(model):
         note = _numpy(draft)
-    _ignored(draft, layout, out)
-    draft.write(report, dry_run=True)  # which reports links and others that are in the way
-    _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
-    module = module_of(out) if layout.kind == "library" else layout.name
-    classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
-    is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
-    plan = Preparation(layout, draft, out, classes, note, is_packed)
-    return None if report.had_errors else plan
+    if layout.kind != "ament_cmake":
+        more = _outdated_builds(draft, layout)
+    return tuple(filter(None, (note, more)))
 
 
 def _places(
@@ -505,6 +517,21 @@ def _setuptools(draft: Draft, out: str, files: Mapping[str, str], report: Report
             report.add(code.of(SETTINGS_FILE, problem.message, hint=hint))
         elif text is None or not problem.edits:
             report.add(problem)
+
+
+def _outdated_builds(draft: Draft, layout: Layout) -> str:
+    """Return a note on a build that does not notice if the classes are out of date."""
+    system = toml(draft.text(SETTINGS_FILE) or "").get("build-system", {})
+    requires = system.get("requires", ()) if isinstance(system, dict) else ()
+    if any(_IDLC.match(str(name)) for name in requires):
+        return ""
+    if layout.kind != "library" and layout.backend.startswith("setuptools."):
+        return ""  # setup.py stops the build
+    tool = tool_of(layout.backend)
+    return (
+        f"{tool} installs the classes that the last `idlc gen` wrote, even if the interfaces have "
+        "changed since: run `idlc gen --check` before you build a wheel"
+    )
 
 
 def _has_arrays(model: Model) -> bool:

@@ -155,6 +155,18 @@ def test_messages_are_printed_and_malformed_ones_counted(robot, address, capsys,
     assert "1 malformed messages" in err
 
 
+@pytest.mark.parametrize("unread", [3, 4, 12])
+def test_messages_that_are_longer_than_their_type_are_noted_once(robot, address, capsys, unread):
+    string = standard("std_msgs/msg/String")
+    publish = robot.publisher("/words", "std_msgs/msg/String", LATCHED)
+    for word in ("one", "two"):
+        publish(string(data=word).serialize() + bytes(unread))
+    assert main(["echo", address, "words", "--count", "2"]) == 0
+    out, err = capsys.readouterr()
+    assert out == "{data: one}\n---\n{data: two}\n---\n"
+    assert err.count(f"has {unread} bytes that std_msgs/msg/String does not read") == (unread > 3)
+
+
 def test_fields_are_printed_without_the_rest(robot, address, capsys):
     kind = standard("sensor_msgs/msg/JointState")
     publish = robot.publisher("/joints", "sensor_msgs/msg/JointState", LATCHED)

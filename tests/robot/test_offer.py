@@ -18,7 +18,7 @@ from idlc.robot.offer import OFFERED
 from tests.robot.conftest import environ_of
 from tests.robot.nodes import LONG, node_at
 from tests.support.paths import EXAMPLE, GOLDEN, ROOT
-from tests.support.waiting import wait_for
+from tests.support.waiting import WORK, wait_for
 
 #: The installed packages that idlc uses here; the environment may have ROS 2's as well.
 USED = "_yaml click jinja2 lark markupsafe msgspec numpy typing_extensions xxhash yaml zenoh"
@@ -106,7 +106,7 @@ def file(name):
 def test_the_demo(start):
     """`make demo ROS=no` but for its environment."""
     demo = start(ROOT / "examples/demo.py")
-    assert demo.ends() == 0, demo.output
+    assert demo.process.wait(WORK) == 0, demo.output
     assert demo.output.splitlines()[-1].startswith("All of it agreed"), demo.output
     assert "Traceback" not in demo.output
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 
 from idlc.robot.dds import address, formats, wire
+from idlc.robot.dds.formats import Outgoing
 from idlc.robot.dds.participant import Participant
-from idlc.robot.dds.shared import Outgoing
 from idlc.robot.dds.writer import Writer
 
 #: The longest sleep of the thread, in which another thread may make something due.
@@ -72,9 +72,8 @@ class Connection:
 
     def _run(self) -> None:
         while self._is_open:
-            wait = self._due() - time.monotonic()
             begin = time.monotonic()
-            ready = self._selector.select(max(wait, 0))
+            ready = self._selector.select(max(self._due() - begin, 0))
             # to look for another packet would let other threads run first
             most = 1 if time.monotonic() - begin > _NAP else _AT_ONCE
             for key, _ in ready:
