@@ -80,7 +80,7 @@ def command(
         sys.stderr.write(f"note: {one_line(reason)}\n")
         sys.stderr.flush()
 
-    arrived = traffic.messages(session, ends, read, count, report, complain)
+    arrived = traffic.messages(session, ends, read, count, report, complain, kind)
     with suppress(KeyboardInterrupt):
         for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):
             output.lines(text, style, sys.stdout)

@@ -44,7 +44,19 @@ def once(request: GenOptions, style: str) -> int:
             sys.stdout.writelines([_line(package, request.check, paint) for package in packages])
     else:
         _document(report, style, packages, check=request.check)
-    return output.status(report)
+    return max(output.status(report), _lacks_types(report))
+
+
+def _lacks_types(report: Report) -> bool:
+    """Return whether nodes of a robot did not send the definitions of some topics."""
+    from idlc.diagnostics import codes
+    from idlc.project.find import is_address
+
+    return any(
+        problem.code == codes.MISSING_DEFINITION.id and "does not define" in problem.message
+        for problem in report
+        if is_address(problem.where[0])
+    )
 
 
 def _document(

@@ -229,7 +229,7 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
         sys.stdout.write(f"{within}{result}{proof.tried}\n")
     sys.stdout.writelines(f"  {line}\n" for line in proof.failure.splitlines())
     if proof.obstacle:
-        sys.stdout.write(f"{within}not tested: the import, because {proof.obstacle}\n")
+        sys.stdout.write(f"{within}not tested: {proof.obstacle}\n")
     if not is_complete:
         names = ", ".join(f"`{name}`" for name in done[0].needs) or "a package"
         verb = "are" if len(done[0].needs) > 1 else "is"
