@@ -256,3 +256,12 @@ def test_a_range_is_no_unit(tmp_path, capsys, comments, heading):
     pages = [one.read_text(encoding="utf-8") for one in (tmp_path / "site").rglob("*.html")]
     assert any(f'<th class="unit">{heading}</th>' in text for text in pages)
     capsys.readouterr()
+
+
+def test_a_field_leads_to_its_constants(tmp_path):
+    text = "uint8 MODE_OFF=0\nuint8 MODE_ON=1\nuint8 LAST_ONE=1\nuint8 mode\nuint8 last\n"
+    write(tmp_path / "demo/srv/Switch.srv", f"{text}---\nuint8[] mode\n")
+    assert main(["docs", str(tmp_path / "demo"), "-o", str(tmp_path / "site")]) == 0
+    (page,) = (tmp_path / "site").rglob("srv-Switch.html")
+    links = re.findall('<a href="#([^"]*)">constants</a>', page.read_text(encoding="utf-8"))
+    assert links == ["Request.MODE_OFF"]

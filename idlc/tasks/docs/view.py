@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from idlc.model import derive, ir
 from idlc.model.comments import deprecation
+from idlc.model.enums import enums
 from idlc.model.ir import is_range, spell, spell_value
 from idlc.model.link import Model
 
@@ -130,9 +131,13 @@ class Link(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A field or constant; its type is a link and the text after it, or only a text."""
+    """A field or constant; its type is a link and the text after it, or only a text.
+
+    `constants` is the anchor of the first constant that names a value of the field.
+    """
 
     anchor: str
+    constants: str
     words: Sequence[str]
     link: Link | None
     type: Sequence[str]
@@ -238,12 +243,21 @@ def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
 def _section(title: str, message: ir.Message, before: str, pages: Pages) -> StructureView:
     package = message.name.package
     own = (message.constants, message.fields)
-    constants, fields = (_table(elements, package, before, pages) for elements in own)
+    named = {
+        field.name: before + next(iter(enum.members.values())).name
+        for enum in enums(message, "all")
+        for field in enum.fields
+    }
+    constants, fields = (_table(elements, package, before, pages, named) for elements in own)
     return StructureView(title, blocks(message.comment), constants, fields, not any(own))
 
 
 def _table(
-    elements: Sequence[ir.Field | ir.Constant], package: str, before: str, pages: Pages
+    elements: Sequence[ir.Field | ir.Constant],
+    package: str,
+    before: str,
+    pages: Pages,
+    named: Mapping[str, str],
 ) -> FieldTable:
     rows = []
     for element in elements:
@@ -259,8 +273,8 @@ def _table(
             value = spell_value(element.default.value) if element.default else ""
         meaning, anchor = blocks(element.comment), before + element.name
         is_deprecated = deprecation(element.comment) is not None
-        name = words(element.name)
-        rows.append(Row(anchor, name, link, rest, unit, value, meaning, is_deprecated))
+        name, constants = words(element.name), named.get(element.name, "")
+        rows.append(Row(anchor, constants, name, link, rest, unit, value, meaning, is_deprecated))
     kinds = {"range" if is_range(row.unit) else "unit" for row in rows if row.unit}
     return FieldTable(
         rows,
