@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,14 @@ from idlc.cli import options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
+    from idlc.generate.package import Generated
     from idlc.project.root import Root
     from idlc.scaffold.init import Draft, Preparation
     from idlc.scaffold.layouts import Layout
+    from idlc.scaffold.proof import Proof
 
 TEST = "The test runs the package's own build (setup.py)."
+CI_NOTE = "note: idlc's docs/ci.md describes what this file installs, and from where\n"
 CONSENT = f"Write these changes, compile and test? {TEST}"
 
 
@@ -63,37 +67,54 @@ def command(path: str, service: str | None, yes: bool) -> int:
         sys.stderr.write("nothing was written\n")
         return output.status(report)
     planned, status = _plans(layout, root, report)
-    checks = continuous(service, layout, others := Report()) if service else None
+    extras = []
     if service:
+        others = Report()
+        checks = continuous(service, layout, others)
+        if checks:
+            extras.append((checks, CI_NOTE))
         output.show(others, "text", sys.stderr)
         status = max(status, output.status(others))
-    extras = [*filter(None, (checks, recommendation(root, report) if planned else None))]
-    drafts = [(each.draft, each.out) for each in planned] + [(draft, "") for draft in extras]
-    changed = [draft for draft, _ in drafts if draft.reasons]
+    if planned:
+        extras.append((recommendation(root, report), ""))
+    drafts = [(each.draft, each.out) for each in planned] + [(draft, "") for draft, _ in extras]
     for draft, out in drafts:
         _show(draft, out, root)
-    if changed and not yes:
-        if not (sys.stdin.isatty() and sys.stdout.isatty()):
-            words = ["init", *[path] * (path != "."), *options.typed("path"), "--yes"]
-            note = f"note: --yes writes these changes, compiles and tests. {TEST}\n"
-            sys.stdout.write(f"{note}nothing was written; next: {_pasted(words)}\n")
-            return max(status, 1)
-        if not click.confirm(CONSENT, default=False):
-            return max(status, 1)
-    for draft in extras:
-        note = "note: idlc's docs/ci.md describes what this file installs, and from where\n"
-        status = max(status, _write(draft, note * (draft is checks)))
+    is_changed = any(draft.reasons for draft, _ in drafts)
+    if is_changed and not yes and not _consents(path):
+        return max(status, 1)
+    for draft, note in extras:
+        status = max(status, _write(draft, note))
     for preparation in planned:
         status = max(status, _finish(preparation, root, again=yes))
-    if not changed and not status:
+    if not is_changed and not status:
         sys.stdout.write("nothing to do\n")
     if planned and not status:
-        start = [] if path == "." else [f"cd {shlex.quote(path)}"]
-        is_one = not layout.packages
-        words = ["check", *["gen"] * is_one, *["breaking"] * (is_one and planned[0].compares())]
-        commands = [*start, *(_pasted([word]) for word in words)]
-        sys.stdout.writelines(f"next: {line}\n" for line in commands)
+        _show_next(path, layout, planned)
     return status
+
+
+def _consents(path: str) -> bool:
+    """Return whether the user agrees to the changes; without a terminal, name the option."""
+    if sys.stdin.isatty() and sys.stdout.isatty():
+        return click.confirm(CONSENT, default=False)
+    words = ["init", *[path] * (path != "."), *options.typed("path"), "--yes"]
+    note = f"note: --yes writes these changes, compiles and tests. {TEST}\n"
+    sys.stdout.write(f"{note}nothing was written; next: {_pasted(words)}\n")
+    return False
+
+
+def _show_next(path: str, layout: Layout, planned: Sequence[Preparation]) -> None:
+    """Name the commands that a new user tries next."""
+    words = ["check"]
+    if not layout.packages:
+        words.append("gen")
+        if planned[0].compares():
+            words.append("breaking")
+    commands = [_pasted([word]) for word in words]
+    if path != ".":
+        commands.insert(0, f"cd {shlex.quote(path)}")
+    sys.stdout.writelines(f"next: {line}\n" for line in commands)
 
 
 def _pasted(words: list[str]) -> str:
@@ -184,9 +205,7 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
     from idlc.cli import output
     from idlc.diagnostics import codes
     from idlc.diagnostics.report import Report
-    from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
-    from idlc.scaffold.init import generate
     from idlc.scaffold.layouts import SETUP
     from idlc.scaffold.proof import installed_files, prove
 
@@ -196,16 +215,9 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
     draft, backend = preparation.draft, preparation.layout.backend
     is_edited = SETUP in draft.reasons and draft.project.has(SETUP)
     before = installed_files(folder, backend) if is_edited and backend else frozenset()
-    is_written = draft.write(report) is not None
-    done = generate(preparation, report) if is_written else ()
-    output.show(report, "text", sys.stderr)
+    done = _compile(preparation, within, report)
     if not done:
-        sys.stderr.write(f"{within}idlc did not generate the classes\n")
         return output.status(report) or 1
-    for package in done:
-        if package.written or package.removed:
-            count = counted(package.interfaces, "interface")
-            sys.stdout.write(f"{within}compiled {count} into {one_line(package.out)}\n")
     if not (draft.reasons or again):
         return 0
     if not preparation.is_packed:
@@ -214,20 +226,46 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
     sys.stdout.flush()
     source = preparation.source()
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
-    is_complete = not done[0].needs and all(problem.code != unimportable for problem in report)
+    needs = done[0].needs
+    is_complete = not needs and all(problem.code != unimportable for problem in report)
     classes = preparation.classes if is_complete else ()
     proof = prove(folder, backend, classes, source, before)
     if proof.tried:
-        result = "test failed: " if proof.failure else "test passed: "
-        sys.stdout.write(f"{within}{result}{proof.tried}\n")
+        result = "failed" if proof.failure else "passed"
+        sys.stdout.write(f"{within}test {result}: {proof.tried}\n")
     sys.stdout.writelines(f"  {line}\n" for line in proof.failure.splitlines())
-    if proof.obstacle:
-        sys.stdout.write(f"{within}not tested: the import, because {proof.obstacle}\n")
-    if not is_complete:
-        names = ", ".join(f"`{name}`" for name in done[0].needs) or "a package"
-        verb = "are" if len(done[0].needs) > 1 else "is"
-        why = f"because the classes import {names}, which {verb} not installed"
-        sys.stdout.write(f"{within}not tested: the import, {why}\n")
-    if preparation.layout.kind == "ament_cmake":
-        sys.stdout.write(f"{within}not tested: the CMake build (`colcon build`)\n")
+    missing = None if is_complete else needs
+    untested = _untested(proof, preparation.layout, missing)
+    sys.stdout.writelines(f"{within}not tested: {item}\n" for item in untested)
     return int(bool(proof.failure))
+
+
+def _compile(preparation: Preparation, within: str, report: Report) -> tuple[Generated, ...]:
+    """Write and compile a package; return the generated packages, none after an error."""
+    from idlc.cli import output
+    from idlc.diagnostics.terminal import counted
+    from idlc.diagnostics.text import one_line
+    from idlc.scaffold.init import generate
+
+    is_written = preparation.draft.write(report) is not None
+    done = generate(preparation, report) if is_written else ()
+    output.show(report, "text", sys.stderr)
+    if not done:
+        sys.stderr.write(f"{within}idlc did not generate the classes\n")
+    for package in done:
+        if package.written or package.removed:
+            count = counted(package.interfaces, "interface")
+            sys.stdout.write(f"{within}compiled {count} into {one_line(package.out)}\n")
+    return done
+
+
+def _untested(proof: Proof, layout: Layout, missing: Sequence[str] | None) -> Iterator[str]:
+    """Yield what was not tested, and why; `missing` are packages that the classes import."""
+    if proof.obstacle:
+        yield f"the import, because {proof.obstacle}"
+    if missing is not None:
+        names = ", ".join(f"`{name}`" for name in missing) or "a package"
+        verb = "are" if len(missing) > 1 else "is"
+        yield f"the import, because the classes import {names}, which {verb} not installed"
+    if layout.kind == "ament_cmake":
+        yield "the CMake build (`colcon build`)"

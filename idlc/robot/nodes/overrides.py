@@ -110,7 +110,12 @@ def _value(node: yaml.Node) -> object:
     if text in _TRUE or text in _FALSE:
         return text in _TRUE
     if (match := _INTEGER.fullmatch(text)) and len(text) < 64:
-        number = int(text, 16 if match[1] else 8 if match[2] else 10)
+        base = 10
+        if match[1]:
+            base = 16
+        elif match[2]:
+            base = 8
+        number = int(text, base)
         return number if -(2**63) <= number < 2**63 else float(number)
     if _DOUBLE.fullmatch(text):
         return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))

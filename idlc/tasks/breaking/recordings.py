@@ -75,8 +75,7 @@ def compare_with_recordings(
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
     for models, recorded in earlier.versions:
-        pairs = later.pairs(models, recorded) if later else local.pairs(models, recorded)
-        for old, new in pairs:
+        for old, new in (later or local).pairs(models, recorded):
             seen |= {interface.name for interface in old.own}
             with stage("compare", old.package):
                 new_ones = local.compared(old, new).changes
@@ -84,20 +83,7 @@ def compare_with_recordings(
                 **{(change.subject, change.message): change for change in new_ones},
                 **changes,
             }
-    unknown = (earlier.names - seen) if later else local.unknown
-    where = "the other recordings do not contain them" if later else "idlc did not find them"
-    if packages and not later:  # what else was recorded is not meant
-        earlier.undefined = {
-            topic: name
-            for topic, name in earlier.undefined.items()
-            if name and name.package in local.packages
-        }
-    skipped = [
-        Skipped(tuple(map(str, sorted(unknown))), where),
-        Skipped(tuple(sorted(earlier.undefined)), "their types are not defined"),
-    ]
-    if later:
-        skipped.append(Skipped(tuple(sorted(later.undefined)), "their types are not defined"))
+    skipped = [*_skipped(earlier, later, local, seen)]
     if not seen:
         reason = "the recordings contain none of these interfaces"
         hint = "`idlc show` lists the types of a recording; name the folder of these interfaces"
@@ -107,6 +93,30 @@ def compare_with_recordings(
     judged = judge([*changes.values()], options, report, concerns=concerns_readers)
     others, hidden = (0, judged.hidden) if options.levels else (judged.hidden, 0)
     return RecordedVerdict(judged.levels, judged.allowed, others, counts, hidden, names)
+
+
+def _skipped(
+    earlier: _Recorded, later: _Recorded | None, local: _LocalVersions, seen: set[ir.TypeName]
+) -> Iterator[Skipped]:
+    """Yield the types and topics that were not compared, with the reasons."""
+    undefined = earlier.undefined
+    if later:
+        yield Skipped(_sorted(earlier.names - seen), "the other recordings do not contain them")
+    else:
+        yield Skipped(_sorted(local.unknown), "idlc did not find them")
+        if local.packages:  # what else was recorded is not meant
+            undefined = {
+                topic: name
+                for topic, name in undefined.items()
+                if name and name.package in local.packages
+            }
+    yield Skipped(tuple(sorted(undefined)), "their types are not defined")
+    if later:
+        yield Skipped(tuple(sorted(later.undefined)), "their types are not defined")
+
+
+def _sorted(names: Iterable[ir.TypeName]) -> tuple[str, ...]:
+    return tuple(map(str, sorted(names)))
 
 
 class _Recorded:
