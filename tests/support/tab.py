@@ -11,6 +11,9 @@ import tempfile
 from tests.support.browser import FLAGS, command
 from tests.support.waiting import LIMIT, WORK, wait_for
 
+#: Seconds until the playground has started, which compiles WebAssembly on a busy machine.
+START = 120
+
 
 class Tab:
     """A tab; `events` are what it reported."""

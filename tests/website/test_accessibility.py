@@ -12,7 +12,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from maintenance.playground import build as playground
-from tests.support.tab import tab
+from tests.support.tab import START, tab
 
 pytestmark = pytest.mark.long
 
@@ -59,7 +59,7 @@ def opened(site, tmp_path):
             page.open("about:blank")
             page.until("location.href === 'about:blank'")
             page.open(f"http://127.0.0.1:{server.server_port}/{name}")
-            page.until(f"location.protocol === 'http:' && {ready}")
+            page.until(f"location.protocol === 'http:' && {ready}", START)
             return page
 
         yield opened
