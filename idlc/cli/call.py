@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from idlc.cli import completion, options
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Report
-    from idlc.robot.session import Session
 
 
 @click.command(
@@ -31,15 +26,7 @@ if TYPE_CHECKING:
     help="Stop waiting for the response after this time.",
 )
 @options.output_style(("yaml", "json"), "Output format: YAML, or one JSON object.")
-def command(
-    service: str,
-    values: tuple[str, ...],
-    timeout: float,
-    style: str,
-    session: Session,
-    report: Report,
-    include: tuple[str, ...],
-) -> None:
+def command(**arguments: Any) -> None:
     """Call a service of a robot and print the response.
 
     ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447.
@@ -47,25 +34,6 @@ def command(
     messages as JSON, such as `ids=[1,2]`. Other fields have their default values. idlc checks all
     values before it sends the request.
     """
-    from idlc.cli import messages, output
-    from idlc.diagnostics import codes
-    from idlc.robot.keys import Kind
-    from idlc.robot.live import connect, traffic
+    from idlc.cli.run.robots import call
 
-    kind, ends = traffic.find_version(session, service, [Kind.SERVICE], report, include)
-    if kind is None:
-        return
-    request = messages.message_of(kind.Request, values)
-    replies = connect.call(session, [(ends[0], request)], timeout)
-    _, payload = next(replies, (0, None))
-    if payload is None:
-        message = f"`{ends[0].name}` of `{ends[0].node_name}` did not respond"
-        hint = f"idlc waited {timeout:g} s; raise --timeout"
-        report.add(codes.NO_ANSWER.of("", message, hint=hint))
-        return
-    try:
-        text = "".join(messages.texts(style, [kind.Response.deserialize(payload).to_dict()]))
-        output.lines(text.removesuffix(messages.BETWEEN), style, sys.stdout)
-    except ValueError as error:
-        message = f"`{ends[0].name}` sent a malformed response: {error}"
-        report.add(codes.NO_ANSWER.of("", message))
+    return call(**arguments)

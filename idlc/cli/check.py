@@ -48,7 +48,7 @@ def command(paths: tuple[str, ...], **arguments: Any) -> int:
     all rules.
     """
     from idlc.check.select import is_selector, similar_selector
-    from idlc.cli.direct import check_paths
+    from idlc.cli.run.check import check_paths
 
     for word in f"{arguments['select'] or ''},{arguments['ignore'] or ''}".split(","):
         if word and not is_selector(word):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from typing import Any
 
 import click
 
@@ -23,7 +23,7 @@ from idlc.cli import options
     "--diff", is_flag=True, help="Write nothing; show the changes and fail if there are any."
 )
 @options.exclude
-def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...]) -> int:
+def command(**arguments: Any) -> int:
     """Normalize whitespace and keep deliberate alignment.
 
     idlc keeps single spaces between words, and two spaces before a comment. It keeps wider gaps if
@@ -35,43 +35,6 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
     as in `idlc check`.
     """
-    from idlc.cli import output
-    from idlc.compiler.compiler import stage
-    from idlc.diagnostics.terminal import counted
-    from idlc.diagnostics.text import one_line
-    from idlc.model import ir
-    from idlc.project.files import read_source
-    from idlc.project.find import find
-    from idlc.project.settings import scope, settings_here
-    from idlc.project.write import rewrite
-    from idlc.tasks.fmt import laid_out
+    from idlc.cli.run.fmt import run
 
-    settings, report = settings_here()
-    write = not (check or diff)
-    done = "changed" if write else "would change"
-    broken, clean = "with errors skipped", "already formatted"
-    numbers = dict.fromkeys((done, broken, clean), 0)
-    if not report.had_errors:
-        left_out = scope(settings, exclude=exclude).exclude
-        for file in find(paths or settings.paths or (".",), settings.root, report, left_out):
-            source = read_source(file.path, file.shown, report)
-            if source is None:
-                continue
-            with stage("format", file.shown):
-                name = ir.TypeName("package", file.kind, file.name)
-                new = laid_out(source, name, report)
-            if new is None or new == source.text:
-                numbers[broken if new is None else clean] += 1
-                continue
-            numbers[done] += 1
-            if write:
-                rewrite(file.path, file.shown, source.text, new, report)
-            if diff:
-                output.diff(file.shown, source.text, new, sys.stdout)
-            else:
-                sys.stdout.write(f"{done} {one_line(file.shown)}\n")
-    output.show(report, "text", sys.stderr)
-    shown = [f"{counted(count, 'file')} {what}" for what, count in numbers.items() if count]
-    if shown:
-        (sys.stderr if diff else sys.stdout).write(f"{', '.join(shown)}\n")
-    return output.status(report) or int(not write and bool(numbers[done]))
+    return run(**arguments)

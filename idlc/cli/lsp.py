@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
 from idlc.cli import options
@@ -17,13 +15,6 @@ def command(check: bool) -> int:
     The server implements the Language Server Protocol 3.17. It reads [tool.idlc] and the editor's
     settings. The language id of .msg, .srv and .action files is `rosmsg`.
     """
-    if check:
-        import json
+    from idlc.cli.run.lsp import serve_editor, show_capabilities
 
-        from idlc.editor.protocol import initialize_result
-
-        sys.stdout.write(json.dumps(initialize_result({}), indent=2) + "\n")
-        return 0
-    from idlc.cli.direct import serve_editor
-
-    return serve_editor()
+    return show_capabilities() if check else serve_editor()

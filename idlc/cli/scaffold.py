@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
-from typing import Any
-
 import click
 
 from idlc.cli import options
@@ -67,28 +63,3 @@ def writing(function: Command) -> Command:
 def common(function: Command) -> Command:
     """Add the options of a command that writes files and knows interfaces."""
     return options.include(writing(function))
-
-
-def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
-    """Show the outcome of a command and return the exit status; `hints` are the next commands."""
-    from idlc.cli import output
-    from idlc.diagnostics.terminal import summary
-
-    output.show(report, "text", sys.stderr)
-    if result is None:
-        sys.stderr.write(f"{summary(report)}; nothing was written\n")
-        return output.status(report)
-    if result.diff:
-        sys.stdout.writelines(result.diff)
-        return output.status(report)
-    folder = "" if result.folder in ("", ".") else f"{result.folder}/"
-    changes = [done for done in result.done if done.what != "unchanged"]
-    sys.stdout.writelines(f"{done.what} {folder}{done.path}\n" for done in changes)
-    if not changes:
-        sys.stdout.write("nothing to do\n")
-    sys.stdout.writelines(f"note: {note}\n" for note in result.notes)
-    if changes:
-        if result.following:
-            hints = (shlex.join([*output.program().split(), *result.following]), *hints)
-        sys.stdout.writelines(f"next: {hint}\n" for hint in hints)
-    return output.status(report)
