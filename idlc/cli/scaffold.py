@@ -1,6 +1,8 @@
-"""`idlc scaffold`: the group of its commands."""
+"""`idlc scaffold` and its commands `package` and `interface`."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import click
 
@@ -24,12 +26,16 @@ SYNONYMS = {
 }
 
 
+HOMES = {"package": "scaffold", "interface": "scaffold", "node": "scaffold_node"}
+
+
 class Scaffold(LazyGroup):
     """The group of these commands."""
 
     groups = {"Commands": COMMANDS}  # noqa: RUF012 - a constant
     overview = COMMANDS
-    modules = "idlc.cli.scaffold_"
+    modules = "idlc.cli."
+    homes = dict.fromkeys(COMMANDS, "scaffold")
     synonyms = SYNONYMS
 
 
@@ -63,3 +69,70 @@ def writing(function: Command) -> Command:
 def common(function: Command) -> Command:
     """Add the options of a command that writes files and knows interfaces."""
     return options.include(writing(function))
+
+
+PACKAGE_EPILOG = options.example(
+    "idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com",
+    "idlc scaffold package --interfaces my_msgs Drive srv/Ask",
+    title="Examples",
+)
+
+
+LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
+
+
+@click.command("package", epilog=PACKAGE_EPILOG)
+@click.argument("name", metavar="NAME")
+@click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
+@click.option("--description", default="", help="Description of the package, in one sentence.")
+@click.option("--maintainer", help="Name of the maintainer.  [default: git's user.name]")
+@click.option("--email", help="Email address of the maintainer.  [default: git's user.email]")
+@click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
+@click.option(
+    "--interfaces",
+    "--interfaces-only",
+    "interfaces_only",
+    is_flag=True,
+    help="Create a package that contains only interfaces. CMake builds it for nodes in any "
+    "language, and pip builds it for Python. INTERFACE is an interface to create, such as "
+    "`Drive` or `srv/Ask`.",
+)
+@common
+def package_command(**arguments: Any) -> int:
+    """Create a package that you can build with colcon and install with pip.
+
+    Each build of the package compiles the interfaces in its msg/, srv/ and action/ folders.
+    `idlc init` creates the same package in an empty folder, with an example, and compiles it.
+    """
+    from idlc.cli.run.scaffold import new_package
+
+    return new_package(**arguments)
+
+
+INTERFACE_EPILOG = options.example(
+    "idlc scaffold interface msg RobotCommand \\",
+    "    'string command_type' 'float32 linear_velocity_x  # [m/s]'",
+    "idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'",
+    title="Example, within a package",
+)
+
+
+@click.command(
+    "interface", epilog=INTERFACE_EPILOG, context_settings={"ignore_unknown_options": True}
+)
+@click.argument("kind", type=click.Choice(["msg", "srv", "action"]))
+@click.argument("name", metavar="NAME")
+@click.argument("fields", metavar="FIELD...", nargs=-1, type=click.UNPROCESSED)
+@common
+def interface_command(**arguments: Any) -> int:
+    """Create an interface in the package that contains the working folder.
+
+    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]', a constant or a comment.
+    `---` separates the sections of services and actions.
+    """
+    from idlc.cli.run.scaffold import new_interface
+
+    return new_interface(**arguments)
+
+
+MEMBERS = (package_command, interface_command)

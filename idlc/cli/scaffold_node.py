@@ -94,3 +94,6 @@ def command(**arguments: Any) -> int:
     from idlc.cli.run.scaffold import new_node
 
     return new_node(owners=click.get_current_context().meta[_OWNERS], **arguments)
+
+
+MEMBERS = (command,)

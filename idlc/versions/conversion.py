@@ -12,8 +12,7 @@ from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.model.python_names import field as attribute
 from idlc.versions.changes import Pairing, pair, tighter
-from idlc.versions.constants import Renumbering, renumbered
-from idlc.versions.units import factor
+from idlc.versions.meanings import Renumbering, factor, renumbered
 
 #: Returns the class of a type by its full name.
 Find: TypeAlias = Callable[[str], Any]

@@ -18,8 +18,8 @@ from idlc.project import write
 from idlc.project.root import Root
 from idlc.project.templates import Code, RenderedFile, Text, code
 from idlc.recordings.definitions import interface_of
-from idlc.versions.constants import renumbered
 from idlc.versions.conversion import FieldPlan, Key, Plan, Version, is_list
+from idlc.versions.meanings import renumbered
 from idlc.versions.rules import TYPES, Rules, read_rules
 
 _AROUND = Surroundings(runtime="....", others="..", enums="none")

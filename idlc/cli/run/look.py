@@ -19,8 +19,6 @@ from idlc.diagnostics.terminal import Paint, counted
 from idlc.diagnostics.text import one_line
 from idlc.project import library
 from idlc.project.settings import Scope, scope, settings_here
-from idlc.tasks.docs.pages import docs
-from idlc.tasks.doctor import examine
 
 
 def in_scope(
@@ -62,12 +60,16 @@ def list_names(packages: tuple[str, ...], style: str, scope: Scope, report: Repo
 
 def write_docs(paths: tuple[str, ...], out: str, scope: Scope, report: Report) -> str:
     """Write a site, and return the line about it."""
+    from idlc.tasks.docs.pages import docs
+
     pages = docs(paths or scope.paths or (".",), out, scope, report)
     return f"{counted(pages, 'page')} written; open {out}/index.html\n" if pages else ""
 
 
 def doctor(style: str, scope: Scope, report: Report) -> None:  # noqa: ARG001 - no problem of files
     """Write a line for each finding."""
+    from idlc.tasks.doctor import examine
+
     paint = output.painter(sys.stdout)
     for finding in examine(scope, output.program):
         subject, text, hint = finding
