@@ -39,7 +39,7 @@ ROBOT_ENV := .venv/robot-$(KIND)
 LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 # no lock is for the demonstration alone
-DEMO_ENV := $(if $(filter yes,$(LOCKED)),$(TEST_ENV),.venv/demo-$(TAG))
+DEMO_ENV := $(if $(filter yes,$(LOCKED)),$(TEST_ENV),.venv/demo-$(TAG)$(if $(filter no,$(ROS)),-without-ros))
 SITE_ENV := $(if $(filter no,$(ROS)),.venv/site-$(TAG),$(TEST_ENV))
 RELEASE_ENV := .venv/release-$(KIND)
 LOCK_ENV := .venv/lock-$(TAG)
@@ -80,11 +80,15 @@ install: $(DEMO_ENV)/installed $(TEST_ENV)/installed ## prepare what demo and te
 
 environment: $(TEST_ENV)/installed ## prepare what the tests need
 
-demo: $(DEMO_ENV)/installed ## compile the example; publish, call and act with it in the real rclpy
+demo: $(DEMO_ENV)/installed ## compile the example; publish, call and act with it in the real rclpy, or without ROS
 	@echo '$$ idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller'
 	@$(DEMO_ENV)/bin/idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller
+ifeq ($(ROS),no)
+	@PYTHONPATH=$(DEMO_OUT) $(DEMO_ENV)/bin/python -m idlc.robot examples/demo.py
+else
 	@$(DEMO_ENV)/bin/idlc gen $(DEMO_ENV)/share/std_msgs --package std_msgs_by_idlc -o $(DEMO_OUT)/std_msgs_by_idlc
 	@PYTHONPATH=$(DEMO_OUT) $(DEMO_ENV)/bin/python examples/demo.py
+endif
 
 quick: $(TEST_ENV)/installed ## run the tests that take at most 0.3 CPU-seconds each, while you edit
 	$(PYTEST) --tier quick $(SELECTION) $(ARGS)
@@ -204,7 +208,7 @@ $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(KILTED_ENV)/installed: EXTRA := test-kilted
 $(ROBOT_ENV)/installed: EXTRA := test-robot
 $(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
-$(if $(filter-out yes,$(LOCKED)),$(DEMO_ENV)/installed: EXTRA := ros)
+$(if $(filter-out yes,$(LOCKED)),$(DEMO_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),recordings,ros))
 $(SITE_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),docs,test-ros)
 $(RELEASE_ENV)/installed: EXTRA := release
 

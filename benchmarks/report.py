@@ -111,7 +111,7 @@ def factor(ratio: float) -> str:
 PARTS = {
     ROOT / "benchmarks" / "performance.md": full_table,
     ROOT / "benchmarks" / "recordings.md": recordings_table,
-    ROOT / "docs" / "fields.md": fields_table,
+    ROOT / "benchmarks" / "fields.md": fields_table,
 }
 PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=<!-- end -->)", re.DOTALL)
 

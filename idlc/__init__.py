@@ -32,7 +32,7 @@ _MODULES = {
     "Batch": "recordings.batches",
     "Recording": "api.recording",
     "delimited": "recordings.batches",
-    "load": "api.load",
+    "load": "api.sources",
     "patch": "api.reader",
     "reader": "api.reader",
     "split_delimited": "recordings.batches",

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cached_property
+from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 import numpy as np
@@ -515,6 +516,8 @@ class Part(Selection):
             _warn(tuple(file.damage), warned)
 
 
+#: For those who give ints.
+HINT = "write a text, such as `'10'`, for seconds from the start; an int is nanoseconds"
 #: A part reads about so many bytes of a recording.
 PART = 1 << 25
 
@@ -745,10 +748,11 @@ class RecordedTopic(Selection):
         )
         window = self.window.narrowed(first, last)
         if (start, end) != (None, None):
-            self._check_range(window)
+            is_number = any(isinstance(time, int) for time in (start, end))
+            self._check_range(window, HINT if is_number else None)
         return self._narrowed(window, self.options)
 
-    def _check_range(self, window: Window) -> None:
+    def _check_range(self, window: Window, hint: str | None) -> None:
         """Raise RecordingError if a range of times does not touch the recording."""
         span = self._container.span()
         if None not in window and window.start > window.end:  # type: ignore[operator]
@@ -761,7 +765,9 @@ class RecordedTopic(Selection):
             return
         limits = " to ".join("" if time is None else date_text(time) for time in window).strip()
         recorded = " to ".join(map(date_text, span))
-        hint = "write a text, such as `'10'`, for seconds from the start; an int is nanoseconds"
+        if hint is None:
+            seconds = ceil((span[1] - span[0]) / 1e9)
+            hint = f"give times from `0` to `{seconds}`, in seconds from the start, or dates"
         what = f"no message is in the range of times ({limits})"
         raise RecordingError(f"{what}: the recording is from {recorded}", hint)
 

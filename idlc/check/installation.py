@@ -6,19 +6,22 @@ import ast
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from fnmatch import fnmatchcase
 from functools import lru_cache
+from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from idlc.check.outputs import outdated
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated
+from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
 from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
 from idlc.packaging import setup_edits
 from idlc.packaging.facts import Facts
 from idlc.packaging.layout import Layout, layout
 from idlc.packaging.setup_py import DataFiles, Setup, defines, range_of, span_of
+from idlc.project.find import KINDS
 from idlc.project.lock import Runtime
 
 _INDEX = "share/ament_index/resource_index"
@@ -93,6 +96,27 @@ def installed(facts: Facts, model: Model) -> Iterator[Diagnostic]:
                 yield problem
     elif setup is not None and (view := _layout(facts, setup)):
         yield from _absent_folders(_Package(setup, facts.name, (), facts.folders), view)
+    if setup is not None and facts.index is not None and facts.is_known:
+        yield from _outdated_index(facts.index, facts.files.keys())
+
+
+def _outdated_index(index: Source, present: AbstractSet[str]) -> Iterator[Diagnostic]:
+    """Yield the problem with a list of interfaces that is not the package's."""
+    lines = [line.strip() for line in index.text.splitlines()]
+    listed = {line for line in lines if PurePosixPath(line).suffix in KINDS}
+    if listed == present:
+        return
+    wrong = [*(f"omits `{key}`" for key in sorted(present - listed))]
+    wrong += [f"lists `{key}`, which does not exist" for key in sorted(listed - present)]
+    stems = {PurePosixPath(key).with_suffix("") for key in present}
+    others = {line for line in lines if PurePosixPath(line).with_suffix("") in stems} - listed
+    text = "".join(f"{line}\n" for line in sorted(present | others))
+    yield codes.INTERFACES_NOT_INSTALLED.at(
+        Span(index, 0, len(index.lines[0]) if lines else 0),
+        f"this list for ROS 2's tools {first_few(wrong, 3)}",
+        hint="write a line for each interface, or run `idlc check --fix`",
+        edits=(Edit(Span(index, 0, len(index.text)), text),),
+    )
 
 
 def _missing_interfaces(package: _Package, keys: Mapping[str, str]) -> Iterator[Diagnostic]:
@@ -336,7 +360,14 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
 def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
     """Generated code in the package matches the current interfaces."""
     for output in facts.outputs:
-        if output.package == facts.name and facts.whole:
-            folder = facts.manifest.path.rpartition("/")[0] or "."
-            words = ("gen", folder, "-o", output.path.rpartition("/")[0])
+        folder = facts.manifest.path.rpartition("/")[0] or "."
+        home = output.path.rpartition("/")[0]
+        if output.package == facts.name and facts.is_known and not facts.files:
+            # where a setup.py runs idlc's build step, the interfaces were in this package
+            if facts.has_build_step and output.inputs:
+                message = "the interfaces of the generated code are gone"
+                hint = f"remove `idlc.lock` and the other generated files from `{home}`"
+                yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
+        elif output.package == facts.name and facts.whole:
+            words = ("gen", folder, "-o", home)
             yield from outdated(output.path, output.inputs, facts.inputs, words)

@@ -132,6 +132,7 @@ GROUPS = {
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 #: Commands whose module contains several.
 HOMES = {
+    **dict.fromkeys(("check", "fmt", "lsp"), "check"),
     **dict.fromkeys(("list", "docs", "doctor", "explain"), "look"),
     **dict.fromkeys(("echo", "call", "record", "router"), "robots"),
 }

@@ -35,7 +35,7 @@ class Scaffold(LazyGroup):
     groups = {"Commands": COMMANDS}  # noqa: RUF012 - a constant
     overview = COMMANDS
     modules = "idlc.cli."
-    homes = dict.fromkeys(COMMANDS, "scaffold")
+    homes = HOMES
     synonyms = SYNONYMS
 
 

@@ -53,6 +53,13 @@ def unique_names(model: Model) -> Iterator[Diagnostic]:
                     labels = (Label(earlier.name_span, "first definition"),)
                     hint = "rename or remove one of them"
                     yield code.at(element.name_span, text, hint=hint, labels=labels)
+        # recorded names may be of any case
+        constants = {constant.name for constant in message.constants}
+        for field in message.fields:
+            if field.name in constants:
+                text = f"`{field.name}` is the name of a field and of a constant"
+                hint = "rename one of them"
+                yield codes.DUPLICATE_FIELD.at(field.name_span, text, hint=hint)
 
 
 def unique_modules(model: Model) -> Iterator[Diagnostic]:

@@ -34,10 +34,15 @@ class Source:
         """True for IDL, which ROS 2 makes from interface files, instead of an interface file."""
         return self.path.endswith(".idl")
 
+    @property
+    def is_recorded(self) -> bool:
+        """True for a definition that came with messages; never for a file of its own."""
+        return self.file != self.path
+
     @cached_property
     def is_incomplete(self) -> bool:
         """True if constants and default values may be missing; never for a file of its own."""
-        return self.file != self.path and self.text.rstrip().endswith(INCOMPLETE)
+        return self.is_recorded and self.text.rstrip().endswith(INCOMPLETE)
 
     @cached_property
     def lines(self) -> tuple[str, ...]:

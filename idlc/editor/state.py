@@ -146,7 +146,7 @@ class ServerState:
         strays: dict[Path, set[str]] = {}
         own = self._folders.values()
         for path in filter(None, (document.path for document in self.documents.values())):
-            if path.suffix in KINDS and not any(workspace.holds(path) for workspace in own):
+            if path.suffix in KINDS and not any(workspace.lists(path) for workspace in own):
                 folder, paths = stray_folder(path)
                 strays.setdefault(folder, set()).update(paths)
         keys = [(folder, tuple(sorted(paths))) for folder, paths in strays.items()]

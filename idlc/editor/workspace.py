@@ -183,6 +183,7 @@ class Workspace:
             for number, package in enumerate(self._packages)
             for at, entry in enumerate(package.files)
         }
+        self._listed = {in_folder(self.folder, file.shown) for file in files.files}
         self.is_loaded = True
 
     def forget(self) -> None:
@@ -213,6 +214,10 @@ class Workspace:
         except Exception:  # which `snapshot` keeps
             return False
         return self.has(path)
+
+    def lists(self, path: Path) -> bool:
+        """Return whether a file is checked or is a duplicate of one; reads the disk if need be."""
+        return self.holds(path) or (self.is_loaded and path in self._listed)
 
     def has(self, path: Path) -> bool:
         """Return whether a file is checked, as of the last load."""

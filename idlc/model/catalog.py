@@ -87,6 +87,11 @@ def nearby(_: str) -> str | None:
     return None
 
 
+def idl_file(_: ir.TypeName) -> str | None:
+    """Return `None`: ROS 2 defines the standard messages in .msg files."""
+    return None
+
+
 def is_standard(package: str) -> bool:
     """Return whether a package is one of any distribution's."""
     return package in _packages_of_any()

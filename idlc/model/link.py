@@ -214,6 +214,9 @@ class InterfaceSource(Protocol):
     def nearby(self, package: str) -> str | None:
         """Return the advice that makes idlc find a package, if its folder is near."""
 
+    def idl_file(self, name: ir.TypeName) -> str | None:
+        """Return the path of the .idl file that defines a message, if there is one."""
+
     @property
     def distro(self) -> Distro:
         """The distribution of ROS 2 that files are read for."""
@@ -412,6 +415,8 @@ class _UnknownTypes:
             if other in self._interfaces or (self._hints >= 0 and self._library.source(other)):
                 return f"`{target.name}` is {noun}; only messages can be the type of a field"
         name, package, distro = target.name, target.package, self._library.distro
+        if self._hints >= 0 and (path := self._library.idl_file(target)):
+            return f"`{path}` defines it, but idlc does not compile .idl files"
         if not qualified and (hint := self._in_other_package(name)):
             return hint
         if misnamed := self._misnamed.get((package, name.lower())):

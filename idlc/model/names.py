@@ -10,6 +10,7 @@ from importlib.machinery import BuiltinImporter, FrozenImporter
 
 _LOWER = re.compile(r"[a-z](_?[a-z0-9])*")
 _UPPER = re.compile(r"[A-Z](_?[A-Z0-9])*")
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _MESSAGE = re.compile(r"[A-Z][A-Za-z0-9]*")
 _MESSAGE_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
 
@@ -27,6 +28,13 @@ def is_package_name(name: str) -> bool:
 def is_field_name(name: str) -> bool:
     """Return whether a field may have this name."""
     return _LOWER.fullmatch(name) is not None
+
+
+def is_recorded_name(name: str) -> bool:
+    """Return whether a recorded field or constant may have this name, as in ROS 1 and in IDL."""
+    # Python calls a field `from` `from_`
+    is_taken = name.endswith("_") and keyword.iskeyword(name[:-1])
+    return _IDENTIFIER.fullmatch(name) is not None and not is_taken
 
 
 def is_constant_name(name: str) -> bool:

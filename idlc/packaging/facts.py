@@ -46,6 +46,7 @@ class Facts(msgspec.Struct, frozen=True):
     `files` are the paths of interface files in the package's folder by name within the package.
     `interfaces` are the paths of all, checked or not, .idl files included.
     `folders` are those with files by dotted name, and whether they are Python packages.
+    `index` is the list of interfaces that a setup.py installs for ROS 2's tools.
     `has_build_step` is whether idlc wrote the file that a setup.py runs where idlc is missing.
     """
 
@@ -58,6 +59,7 @@ class Facts(msgspec.Struct, frozen=True):
     setup_cfg: Source | None = None
     pyproject: Source | None = None
     cmake: Source | None = None
+    index: Source | None = None
     generates: bool = False
     native: bool = False
     marker: bool = False
@@ -85,6 +87,11 @@ class Facts(msgspec.Struct, frozen=True):
             if statement.tag in tags:
                 by_text.setdefault(statement.text, statement)
         return by_text
+
+    @property
+    def is_known(self) -> bool:
+        """Return whether all interfaces of the package are known; there may be none."""
+        return self.whole or not (self.files or self.interfaces)
 
     @property
     def build_type(self) -> str:
@@ -131,6 +138,7 @@ def facts(
         setup_cfg=_optional(folder / "setup.cfg", root),
         pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
+        index=_optional(folder / "resource/rosidl_interfaces" / package.package, root),
         generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
         whole=_is_whole(package, files, scope),

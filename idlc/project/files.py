@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import stat
 import sys
 from functools import cache
@@ -149,10 +150,19 @@ def too_large(name: str) -> Diagnostic:
     return codes.TOO_LARGE.of(name, message, hint=hint)
 
 
+def leading_out(name: str) -> Diagnostic:
+    """Return the problem with a link of a git repository that leads out of it."""
+    message = f"idlc does not follow `{name}`, a link that leads out of its git repository"
+    hint = "replace the link with what it leads to, or remove it from the repository"
+    return codes.UNREADABLE.of(name, message, hint=hint)
+
+
 def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
     """Return the problem with a path that cannot be read."""
     if isinstance(error, OSError) and error.errno == errno.ENOENT:
-        return codes.NO_SUCH_PATH.of(name, f"no such file or folder: `{name}`")
+        address = re.fullmatch(r"(tcp|udp|tls|quic|ws)://(.+)", name)
+        hint = f"for a robot, write `{address[1]}/{address[2]}`" if address else None
+        return codes.NO_SUCH_PATH.of(name, f"no such file or folder: `{name}`", hint=hint)
     return codes.UNREADABLE.of(name, f"cannot read `{name}`: {reason(error)}")
 
 

@@ -216,7 +216,8 @@ def _files_of(
     except (OSError, ValueError) as error:
         problem = unreadable(argument, error)
         close = closest(path.name, [entry.name for entry in entries(Path(root.path(path.parent)))])
-        hint = f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+        near = f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+        hint = problem.hint or near
         report.add(codes.CODES[problem.code].of(argument, problem.message, hint=hint))
         return
     if stat.S_ISDIR(mode):
@@ -250,7 +251,8 @@ def walk(
     listed. Files whose extensions have capitals, which ROS 2 does not read, are included.
 
     Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, except `folder`
-    itself; links to folders are followed, each folder once.
+    itself; links to folders are followed, each folder once, except links that a git repository
+    has and that lead out of it.
     """
     waiting = [folder]
     visited: set[tuple[int, int]] = set()
@@ -271,10 +273,19 @@ def walk(
         visited.add(identity)
         for entry in inside:
             if _is_folder(entry):
-                if not entry.name.startswith(".") and entry.name not in SKIPPED:
+                if entry.name.startswith(".") or entry.name in SKIPPED:
+                    continue
+                if entry.is_symlink() and root.leads_out(os.path.join(place, entry.name)):  # noqa: PTH118
+                    report.add(_link_out((current / entry.name).as_posix()))
+                else:
                     waiting.append(current / entry.name)
             elif not entry.name.startswith(".") and _is_wanted(entry.name):
                 yield current / entry.name
+
+
+def _link_out(name: str) -> Diagnostic:
+    message = f"idlc skips `{name}`, a link that leads out of its git repository"
+    return codes.UNREAD_FILE.of(name, message, hint="name the folder with `-I`, or as a PATH")
 
 
 def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
@@ -297,6 +308,26 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
         return entry.is_dir()
     except OSError:
         return False
+
+
+def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
+    """Return the .idl files of a package without a .msg, .srv or .action file beside, sorted."""
+    unread = []
+    for folder in folders:
+        for kind in KINDS:
+            inside = folder / kind[1:]
+            try:
+                names = {entry.name for entry in os.scandir(inside)}
+            except OSError:
+                continue
+            unread += [
+                f"{kind[1:]}/{name}"
+                for name in names
+                if name.endswith(".idl")
+                and f"{name.removesuffix('.idl')}{kind}" not in names
+                and not exclude.has(str(inside / name))
+            ]
+    return sorted(unread)
 
 
 #: When a file was written and last changed, its size and its number: all 0 if there is none.

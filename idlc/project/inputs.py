@@ -162,7 +162,7 @@ def load(
     for file in files:
         first = loaded.get(file.key)
         if first is not None:
-            message = f"`{file.key}` is also defined by `{first.file.shown}`"
+            message = f"`{first.file.shown}` already defines `{file.kind}/{file.name}`"
             hint = (
                 "a package can have only one interface of each kind and name; exclude files "
                 "with --exclude, or `exclude` in [tool.idlc]"

@@ -21,21 +21,24 @@ from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
 from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import installed
-from idlc.project.root import Root
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
 #: The texts of interfaces by name.
 InterfaceTexts: TypeAlias = Mapping[ir.TypeName, Source]
 
+#: Such files are written by ROS 2, and by people who do without interface files.
+IDL = ".idl"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 class Folder:
     """One -I folder: a package, a folder of packages, a source tree or an install prefix."""
 
-    def __init__(self, path: str | Path, root: Root) -> None:
+    def __init__(self, path: str | Path, root: Root, *, idl: bool = False) -> None:
         self._path = root.absolute(path)
         self._root = root
+        self._idl = idl
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
@@ -51,12 +54,18 @@ class Folder:
         """Every package at any depth, by name; made only when the direct look-up fails."""
         ignored = Report()
         by_name: dict[str, list[Path]] = {}
-        files = (path for path in walk(self._path, self._root, ignored) if path.suffix in KINDS)
-        for folder in sorted({root_of(str(file.parent)) for file in files}):
+        files = walk(self._path, self._root, ignored)
+        folders = {root_of(str(file.parent)) for file in files if self._is_of_interfaces(file)}
+        for folder in sorted(folders):
             declared = self._root.manifest(folder)
             name = declared_name(declared, self._root, ignored) if declared else None
             by_name.setdefault(name or folder.name, []).append(folder)
         return by_name
+
+    def _is_of_interfaces(self, file: Path) -> bool:
+        """Return whether a file shows that there is a package of interfaces."""
+        is_of_idl = self._idl and file.name == MANIFEST and _has_interfaces(file.parent)
+        return file.suffix in KINDS or is_of_idl
 
 
 class InstallPrefix:
@@ -96,7 +105,7 @@ class Library:
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
     a single file finds its neighbours, unless they are excluded. `texts` take precedence over
     files. Files that cannot be read are reported. `distro` is the distribution that files are read
-    for.
+    for. With `idl`, an .idl file that people wrote for ROS 2 defines what no interface file does.
     """
 
     def __init__(
@@ -109,11 +118,15 @@ class Library:
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
         texts: InterfaceTexts = MappingProxyType({}),
+        idl: bool = False,
     ) -> None:
         self.distro = distro
+        self._idl = idl
         self.texts = texts
         self._missing = [path for path in folders if not is_folder(Path(root.path(path)))]
-        self._places: list[Folder | InstallPrefix] = [Folder(path, root) for path in folders]
+        self._places: list[Folder | InstallPrefix] = [
+            Folder(path, root, idl=idl) for path in folders
+        ]
         self._places += [InstallPrefix(path, distro) for path in prefixes.ament_prefixes()]
         self._own = own or {}
         self._exclude = exclude
@@ -143,7 +156,10 @@ class Library:
             return None
         file = f"{name.name}.{name.kind}"
         places = self._roots(name.package)
-        paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
+        inside = [f"{name.kind}/{file}", file]
+        if self._idl:
+            inside.append(f"{name.kind}/{name.name}{IDL}")
+        paths = (f"{root}/{own}" for root in places for own in inside)
         exclude = self._excluded(name.package)
         files = (path for path in paths if self._root.is_file(path) and not exclude.has(path))
         return next(map(Path, files), None)
@@ -218,6 +234,13 @@ class Library:
                 folder = self._root.relative(beside)
                 return f"it is in `{Path(folder, package).as_posix()}`: {including(folder)}"
         return None
+
+    def idl_file(self, name: ir.TypeName) -> str | None:
+        """Return the path of the .idl file that defines a message, if there is one."""
+        if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
+            return None
+        paths = (root / "msg" / f"{name.name}.idl" for root in self._roots(name.package))
+        return next((self._root.shown(path) for path in paths if is_file(path)), None)
 
     def _interfaces(self, root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each interface file of a folder and of its folders for kinds."""

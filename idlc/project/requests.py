@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
@@ -13,7 +12,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import catalog, ir
 from idlc.project import inputs
-from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
+from idlc.project.find import InterfaceFile, find
 from idlc.project.inputs import accept_name, by_home, output_folders, separate_homes
 from idlc.project.library import Library
 from idlc.project.package_xml import declared_name
@@ -131,26 +130,6 @@ def completed(
         files = sorted((*package.files, *more), key=lambda each: each.file.key)
         extended.append(msgspec.structs.replace(package, files=tuple(files)))
     return [] if extended == [*packages] else extended
-
-
-def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
-    """Return the .idl files of a package without a .msg, .srv or .action file beside, sorted."""
-    unread = []
-    for folder in folders:
-        for kind in KINDS:
-            inside = folder / kind[1:]
-            try:
-                names = {entry.name for entry in os.scandir(inside)}
-            except OSError:
-                continue
-            unread += [
-                f"{kind[1:]}/{name}"
-                for name in names
-                if name.endswith(".idl")
-                and f"{name.removesuffix('.idl')}{kind}" not in names
-                and not exclude.has(str(inside / name))
-            ]
-    return sorted(unread)
 
 
 def _borrowed(name: ir.TypeName, library: Library) -> inputs.Input:

@@ -32,6 +32,7 @@ class Root:
         self._above = f"{base}{os.sep}"
         self._manifests: dict[Path, Path | None] = {}
         self._locks: dict[Path, tuple[lock.Lock, ...]] = {}
+        self._links: dict[Path, frozenset[str] | None] = {}
 
     @classmethod
     def here(cls) -> Root:
@@ -79,7 +80,10 @@ class Root:
         """Return a file's bytes, or its open text; report as `files.read_bytes` does."""
         data = self._texts.get(self.absolute(path)) if self._texts else None
         if data is None:
-            return files.read_bytes(Path(self.path(path)), name, report)
+            if self.leads_out(place := self.path(path)):
+                report.add(files.leading_out(name))
+                return None
+            return files.read_bytes(Path(place), name, report)
         if len(data) > files.MAX_SIZE:
             report.add(files.too_large(name))
             return None
@@ -95,6 +99,29 @@ class Root:
         if is_file(self.path(path)):
             return True
         return bool(self._texts) and self.absolute(path) in self._texts
+
+    def leads_out(self, path: str) -> bool:
+        """Return whether a path is a link that git tracks, and leads out of the repository.
+
+        Links that git does not track are the user's. If git cannot tell, none is.
+        """
+        if not os.path.islink(path):  # noqa: PTH114 - asked of every file that is read
+            return False
+        from idlc.project.git import repository_of, tracked_links
+
+        link = Path(path)
+        try:
+            link.stat()  # the system follows a few links only, so that few are resolved
+            place, target = link.parent.resolve() / link.name, link.resolve()
+        except OSError:
+            return False
+        top = repository_of(place.parent)
+        if top is None or (target.is_relative_to(top) and not target.is_relative_to(top / ".git")):
+            return False
+        if top not in self._links:
+            self._links[top] = tracked_links(top)
+        links = self._links[top]
+        return links is None or place.relative_to(top).as_posix() in links
 
     def is_open(self, path: Path) -> bool:
         """Return whether an open text counts instead of the file at an absolute path."""

@@ -195,17 +195,18 @@ def type_of(
     release = BY_NAME[distro] if distro else Scope(Root.here()).distro
     topic_type, report = _type_of(topic, include, release)
     borrowed = any(problem.code == codes.MISSING_DEFINITION.id for problem in report)
-    title = ""
+    distros: tuple[Distro, ...] = ()
     if borrowed and distro is None:
         raws = sample()
         if raws and not fits(topic_type.structure, raws):
-            topic_type, title = _fitting(topic, include, raws) or (topic_type, "")
+            topic_type, distros = _fitting(topic, include, raws) or (topic_type, ())
     for diagnostic in report:
         message = diagnostic.message
-        if title:
+        if distros:
             what = message.partition("; ")[0]
-            message = f"{what}; idlc uses the type of {title}, which fits the messages"
-        warnings.warn(MissingDefinitionWarning(topic.name, message), stacklevel=2)
+            message = f"{what}; idlc uses the type of {titles(distros)}, which fits the messages"
+        fitting = next(iter(distros), None)
+        warnings.warn(MissingDefinitionWarning(topic.name, message, fitting), stacklevel=2)
     if list(report):  # the local definitions that are used instead may change
         _type_of.cache_clear()
     if topic.hash not in (None, topic_type.structure.hash):
@@ -216,7 +217,7 @@ def type_of(
 
 def _fitting(
     topic: Topic, include: tuple[str, ...], raws: Sequence[Raw]
-) -> tuple[TopicType, str] | None:
+) -> tuple[TopicType, tuple[Distro, ...]] | None:
     """Return the type that fits messages, and its distributions; `None` if it is not the only one.
 
     Types are looked up in each distribution of ROS 2.
@@ -230,7 +231,7 @@ def _fitting(
     if len(every) != 1:
         return None
     ((fitting, distros),) = every.values()
-    return fitting, titles(tuple(distros))
+    return fitting, tuple(distros)
 
 
 def known_versions(
@@ -263,7 +264,7 @@ def _compiled(topic: Topic, include: tuple[str, ...], distro: Distro) -> tuple[T
         problems = [*types.errors, *report]
         first = min(problems, key=lambda problem: problem.severity, default=None)
         why = first.message if first else "its type is unknown"
-        why = why.removeprefix(f"idlc skips `{topic.name}`: ")
+        why = why.removeprefix(f"idlc does not read `{topic.name}`: ")
         raise RecordingError(f"`{topic.name}` cannot be read: {why}", first and first.hint)
     return TopicType(types.models, types.topics[0].name), report
 
@@ -282,12 +283,16 @@ class OtherDefinitionWarning(UserWarning):
 
 
 class MissingDefinitionWarning(UserWarning):
-    """A recording does not define one of its types; the local type of that name is used."""
+    """A recording does not define one of its types; the local type of that name is used.
 
-    def __init__(self, topic: str, message: str) -> None:
+    Or that of a `distro`, if only that fits the messages.
+    """
+
+    def __init__(self, topic: str, message: str, distro: Distro | None = None) -> None:
         super().__init__(topic, message)
         self.topic = topic
         self.message = message
+        self.distro = distro
 
     def __str__(self) -> str:
         return f"`{self.topic}`: {self.message}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -14,15 +13,23 @@ from idlc.diagnostics.report import Diagnostic, Label, Report, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.model import ir
+from idlc.model.link import Model, own_sections
+from idlc.model.lowering.lower_types import constant_name, field_name
 from idlc.project import inputs, prefixes, write
 from idlc.project.library import InterfaceTexts
 from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
-from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
-
-if TYPE_CHECKING:
-    from idlc.model.link import Model
-from idlc.recordings.types import Reader, Version, contradictions, topics_of, versions
+from idlc.recordings.types import (
+    NAMED,
+    LocalTypes,
+    Reader,
+    RecordedTypes,
+    Version,
+    contradictions,
+    recorded_types,
+    topics_of,
+    versions,
+)
 
 
 def check_versions(groups: Sequence[Version], report: Report) -> None:
@@ -47,6 +54,18 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
                 place=typed.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )
+
+
+def _forbidden_names(types: RecordedTypes) -> Iterator[Diagnostic]:
+    """Yield IDL203 or IDL204 for names that recordings can have, and interface files cannot."""
+    hint = "`idlc.load` and `idlc.Recording` make classes of recorded types without files"
+    for model in types.models.values():
+        for message in own_sections(model):
+            faults = [(field.name_span, field_name(field.name)) for field in message.fields]
+            faults += [(own.name_span, constant_name(own.name)) for own in message.constants]
+            for span, fault in faults:
+                if fault:
+                    yield fault.code.at(span, fault.message, hint=hint)
 
 
 def recorded_models(
@@ -85,6 +104,7 @@ def recorded_packages(
         return [], {}
     types = recorded_types(groups[0], LocalTypes(scope, report), report)
     report.extend(contradicted(types))
+    report.extend(_forbidden_names(types))
     names: dict[str, set[ir.TypeName]] = {}
     for name in types.interfaces:
         names.setdefault(name.package, set()).add(name)

@@ -151,6 +151,11 @@ class _Rewriting:
         self.topics: dict[str, RewrittenTopic] = {}
         self.damage: list[Damage] = []
 
+    @property
+    def messages(self) -> int:
+        """The number of messages that were written."""
+        return sum(topic.messages for topic in self.topics.values())
+
     def file(self, path: Path, target: Path) -> None:
         """Write a file."""
         if first_bytes(path).startswith(ZSTD_MAGIC):
@@ -214,15 +219,28 @@ class _Rewriting:
             last = new if isinstance(new, Conversion) else new[-1]
             types[name] = last.type, last.type_hash
         target.mkdir()
+        counts: dict[str, int] = {}
         for path in sorted(folder.iterdir()):
             if path in paths:
+                before = self.messages
                 self.split(path, target / mcap_name(path), len(paths) == 1)
-            elif path.name == bag.METADATA and (data := bag.retyped(path, types)) is not None:
-                is_mcap = all(path.suffix == ".mcap" for path in paths)
-                data = data if is_mcap else as_mcap(data.decode()).encode()
-                (target / path.name).write_bytes(data)
-            elif path.name not in beside:
+                if (target / mcap_name(path)).exists():
+                    counts[path.name.removesuffix(bag.ZSTD)] = self.messages - before
+            elif path.name not in (*beside, bag.METADATA):
                 _copy(path, target / path.name)
+        metadata = folder / bag.METADATA
+        if not metadata.is_file():
+            return
+        data = bag.retyped(metadata, types)
+        if data is None:
+            _copy(metadata, target / bag.METADATA)
+            return
+        if self.damage:
+            by_topic = {name: topic.messages for name, topic in self.topics.items()}
+            data = bag.recounted(data, by_topic, counts)
+        is_mcap = all(path.suffix == ".mcap" for path in paths)
+        data = data if is_mcap else as_mcap(data.decode()).encode()
+        (target / bag.METADATA).write_bytes(data)
 
 
 def _copy(path: Path, target: Path) -> None:

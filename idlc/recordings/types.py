@@ -231,7 +231,13 @@ class LocalTypes:
         self.scope = scope
         self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
-            scope.include, scope.root, report, own=self.near, distro=scope.distro, texts=texts
+            scope.include,
+            scope.root,
+            report,
+            own=self.near,
+            distro=scope.distro,
+            texts=texts,
+            idl=True,
         )
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
@@ -301,7 +307,7 @@ class RecordedTypes:
         self.texts = texts
         scope, own, texts = local.scope, local.near, {**local.library.texts, **texts}
         self.library = Library(
-            scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts
+            scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts, idl=True
         )
         self.topics = tuple(self._typed(version, report))
         compiler = Compiler(self.library)
@@ -348,9 +354,8 @@ class RecordedTypes:
         for (recording, why), names in missing.items():
             listed = first_few((f"`{name}`" for name in names), NAMED)
             advice = f"{including('DIR')}, where DIR contains the package's sources"
-            is_other = "not as ROS 2 writes them" in why
-            hint = None if is_other or "no type of" in why else advice
-            message = f"idlc {'does not read' if is_other else 'skips'} {listed}: {why}"
+            hint = advice if "does not define" in why else None
+            message = f"idlc does not read {listed}: {why}"
             report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
 
     def _substitutions(self) -> Iterator[Diagnostic]:

@@ -20,9 +20,9 @@ from idlc.robot.nodes.context import init as init
 from idlc.robot.nodes.context import ok as ok
 from idlc.robot.nodes.context import shutdown as shutdown
 from idlc.robot.nodes.endpoints import Publisher as Publisher
-from idlc.robot.nodes.endpoints import PublisherEventCallbacks as PublisherEventCallbacks
 from idlc.robot.nodes.endpoints import Subscription as Subscription
-from idlc.robot.nodes.endpoints import SubscriptionEventCallbacks as SubscriptionEventCallbacks
+from idlc.robot.nodes.events import PublisherEventCallbacks as PublisherEventCallbacks
+from idlc.robot.nodes.events import SubscriptionEventCallbacks as SubscriptionEventCallbacks
 from idlc.robot.nodes.executor import Executor as Executor
 from idlc.robot.nodes.executor import ExternalShutdownException as ExternalShutdownException
 from idlc.robot.nodes.executor import Future as Future

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from itertools import islice
 from threading import Condition
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from idlc.robot.keys import Entity, Kind, parse_token
 from idlc.robot.transport import Transport
@@ -44,6 +44,8 @@ class Graph:
         self._entities: dict[str, Entity] = {}
         self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
         self._changed = Condition()
+        #: Conditions to trigger after each change.
+        self.watchers: set[Any] = set()
         end = time.monotonic() + _PATIENCE
         # Zenoh may answer with nothing after the watch; what goes in between never arrives
         self._expected, known = self._ask(transport, domain), 0
@@ -129,3 +131,5 @@ class Graph:
                 if not same:
                     del self._named[entity.kind, entity.name]
             self._changed.notify_all()
+        for watcher in [*self.watchers]:
+            watcher.trigger()

@@ -22,7 +22,12 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.action.server": "ActionServer CancelResponse GoalResponse ServerGoalHandle",
     "rclpy.callback_groups": "CallbackGroup MutuallyExclusiveCallbackGroup ReentrantCallbackGroup",
     "rclpy.clock": "Clock ClockType",
-    "rclpy.event_handler": "PublisherEventCallbacks SubscriptionEventCallbacks",
+    "rclpy.event_handler": (
+        "PublisherEventCallbacks QoSLivelinessChangedInfo QoSMessageLostInfo"
+        " QoSOfferedDeadlineMissedInfo QoSOfferedIncompatibleQoSInfo QoSPublisherMatchedInfo"
+        " QoSRequestedDeadlineMissedInfo QoSRequestedIncompatibleQoSInfo"
+        " QoSSubscriptionMatchedInfo SubscriptionEventCallbacks UnsupportedEventTypeError"
+    ),
     "rclpy.exceptions": (
         "InvalidParameterException InvalidParameterTypeException InvalidParameterValueException"
         " ParameterAlreadyDeclaredException ParameterException ParameterNotDeclaredException"
@@ -32,12 +37,21 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
         "Executor ExternalShutdownException MultiThreadedExecutor SingleThreadedExecutor"
     ),
     "rclpy.guard_condition": "GuardCondition",
+    "rclpy.impl": "",
+    "rclpy.impl.logging_severity": "LoggingSeverity",
+    "rclpy.lifecycle": (
+        "LifecycleNode LifecycleNodeMixin LifecyclePublisher LifecycleState ManagedEntity Node"
+        " NodeMixin Publisher SimpleManagedEntity State TransitionCallbackReturn"
+    ),
     "rclpy.logging": "LoggingSeverity get_logger",
     "rclpy.parameter": "Parameter parameter_value_to_python",
     "rclpy.qos": (
         "DurabilityPolicy HistoryPolicy LivelinessPolicy QoSDurabilityPolicy QoSHistoryPolicy"
-        " QoSLivelinessPolicy QoSProfile QoSReliabilityPolicy ReliabilityPolicy"
+        " QoSLivelinessPolicy QoSPolicyKind QoSProfile QoSReliabilityPolicy ReliabilityPolicy"
         " qos_profile_sensor_data qos_profile_services_default qos_profile_system_default"
+    ),
+    "rclpy.qos_overriding_options": (
+        "InvalidQosOverridesError QosCallbackResult QoSOverridingOptions"
     ),
     "rclpy.signals": "SignalHandlerOptions",
     "rclpy.task": "Future",
@@ -45,7 +59,27 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.utilities": "get_default_context ok remove_ros_args shutdown try_shutdown",
 }
 #: The modules of idlc that provide the names.
-_HOMES = "robot robot.nodes.context robot.nodes.node robot.parameters robot.qos".split()
+_HOMES = (
+    "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.node"
+    " robot.nodes.overriding robot.parameters robot.qos"
+).split()
+#: The names that idlc gives to what has other names in rclpy.
+_ALIASES = {
+    f"rclpy.lifecycle.{name}": f"Lifecycle{name}"
+    for name in "Node NodeMixin Publisher State".split()
+} | {
+    f"rclpy.event_handler.QoS{name}Info": home
+    for name, home in (
+        ("LivelinessChanged", "LivelinessInfo"),
+        ("MessageLost", "CountInfo"),
+        ("OfferedDeadlineMissed", "CountInfo"),
+        ("OfferedIncompatibleQoS", "IncompatibleInfo"),
+        ("PublisherMatched", "MatchedInfo"),
+        ("RequestedDeadlineMissed", "CountInfo"),
+        ("RequestedIncompatibleQoS", "IncompatibleInfo"),
+        ("SubscriptionMatched", "MatchedInfo"),
+    )
+}
 
 
 def _attribute(module: str, name: str) -> Any:
@@ -55,6 +89,7 @@ def _attribute(module: str, name: str) -> Any:
         return import_module(full_name)
     if name not in OFFERED[module].split():
         raise AttributeError(not_offered(full_name), name=name)
+    name = _ALIASES.get(full_name, name)
     homes = (vars(import_module(f"idlc.{home}")) for home in _HOMES)
     return next(home[name] for home in homes if name in home)
 

@@ -9,7 +9,8 @@ from contextlib import suppress
 from copy import copy
 from enum import Enum
 from functools import partial
-from typing import Any
+from itertools import chain
+from typing import Any, TypeAlias
 
 from idlc.robot.errors import RobotError
 from idlc.robot.nodes.interfaces import standard
@@ -135,6 +136,10 @@ class ParameterUninitializedException(ParameterException):
     """A parameter was declared with a type, but has no value."""
 
 
+#: Called with the parameters to be set, or that were set.
+SetCallback: TypeAlias = Callable[[list[Parameter]], Any]
+
+
 class HasParameters:
     """A node, as far as its parameters go; descriptors and results are messages of rcl_interfaces.
 
@@ -153,7 +158,9 @@ class HasParameters:
         self._parameter_overrides = overrides
         self._allow_undeclared_parameters = allow_undeclared
         self._parameter_descriptors: dict[str, Any] = {}
-        self._on_set_callbacks: list[Callable[[list[Parameter]], Any]] = []
+        self._pre_set_callbacks: list[SetCallback] = []
+        self._on_set_callbacks: list[SetCallback] = []
+        self._post_set_callbacks: list[SetCallback] = []
         # declared without an event or a descriptor, so that a node that uses no parameters starts
         # without the messages about them
         simulated = overrides.pop(_SIM_TIME, Parameter(_SIM_TIME, value=False))
@@ -231,6 +238,12 @@ class HasParameters:
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> Any:
         """Set all parameters or none, and return the result."""
+        if self._pre_set_callbacks:
+            lists = [callback(parameter_list) for callback in self._pre_set_callbacks]
+            parameter_list = [*chain.from_iterable(lists)]
+            if not parameter_list:
+                reason = "the callbacks before setting left no parameters"
+                return _message("SetParametersResult", successful=False, reason=reason)
         descriptors = {each.name: self.describe_parameter(each.name) for each in parameter_list}
         try:
             self._change(parameter_list, descriptors)
@@ -257,10 +270,34 @@ class HasParameters:
         self._parameter_descriptors.update(descriptors)
         self.use_sim_time(self._parameters[_SIM_TIME].value)
         self._parameter_events.publish(event)
+        for callback in self._post_set_callbacks:
+            callback(parameters)
 
-    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+    # the newest callback is called first
+
+    def add_pre_set_parameters_callback(self, callback: SetCallback) -> None:
+        """Call `callback` with parameters to be set; it returns the parameters to set instead."""
+        self._pre_set_callbacks.insert(0, callback)
+
+    def add_on_set_parameters_callback(self, callback: SetCallback) -> None:
         """Call `callback` with parameters to be set; it returns a SetParametersResult."""
         self._on_set_callbacks.insert(0, callback)
+
+    def add_post_set_parameters_callback(self, callback: SetCallback) -> None:
+        """Call `callback` with parameters that were set."""
+        self._post_set_callbacks.insert(0, callback)
+
+    def remove_pre_set_parameters_callback(self, callback: SetCallback) -> None:
+        """Undo `add_pre_set_parameters_callback`; raise ValueError if it was not called."""
+        self._pre_set_callbacks.remove(callback)
+
+    def remove_on_set_parameters_callback(self, callback: SetCallback) -> None:
+        """Undo `add_on_set_parameters_callback`; raise ValueError if it was not called."""
+        self._on_set_callbacks.remove(callback)
+
+    def remove_post_set_parameters_callback(self, callback: SetCallback) -> None:
+        """Undo `add_post_set_parameters_callback`; raise ValueError if it was not called."""
+        self._post_set_callbacks.remove(callback)
 
     def describe_parameter(self, name: str) -> Any:
         """Return the descriptor of a parameter."""

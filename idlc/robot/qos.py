@@ -55,6 +55,21 @@ class LivelinessPolicy(IntEnum):
     BEST_AVAILABLE = 5
 
 
+class QoSPolicyKind(IntEnum):
+    """A policy of a profile."""
+
+    INVALID = 1
+    DURABILITY = 2
+    DEADLINE = 4
+    LIVELINESS = 8
+    RELIABILITY = 16
+    HISTORY = 32
+    LIFESPAN = 64
+    DEPTH = 128
+    LIVELINESS_LEASE_DURATION = 256
+    AVOID_ROS_NAMESPACE_CONVENTIONS = 512
+
+
 class QoSProfile(msgspec.Struct, kw_only=True):
     """Quality of service of one endpoint.
 

@@ -51,9 +51,13 @@ class Request(Protocol):
 
 
 class Transport(Protocol):
-    """A connection to other programs; tokens contain its `id`."""
+    """A connection to other programs; tokens contain its `id`.
+
+    If `connects_all` is true, ends with QoS that does not fit are connected, too.
+    """
 
     id: str
+    connects_all: bool
 
     def gid(self, entity: Entity) -> bytes:
         """Return the 16 bytes by which others know an endpoint of this connection."""

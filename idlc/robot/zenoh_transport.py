@@ -29,6 +29,8 @@ class ZenohTransport:
     goes on, so that a KeyboardInterrupt would be lost there.
     """
 
+    connects_all = True
+
     def __init__(self, session: zenoh.Session) -> None:
         self._session: Any = session
         self._liveliness = session.liveliness()

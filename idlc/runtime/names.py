@@ -172,11 +172,15 @@ class importing:
         if error.name == "idlc_runtime":
             return
         package = (error.name or "").partition(".")[0] or "another package"
-        raise MissingPackageError(
-            f"this message needs {package}, which cannot be imported ({error}). "
+        how = (
             f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
             f"{package.replace('_', '-')}), or generate this code "
-            f"again with `idlc gen --vendor-deps`, which copies the types that it needs.",
+            f"again with `idlc gen --vendor-deps`, which copies the types that it needs."
+        )
+        if package == "numpy":
+            how = "Install it: pip install numpy."
+        raise MissingPackageError(
+            f"this message needs {package}, which cannot be imported ({error}). {how}",
             name=error.name,
             path=error.path,
         ) from error

@@ -16,7 +16,7 @@ from idlc.model import ir
 from idlc.packaging.facts import home_of
 from idlc.packaging.outcome import Edited, Outcome
 from idlc.packaging.setup_edits import wrap_lines
-from idlc.project.files import entries, read_source
+from idlc.project.files import entries
 from idlc.project.library import Library
 from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
@@ -83,7 +83,8 @@ class Project:
         """Return a file's text, `None` without one; no byte order mark, which edits keep."""
         if not (self.path / path).is_file():
             return None
-        source = read_source(self.path / path, self.shown(path), self._report)
+        root = self._settings.root
+        source = root.read_source(self.path / path, self.shown(path), self._report)
         return source.text.removeprefix("\ufeff") if source else None
 
     def names(self, folder: str) -> list[str]:

@@ -303,7 +303,7 @@ def _wire(
     if layout.kind in ("ament_python", "empty"):
         return _ament_python(draft, layout, model, files, report)
     if layout.kind == "ament_cmake":
-        _ament_cmake(draft, inputs)
+        _ament_cmake(draft, inputs, report)
         return ""
     if layout.backend.startswith("setuptools."):
         _setuptools(draft, out, files, report)
@@ -501,8 +501,8 @@ def _with_keyword(setup: Setup, whole: str) -> Outcome:
     return Refused("there are no calls of setup()", whole.rstrip(), "to its end")
 
 
-def _ament_cmake(draft: Draft, inputs: Inputs) -> None:
-    """Fix package.xml and CMakeLists.txt as `idlc check --fix` does."""
+def _ament_cmake(draft: Draft, inputs: Inputs, report: Report) -> None:
+    """Fix package.xml and CMakeLists.txt as `idlc check --fix` does; report why no build works."""
     reasons = {
         MANIFEST: "the package declares the packages that its interfaces use",
         "CMakeLists.txt": "rosidl receives each interface and the packages that it uses",
@@ -520,6 +520,7 @@ def _ament_cmake(draft: Draft, inputs: Inputs) -> None:
                 draft.put(path, apply(own[0].span.source.text, own)[0], reason)
         if not edits:
             break
+    report.extend(each for each in problems if each.code == codes.CANNOT_BUILD.id)
 
 
 def _place(source: Source, error: BaseException) -> Span:

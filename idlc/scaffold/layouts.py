@@ -59,8 +59,7 @@ class Layout(NamedTuple):
             case "ament_python":
                 return f"{self.name} is an ament_python package with {interfaces}"
             case "ament_cmake":
-                sentence = f"{self.name} is an ament_cmake package with {interfaces}"
-                return f"{sentence}; CMake still builds it"
+                return f"{self.name} is a package for CMake with {interfaces}"
             case "library":
                 where = f"in {self.home} (built with {tool_of(self.backend)})"
                 return f"{self.name} is a Python library {where} with {interfaces}"

@@ -133,12 +133,10 @@ def render(planned: Plan) -> str:
     class_name = "".join(part.capitalize() for part in node.name.split("_"))
     class_name += "Node" if class_name in page.taken else ""
     does = [
-        f"{endpoint.role.summary} {part.title}"
+        endpoint.role.summary.format(part.title)
         for endpoint, part in zip(node.endpoints, parts, strict=True)
         if endpoint.role.summary
     ]
-    if planned.short:  # each is a sentence
-        does = [phrase[0].upper() + phrase[1:] for phrase in does]
     view = NodeView(
         name=Code(node.name),
         class_name=Code(class_name),
@@ -248,10 +246,8 @@ def _short_imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
         for module, names in (endpoint.role.short or {}).items():
             imports[module].update(names)
         imports["rclpy.qos"].update(endpoint.qos.imports)
-    imports["rclpy.executors"].add("ExternalShutdownException")
     imports["rclpy.node"].add("Node")
-    if planned.asking:
-        imports["rclpy.utilities"].add("ok")
+    imports["rclpy.utilities"].add("ok")
     return _import_groups(imports, ("rclpy",))
 
 

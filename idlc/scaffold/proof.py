@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.text import one_line
 from idlc.project.find import SKIPPED
+from idlc.project.root import Root
 from idlc.project.settings import SETTINGS_FILE, toml
 
 _IMPORT = """\
@@ -99,11 +100,16 @@ def _content(wheel: Path) -> frozenset[str]:
 
 def _built(folder: Path, backend: str, scratch: Path) -> tuple[str, Path | None]:
     """Build a wheel of a copy of a package; return why that failed, and the wheel."""
-    # a link out of the package would be followed by the build
-    ignore = shutil.ignore_patterns(*_LEFT_OUT)
+    root, ignored = Root(folder), shutil.ignore_patterns(*_LEFT_OUT)
+
+    def left_out(place: str, names: list[str]) -> set[str]:
+        # setuptools would walk through everything that such a link leads to
+        away = (name for name in names if root.leads_out(os.path.join(place, name)))  # noqa: PTH118
+        return {*ignored(place, names), *away}
+
     copy = Path(scratch, "copy", folder.name)  # no name hides a module or `site`
     try:
-        shutil.copytree(folder, copy, symlinks=True, ignore=ignore)
+        shutil.copytree(folder, copy, symlinks=True, ignore=left_out)
     except shutil.Error as error:  # such as one for a named pipe
         return one_line(str(error.args[0][0][2])), None
     wheels = Path(scratch, "wheels")
@@ -130,8 +136,8 @@ def prove(
     missing = missing_tool(backend) if backend else ""
     with tempfile.TemporaryDirectory(prefix="idlc-") as scratch:
         if not backend or missing:
-            why = f" ({missing} is not installed here, so idlc built nothing)" if missing else ""
-            tried = f"import {count} from the generated code in a new interpreter{why}"
+            why = f" (not tested: pip install, because `{missing}` is missing)" if missing else ""
+            tried = f"import {count} from the generated code{why}"
             return _imported(Path(scratch), source, classes, tried) if classes else Proof("")
         tried = "install a copy with pip"
         failure, wheel = _built(folder, backend, Path(scratch))
@@ -143,7 +149,7 @@ def prove(
         failure = _failure(Path(scratch), "-m", "pip", *_PIP, "--target", site, wheel)
         if failure or not classes:
             return Proof(tried, failure)
-        tried += f", and import {count} from it in a new interpreter"
+        tried += f", and import {count} from it"
         return _imported(Path(scratch), site, classes, tried)
 
 

@@ -13,7 +13,8 @@ from idlc.check.registry import advise, check_package
 from idlc.check.select import Selection, switched_off, without_ignored
 from idlc.compiler.compiler import Compiler, library_for, stage
 from idlc.compiler.verdicts import IncrementalFindings
-from idlc.diagnostics.report import Diagnostic, Report, merge, without_overruled
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, first_few, merge, without_overruled
 from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
@@ -21,13 +22,15 @@ from idlc.packaging.facts import Facts, facts
 from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
-from idlc.project.find import KINDS, RULES, list_files, no_interfaces
+from idlc.project.find import KINDS, RULES, list_files, no_interfaces, unread_idl
 from idlc.project.lock import Lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
 #: Files that describe a package, which hooks name if they change.
 PACKAGE_FILES = frozenset({MANIFEST, "CMakeLists.txt", "setup.py", "setup.cfg", "pyproject.toml"})
+#: Problems with files and packages that are left out; the others can be fixed.
+_DUPLICATES = frozenset({codes.DUPLICATE_INTERFACE.id, codes.DUPLICATE_PACKAGE.id})
 #: Rounds of fixes: one may depend on another, or edit the same range.
 _ROUNDS = 5
 
@@ -85,8 +88,10 @@ def _check_files(options: CheckOptions, report: Report) -> CheckResult:
         checking = checkers(packages, scope)
         problems, models = check_all(checking, packages, selection)
         edits = [change for problem in problems for change in problem.edits]
-        fixes = (options.fix or options.diff) and edits and rounds_left
-        if not fixes or looked.had_errors or report.had_errors:
+        if not ((options.fix or options.diff) and edits and rounds_left):
+            break
+        if report.had_errors or any(each.code not in _DUPLICATES for each in looked.errors):
+            looked.notes.append("idlc fixed nothing, because it could not read all files")
             break
         from idlc.project.write import edited, rewrite
 
@@ -105,10 +110,23 @@ def _check_files(options: CheckOptions, report: Report) -> CheckResult:
     report.extend((*looked, *problems))
     report.notes += looked.notes
     first = next(iter(checking.values()))
-    looked_at = [*filter(None, map(first.package_facts, packages))]
-    unjudged = (note(each) for each in looked_at for note in (cmake_lists.unknown, builds.unjudged))
-    notes = tuple(filter(None, unjudged))
+    looked_at = filter(None, map(first.package_facts, packages))
+    notes = (*_unjudged(looked_at), *filter(None, (_unread(each, scope) for each in packages)))
     return CheckResult(files, len(packages), fixed, distros, notes, texts)
+
+
+def _unjudged(packages: Iterable[Facts]) -> Iterator[str]:
+    """Yield what `check` cannot judge in the builds of packages."""
+    for package in packages:
+        yield from filter(None, (cmake_lists.unknown(package), builds.unjudged(package)))
+
+
+def _unread(package: inputs.Inputs, scope: Scope) -> str:
+    """Return a note on the .idl files of a package of which all files are checked."""
+    is_whole = not package.files or package.is_whole(scope.root)
+    names = unread_idl(package.folders, scope.exclude) if is_whole else []
+    files = first_few((f"`{name}`" for name in names), 3)
+    return f"`{package.package}`: idlc does not check .idl files, such as {files}" if names else ""
 
 
 def _without_packages(
@@ -142,11 +160,11 @@ def _with_recordings(
     problems = Report()
     check_recordings(recordings, options.scope, problems)
     report.extend(problem for problem in problems if options.selection.wants(problem))
-    report.notes += problems.notes
     checked = CheckResult(())
     if others:
         checked = check(msgspec.structs.replace(options, paths=tuple(others)), report)
-    return msgspec.structs.replace(checked, files=(*recordings, *checked.files))
+    files, notes = (*recordings, *checked.files), (*problems.notes, *checked.notes)
+    return msgspec.structs.replace(checked, files=files, notes=notes)
 
 
 def keep_layout(name: str, old: str, new: str) -> str:

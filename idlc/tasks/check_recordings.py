@@ -15,7 +15,7 @@ from idlc.project.find import is_address
 from idlc.project.settings import Scope
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.lengths import WrongDefinitionError
-from idlc.recordings.load import OtherDefinitionWarning
+from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.recordings.packages import check_versions, contradicted
 from idlc.recordings.types import LocalTypes, damage_problems, recorded_types, versions
 
@@ -55,6 +55,10 @@ def _check_lengths(path: str, scope: Scope, report: Report) -> None:
                 report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
             except RecordingError:
                 continue  # its definition has problems, or its messages cannot be read
-    for warning in caught:
-        if isinstance(warning.message, OtherDefinitionWarning) and "bytes" in str(warning.message):
-            report.add(codes.RECORDED_HASH_DIFFERS.of(path, str(warning.message)))
+    for message in (warning.message for warning in caught):
+        if isinstance(message, OtherDefinitionWarning) and "bytes" in str(message):
+            report.add(codes.RECORDED_HASH_DIFFERS.of(path, str(message)))
+        if isinstance(message, MissingDefinitionWarning) and message.distro:
+            fitting = f"they fit that of ROS 2 {message.distro.title}"
+            what = f"messages of `{message.topic}` do not fit the local type, but {fitting}"
+            report.notes.append(f"{what}: check with `--distro {message.distro.name}`")

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -83,9 +84,25 @@ def plain(column: pa.Array) -> pa.Array:
         return pa.array(map(_base64, column.to_pylist()), pa.string())
     if pa.types.is_nested(kind):
         values = column.cast(_timeless(kind)).to_pylist()
-        dumps = partial(json.dumps, default=_base64, ensure_ascii=False)
-        return pa.array(map(dumps, values), pa.string())
+        return pa.array(map(_json, values), pa.string())
     return column
+
+
+def _json(value: Any) -> str:
+    """Return a value as JSON, which has no numbers beyond the finite ones: they are null."""
+    dumps = partial(json.dumps, default=_base64, ensure_ascii=False, allow_nan=False)
+    try:
+        return dumps(value)
+    except ValueError:
+        return dumps(_finite(value))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(own) for name, own in value.items()}
+    if isinstance(value, list):
+        return list(map(_finite, value))
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def _timeless(kind: pa.DataType) -> pa.DataType:
@@ -248,6 +265,8 @@ def columns(
     paths = options.recordings
     with (
         _problems(options, report),
+        # also for damage that opening it warns of
+        warnings.catch_warnings(record=True) as caught,
         Recording(
             paths[0] if len(paths) == 1 else paths,
             index=options.use_index,
@@ -257,9 +276,8 @@ def columns(
             distro=options.distro,
         ) as recording,
     ):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            done += (work or _each_topic)(recording, options, report, progress)
+        warnings.simplefilter("always")
+        done += (work or _each_topic)(recording, options, report, progress)
         for message in (warning.message for warning in caught):
             if isinstance(message, OtherDefinitionWarning):
                 report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
@@ -303,7 +321,28 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
         with nullcontext() if options.topics else _problems(options, report):
             topic = recording.topic(name, options.type_name)
             topics.append(topic.between(options.start, options.end))
-    return checked([_job(topic, options, len(names) > 1) for topic in topics], options, report)
+    files = _file_names([topic.topic.name for topic in topics])
+    jobs = [
+        _job(topic, file, options, len(names) > 1)
+        for topic, file in zip(topics, files, strict=True)
+    ]
+    return checked(jobs, options, report)
+
+
+def _file_names(topics: Iterable[str]) -> list[str]:
+    """Return a name for the file of each topic: `camera.image` for /camera/image.
+
+    Names of which a file system may make one end with a number.
+    """
+    names: dict[str, str] = {}
+    for topic in topics:
+        base = re.sub(r"[^\w.-]", "_", topic.replace("/", ".").lstrip("."), flags=re.ASCII)
+        name, number = base or "_", 1
+        while name.casefold() in names:
+            number += 1
+            name = f"{base}-{number}"
+        names[name.casefold()] = name
+    return list(names.values())
 
 
 def checked(jobs: Sequence[Job], options: ColumnsOptions, report: Report) -> Sequence[Job]:
@@ -331,11 +370,9 @@ def opened(path: str) -> AbstractContextManager[BinaryIO]:
     return nullcontext(sys.stdout.buffer) if path == STDOUT else whole_file(path)
 
 
-def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
-    """Return where a topic goes: to a file in a folder if there are several, or OUT is one."""
-    out, dotted = options.out, topic.topic.name.replace("/", ".").lstrip(".")
-    # `camera.image` is the file of /camera/image
-    name = re.sub(r"[^\w.-]", "_", dotted, flags=re.ASCII) or "_"
+def _job(topic: RecordedTopic, name: str, options: ColumnsOptions, many: bool) -> Job:
+    """Return where a topic goes; in a folder, to the file of that name."""
+    out = options.out
     suffix = STYLES.get(Path(out).suffix.lower())
     if out == STDOUT:
         return Job(topic, out, stdout_style(options))

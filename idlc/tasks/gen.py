@@ -23,7 +23,7 @@ from idlc.packaging.facts import home_of
 from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
-from idlc.project.find import is_path, root_of
+from idlc.project.find import is_path, root_of, unread_idl
 from idlc.project.library import InterfaceTexts, Library, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
@@ -31,7 +31,6 @@ from idlc.project.requests import (
     borrowed,
     completed,
     requested_packages,
-    unread_idl,
 )
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope

@@ -185,7 +185,7 @@ async function draw() {
 
 function changes(answer) {
   if (typeof answer === "string") return element("p", { textContent: `Not compared: ${answer}.` });
-  if (answer.length === 0) return element("p", { textContent: "Nothing breaks against the text that you began with." });
+  if (answer.length === 0) return element("p", { textContent: "No breaking changes yet. Change a field on the left." });
   const items = answer.map(({ code, message, levels, hint }) => element("li", {
     textContent: `${code}: ${message} (breaks: ${levels.join(", ")})${hint ? ` – ${hint}` : ""}`,
   }));

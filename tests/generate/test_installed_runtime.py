@@ -71,7 +71,8 @@ def execute(*folders, code, options=("-I", "-S")):
 def test_one_field_is_little(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(write(tmp_path / "demo", ONE_FIELD).parent)
     assert main(["gen", "demo", "-o", "out/demo", "--runtime", "installed"]) == 0
-    assert capsys.readouterr().out == "demo: 1 interface → 7 files in out/demo, runtime installed\n"
+    line = "wrote out/demo: 7 files from 1 interface; imports idlc_runtime\n"
+    assert capsys.readouterr().out == line
     files = [path for path in Path("out").rglob("*") if path.is_file()]
     texts = {path.name: path.read_text(encoding="utf-8") for path in files}
     assert len(files) <= 8
@@ -234,7 +235,7 @@ def test_switching_removes_or_writes_the_copy(tmp_path, monkeypatch, capsys):
 
     def gen(*options):
         status = main(["gen", "demo", "-o", "out/demo", *options])
-        return status, capsys.readouterr().out.partition(", ")[2].strip()
+        return status, capsys.readouterr().out.partition(" interface")[2].strip()
 
     def mode():
         record = json.loads(Path("out/demo/idlc.lock").read_text(encoding="utf-8"))
@@ -247,18 +248,18 @@ def test_switching_removes_or_writes_the_copy(tmp_path, monkeypatch, capsys):
     assert mode() == "carried"
     assert gen("--check", "--runtime", "installed")[0] == 1
     assert mode() == "carried"
-    said = f"runtime installed (1 written, {copies} removed)"
+    said = f"(1 written, {copies} removed); imports idlc_runtime"
     assert gen("--runtime", "installed") == (0, said)
     assert mode() == "installed"
-    assert gen() == (0, "runtime installed (unchanged)")
-    assert gen("--check") == (0, "runtime installed (up to date)")
+    assert gen() == (0, "(unchanged); imports idlc_runtime")
+    assert gen("--check") == (0, "(up to date)")
     Path("demo/msg/More.msg").write_text("int8 x\n", encoding="utf-8")
     assert gen()[0] == 0
     assert mode() == "installed"
     assert gen("--check", "--runtime", "carried")[0] == 1
     Path("pyproject.toml").write_text('[tool.idlc]\nruntime = "carried"\n', encoding="utf-8")
     assert gen("--check")[0] == 1
-    assert gen() == (0, f"runtime carried ({copies} written, 1 removed)")
+    assert gen() == (0, f"s ({copies} written, 1 removed)")
     assert mode() == "carried"
     assert gen("--runtime", "installed")[0] == 0
     assert mode() == "installed"

@@ -52,14 +52,14 @@ def read(inside):
 @pytest.mark.parametrize(
     ("inside", "guilty"),
     [
-        ("enum Colour { RED, GREEN };", "enum"),
+        ("enum Colour { RED = 1 };", "="),
+        ("enum Colour { };", "}"),
         ("union U switch (long) { case 1: long a; };", "union"),
-        ("@mutable struct Example { long a; };", "long"),
-        ("struct Example { long a; };", "long"),
-        ("struct Example { unsigned long a; };", "a"),
+        ("struct Example { unsigned a; };", "unsigned"),
+        ("struct Example { long double a; };", "a"),
         ("struct Example { int32 a, b; };", ","),
-        ("struct Example { int32 a[3]; };", "["),
-        ("struct Example { @key int32 a; };", "key"),
+        ("struct Example { int32 a[3][3]; };", "["),
+        ("typedef int32 a__2[2]; struct Example { a__2 a[3]; };", "a"),
         ("struct Example { @default(value=1 + 2) int32 a; };", "+"),
         ("struct Example { sequence<sequence<int32> > a; };", "int32"),
         ("struct Example { map<string, int32> a; };", "string"),
@@ -90,9 +90,9 @@ def test_other_idl_is_refused_at_its_first_place(inside, guilty):
         ("struct Example { string<0> a; };", ("IDL301", "0")),
         ("typedef int32 a__0[0]; struct Example { a__0 a; };", ("IDL301", "0")),
         ("struct Example { sequence<int32, 0> a; };", ("IDL301", "0")),
-        ("struct Example { int32 camelCase; };", ("IDL203", "camelCase")),
-        ("struct Example { int32 class__; };", ("IDL203", "class__")),
-        ("module Example_Constants { const int32 a = 1; }; struct Example { int8 a; };", None),
+        ("struct Example { int32 _a; };", ("IDL203", "_a")),
+        ("struct Example { int32 class_; };", ("IDL203", "class_")),
+        ("module Example_Constants { const int32 _a = 1; }; struct Example { int8 a; };", None),
         ("struct Example { @default (value=300) uint8 a; };", ("IDL305", "300")),
         ("struct Example { @default (value=x) uint8 a; };", ("IDL304", "x")),
         ('struct Example { @default (value="1") uint8 a; };', ("IDL304", '"1"')),
@@ -112,9 +112,29 @@ def test_other_idl_is_refused_at_its_first_place(inside, guilty):
 )
 def test_wrong_values_and_names_have_their_own_codes(inside, expected):
     _, problems = read(inside)
-    code, text = expected or ("IDL204", "a")
+    code, text = expected or ("IDL204", "_a")
     assert problems[0][0] == code
     assert text is None or problems[0][1] == text
+
+
+@pytest.mark.parametrize(
+    ("inside", "field"),
+    [
+        ("enum Colour { RED, GREEN }; struct Example { Colour a; };", "uint32 a"),
+        ("enum Colour { RED, }; struct Example { demo::msg::Colour a; };", "uint32 a"),
+        ("struct Example { Of a; }; typedef Colour Of; enum Colour { RED };", "uint32 a"),
+        ("struct Example { sequence<Colour, 2> a; }; enum Colour { RED };", "uint32[<=2] a"),
+        ("@mutable struct Example { long a; };", "int32 a"),
+        ("struct Example { unsigned  long\nlong longs; };", "uint64 longs"),
+        ("struct Example { short unsigned_; };", "int16 unsigned_"),
+        ("struct Example { double a[3]; };", "float64[3] a"),
+        ("struct Example { @key @range(min=1, max=2) int32 camelCase; };", "int32 camelCase"),
+    ],
+)
+def test_idl_that_people_write_for_ros_2_is_read(inside, field):
+    message, problems = read(inside)
+    assert not problems
+    assert [f"{ir.spell(own.type)} {own.name}" for own in message.fields] == [field]
 
 
 def test_the_text_must_define_what_it_is_said_to():

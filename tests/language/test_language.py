@@ -150,16 +150,6 @@ def test_the_table_of_reserved_words():
             assert c or cpp == ("IDL222" in warned), word
 
 
-def test_surprises_are_reported_where_it_is_said():
-    parts = re.split(r"(?m)^##+ (\d+(?:\.\d+)?)\.? ", TEXT)
-    sections = dict(zip(parts[1::2], parts[2::2], strict=True))
-    rows = table("surprise")
-    assert len(rows) > 15
-    for _, number, reported in rows:
-        for found in re.findall(r"IDL\d+", reported):
-            assert found in sections[number], (number, found)
-
-
 def test_every_rule_of_the_language_is_in_it():
     rules = {code for code in CODES if code[3] in "123"}
     assert {code for code in rules if code not in TEXT} == set()

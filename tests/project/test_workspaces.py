@@ -139,7 +139,7 @@ def test_a_tree_goes_on_where_it_was():
     assert idlc("gen", "src", "-o", "out/")[0] == 0
     assert sorted(path.name for path in Path("out").iterdir()) == ["a", "b"]
     Path("src/b/msg/B.msg").unlink()
-    assert "out/a, runtime carried (unchanged)" in idlc("gen", "src", "-o", "out")[1]
+    assert "out/a: 22 files from 1 interface (unchanged)" in idlc("gen", "src", "-o", "out")[1]
     assert idlc("gen", "src/a", "-o", "other")[0] == 0
     write("src/b/msg/B.msg", "a/A a\n")
     assert idlc("gen", "src", "-o", "other")[0] == 2  # it holds one package

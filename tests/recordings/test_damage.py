@@ -1,12 +1,14 @@
 """Damaged recordings: whole messages around the damage are read, and the damage is reported."""
 
 import random
+import shutil
 import sqlite3
 import warnings
 from collections import Counter
 from contextlib import closing, suppress
 
 import pytest
+import yaml
 from mcap.reader import make_reader
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
@@ -161,6 +163,103 @@ def test_what_the_mcap_library_reads_of_a_damaged_file_is_read(tmp_path):
         )
     assert found > 0
     assert lost > 0
+
+
+#: Damage of which copies once were damaged, or lacked messages; and more of these kinds.
+COPIED = (2, 15, 36, 117, 129, 165, 170)
+
+
+@pytest.mark.rounds
+def test_a_copy_has_what_is_read_of_a_damaged_file_and_no_damage(tmp_path):
+    path, target, copied = tmp_path / "a.mcap", tmp_path / "b.mcap", 0
+    sound = list(mcap_files(tmp_path))
+    for seed in range(SEED, SEED + 700) if ALL else COPIED:
+        path.write_bytes(damaged(sound[seed % len(sound)][0], random.Random(seed)))
+        try:
+            messages, _ = read(path, check=True)
+        except RecordingError as error:
+            assert "two different definitions" in error.message  # noqa: PT017
+            continue
+        target.unlink(missing_ok=True)
+        topics = rewrite(str(path), str(target), {}).topics
+        again, copy = read(target)
+        assert again == messages, seed
+        assert not copy.damage, seed
+        assert "read from" not in " ".join(copy.notes), seed
+        assert sum(topic.messages for topic in topics.values()) == again.total()
+        copied += again.total()
+    assert copied > 0
+
+
+#: Numbers of damages by one generator, for kinds that one in a hundred shows.
+RARE = (98, 123, 178, 399, 496, 596, 816, 1245)
+
+
+@pytest.mark.long
+def test_copies_of_rare_damage_have_what_is_read(tmp_path):
+    path, rng = tmp_path / "a.mcap", random.Random(992026)
+    sound = list(mcap_files(tmp_path))
+    for number in range(RARE[-1] + 1):
+        raw = damaged(sound[number % len(sound)][0], rng)
+        if number in RARE:
+            path.write_bytes(raw)
+            messages, _ = read(path, check=True)
+            rewrite(str(path), str(tmp_path / f"{number}.mcap"), {})
+            again, copy = read(tmp_path / f"{number}.mcap")
+            assert again == messages, number
+            assert not copy.damage, number
+
+
+def split_with_metadata(folder, storage, style):
+    """Write a bag of three files with a metadata.yaml, as rosbag2 does."""
+    folder.mkdir()
+    parts = [MESSAGES[number * 40 : number * 40 + 40] for number in range(3)]
+    for number, part in enumerate(parts):
+        single = made.by_rosbags(folder / f"b{number}", part, storage)
+        (file,) = single.glob(f"*.{storage}")
+        file.rename(folder / f"bag_{number}.{storage}")
+        content = yaml.safe_load((single / "metadata.yaml").read_text(encoding="utf-8"))
+        shutil.rmtree(single)
+    information = content["rosbag2_bagfile_information"]
+    information |= {
+        "message_count": 120,
+        "relative_file_paths": [f"bag_{number}.{storage}" for number in range(3)],
+        "files": [
+            {"path": f"bag_{number}.{storage}", "message_count": 40, "duration": {"nanoseconds": 5}}
+            for number in range(3)
+        ],
+    }
+    for topic in information["topics_with_message_count"]:
+        topic["message_count"] = 40
+    text = yaml.safe_dump(content, default_flow_style=style, sort_keys=False)
+    (folder / "metadata.yaml").write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("storage", "style", "loss"),
+    [("mcap", False, "empty"), ("mcap", True, "cut"), ("db3", False, "gone"), ("db3", None, "cut")],
+)
+def test_the_metadata_of_a_copy_counts_what_is_there(storage, style, loss, tmp_path):
+    split_with_metadata(tmp_path / "bag", storage, style)
+    lost = tmp_path / "bag" / f"bag_1.{storage}"
+    data = b"" if loss == "empty" else lost.read_bytes()
+    lost.write_bytes(data[: len(data) * 2 // 3])
+    if loss == "gone":
+        lost.unlink()
+    assert rewrite(str(tmp_path / "bag"), str(tmp_path / "copy"), {}).damage
+    text = (tmp_path / "copy" / "metadata.yaml").read_text(encoding="utf-8")
+    information = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    names = sorted(path.name for path in (tmp_path / "copy").glob("*.mcap"))
+    messages, container = read(tmp_path / "copy")
+    assert not container.damage
+    assert not container.notes
+    assert information["relative_file_paths"] == names
+    assert [file["path"] for file in information["files"]] == names
+    counts = [file["message_count"] for file in information["files"]]
+    assert counts[0] == counts[-1] == 40
+    assert sum(counts) == information["message_count"] == messages.total() < 120
+    every = [each["message_count"] for each in information["topics_with_message_count"]]
+    assert sum(every) == messages.total()
 
 
 def of_sqlite(path):

@@ -134,7 +134,7 @@ def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path)
     with idlc.Recording(path, include=[str(FOLDER)]) as recording:
         assert recording["/empty"].to_arrow().column_names == ["log_time", "publish_time"]
     _, text = said("show", path, "/empty")
-    assert "idlc skips `/empty`: the recording does not define `kit_msgs/msg/Empty`" in text
+    assert "idlc does not read `/empty`: the recording does not define `kit_msgs/msg/Empty`" in text
     assert "add `-I DIR`, where DIR contains the package's sources" in text
     no_definition = pytest.raises(RecordingError, match="the recording does not define")
     with idlc.Recording(path) as recording, no_definition:

@@ -101,7 +101,7 @@ def table(name: str) -> dict[str, tuple[str, str]]:
 
 def test_the_examples_of_settings_are_right(complaints):
     examples = re.findall(r"```toml\n(.*?)```", SETTINGS, re.DOTALL)
-    assert len(examples) == 4
+    assert len(examples) == 3
     for example in examples:
         assert complaints(example) == ""
 

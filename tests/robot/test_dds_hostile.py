@@ -7,9 +7,10 @@ from collections import Counter
 
 import pytest
 
-from idlc.robot.dds import formats, info, wire
+from idlc.robot.dds import cyclone, discovery, formats, info, wire
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
-from idlc.robot.dds.reader import MOST_WAITING, Reader
+from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.shared import MOST_WAITING, Received
 from tests.robot.test_dds_network import ALL, LATCHED, PORT, Network, text
 from tests.support.rounds import SEED, rounds
 
@@ -184,6 +185,19 @@ def test_extremes_are_refused_at_once(case, order):
         assert sum(len(each) for answer in answers for each in answer.parts) < 1000
     assert time.process_time() - begun < 5
     assert memory(own) <= before + MOST_PEERS
+
+
+@pytest.mark.parametrize("order", [b"\0\1", b"\0\0"])
+def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order):
+    inline = discovery.format_related(b"a name of 16 byt", 2**40)
+    body = order + b"\0\0" + b"body"
+    sent = cyclone.wrap(body, inline)
+    for end in range(len(sent) + 1):
+        sample = Received(b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
+        payload, named = cyclone.unwrap(sample, b"a name o")
+        assert (named is None) == (end < 20)
+        assert named in (None, (b"a name of 16 byt", 2**40))
+    assert payload == body
 
 
 def test_other_packets_than_rtps_are_counted():

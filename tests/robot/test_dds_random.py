@@ -3,12 +3,11 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from idlc.robot.dds.reader import Reader
 from idlc.robot.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from tests.robot.test_dds_network import ALL, Network, text
+from tests.support.examples import given, settings, st
 from tests.support.rounds import ALL as WHOLE
 from tests.support.rounds import SEED, rounds
 
@@ -70,7 +69,7 @@ class Story:
 
 
 @pytest.mark.rounds
-@settings(max_examples=rounds(200), deadline=None)
+@settings(max_examples=rounds(200))
 @given(st.lists(EVENTS, max_size=12), st.integers(0, 2**32), st.sampled_from([0, 0.05, 0.3]))
 def test_reliable_topics_are_complete_and_in_order_after_all(events, seed, loss):
     story = Story(seed, loss)

@@ -46,7 +46,7 @@ def test_the_types_that_a_robot_uses_are_compiled(robot, address, capsys):
     robot.announce(Kind.SERVICE, "/gear", "demo_msgs/srv/Gear")
     robot.action("/move", "demo_msgs/action/Move")
     assert main(["gen", address, "-o", "out"]) == 0
-    assert "demo_msgs: 5 interfaces" in capsys.readouterr().out
+    assert "demo_msgs: 32 files from 5 interfaces" in capsys.readouterr().out
     assert "[m/s]" in Path("out/demo_msgs/msg/_wheel.py").read_text(encoding="utf-8")
     assert main(["check", address]) == 0
     write_files("mine")
@@ -73,7 +73,7 @@ def test_definitions_with_another_hash_are_refused(address, capsys):
         assert main(["gen", address, "-o", "out"]) == 0
     assert not Path("out/demo_msgs").exists()
     err = capsys.readouterr().err
-    assert "idlc skips `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
+    assert "idlc does not read `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
     assert "`/driver` sends an unusable type description" in err
 
 

@@ -144,6 +144,40 @@ def test_callbacks_reject_values(node):
     assert "SetParametersResult" in node.set_parameters([Parameter("a", value=1)])[0].reason
 
 
+def test_callbacks_before_and_after_see_and_change_what_is_set(node):
+    node.declare_parameters("", [("a", 1), ("b", 2)])
+    calls = []
+
+    def note(name, result):
+        def call(parameters):
+            calls.append((name, [(each.name, each.value) for each in parameters]))
+            return result(parameters)
+
+        return call
+
+    double = note("pre", lambda known: [Parameter("b", value=2 * known[0].value), *known])
+    after, empty = note("post", lambda _: None), note("empty", lambda _: [])
+    node.add_post_set_parameters_callback(after)
+    node.add_pre_set_parameters_callback(double)
+    node.add_on_set_parameters_callback(
+        note("on", lambda _: ROS.msg.SetParametersResult(successful=True))
+    )
+    assert node.set_parameters([Parameter("a", value=5)])[0].successful
+    both = [("b", 10), ("a", 5)]
+    assert calls == [("pre", [("a", 5)]), ("on", both), ("post", both)]
+    assert [node.get_parameter(name).value for name in "ab"] == [5, 10]
+    calls.clear()
+    node.declare_parameter("c", 3)
+    assert [name for name, _ in calls] == ["on", "post"]
+    node.remove_pre_set_parameters_callback(double)
+    node.add_pre_set_parameters_callback(empty)
+    node.remove_post_set_parameters_callback(after)
+    assert "no parameters" in node.set_parameters_atomically([Parameter("a", value=6)]).reason
+    assert node.get_parameter("a").value == 5
+    with pytest.raises(ValueError, match="not in list"):
+        node.remove_on_set_parameters_callback(double)
+
+
 # services
 
 

@@ -252,6 +252,8 @@ CELLS = {
 }
 
 
+#: What the binding of Cyclone DDS for Python can do.
+WITH_CYCLONE = (words_in_order, topics_that_are_latched, services_of_ours, services_of_theirs)
 #: Keeps Cyclone DDS, which does not know ROS 2's variables, on this machine.
 ON_LOOPBACK = """
 <CycloneDDS><Domain>
@@ -270,12 +272,12 @@ ON_LOOPBACK = """
 """
 
 
-def test_topics_work_both_ways_with_cyclone_dds():
+def test_topics_and_services_work_both_ways_with_cyclone_dds():
     pytest.importorskip("cyclonedds")
     program = PROGRAMS / "cyclone_peer.py"
     with running([program], CYCLONEDDS_URI=ON_LOOPBACK) as pair:
-        words_in_order(pair)
-        topics_that_are_latched(pair)
+        for cell in WITH_CYCLONE:
+            cell(pair)
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -285,5 +287,8 @@ def test_it_works_both_ways(pair, cell):
 
 def test_the_table_of_the_page_is_this_one():
     page = (ROOT / "docs/robot.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\w+)[^|]* \| yes \| yes \|", page, re.MULTILINE)
-    assert {*rows} == {cell.partition("_")[0] for cell in CELLS}
+    rows = re.findall(r"^\| (\w+)[^|]* \| (\w+) \| (\w+) \| ([\w ]+) \|$", page, re.MULTILINE)
+    columns = [{row[0] for row in rows if row[column] == "yes"} for column in (1, 2, 3)]
+    kinds = {cell.partition("_")[0] for cell in CELLS}
+    assert columns == [kinds, kinds, {"topics", "services"}]
+    assert {row[0] for row in rows} == kinds

@@ -94,7 +94,7 @@ SERVING = {
 CALLING = {
     "uses a field that is gone": ("{response=}", "{response.succes=}"),
     "never calls": ("self.switch_client.call_async(request)", "Future()"),
-    "calls another name": ("'switch',", "'xswitch',"),
+    "calls another name": ("'switch'", "'xswitch'"),
     "calls another type": ("import SetBool", "import Trigger as SetBool"),
     "ignores the answer": ("f'switch: ", "f'something"),
     "makes no request": ("return SetBool.Request(", "return SetBool.Response("),
@@ -142,11 +142,12 @@ TIMED = {
     "has a default of another type": ("'names', ['a', 'b']", "'names', 'a, b'"),
     "has a parameter of another name": ("_parameter('speed'", "_parameter('sped'"),
 }
+ENDED = "        if ok() and not isinstance(error, KeyboardInterrupt):"
 SHORT_ENDING = {
     "dies at its start": ENDING["dies at its start"],
-    "does not end": ("        pass\n", "        __import__('time').sleep(99)\n"),
-    "ends with a traceback": ("except (KeyboardInterrupt, ", "except ("),
-    "ends with another status": ("        pass\n", "        raise SystemExit(3)\n"),
+    "does not end": (ENDED, f"        __import__('time').sleep(99)\n{ENDED}"),
+    "ends with a traceback": (ENDED, "        if True:"),
+    "ends with another status": (ENDED, f"        raise SystemExit(3)\n{ENDED}"),
     "has another name": ENDING["has another name"],
 }
 #: In a short node, this code is elsewhere or is not there.

@@ -220,9 +220,9 @@ def test_the_wizard_asks_for_the_same(package, monkeypatch):
 
     from idlc.cli.scaffold_node import command
 
-    answers = ["publish", "std_msgs/Strin", "Imu:imu@50", "std_srvs/Empty", "std_msgs/String"]
+    answers = ["1", "std_msgs/Strin", "Imu:imu@50", "std_srvs/Empty", "std_msgs/String"]
     answers += ["bad topic", "chatter", "often", "2", "latched", "timer", "soon", "0.5"]
-    answers += ["parameter", "speed", "speed:int=3", "done", "n"]
+    answers += ["8", "speed", "speed:int=3", "", "n"]
     monkeypatch.setattr("idlc.cli.run.scaffold.interactive", lambda: True)
     result = CliRunner().invoke(command, ["asker"], input="\n".join(answers) + "\n")
     assert result.exception is None or isinstance(result.exception, SystemExit), result.output

@@ -118,7 +118,7 @@ def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys
     printed = capsys.readouterr().out
     assert sample.words in printed
     assert tree(project) == before
-    warning = r"The test runs the package's own build \(setup.py\)\."
+    warning = r"The test runs the package's own build\."
     assert re.search(rf"{warning}\nnothing was written; next: idlc init --yes\n$", printed)
     assert main(["init", "--yes"]) == 0
     printed, problems = capsys.readouterr()
@@ -532,7 +532,14 @@ def test_an_authors_own_tools_stay_green(project, unproved):
             ("ruff", "check", "--isolated", "--no-cache", ".", *own),
             ("ruff", "format", "--isolated", "--no-cache", "--check", ".", *own),
             # as where neither numpy nor ROS 2 is installed
-            ("mypy", "--no-site-packages", "--strict", "--exclude", "(setup|talker).py$", "."),
+            (
+                "mypy",
+                "--no-site-packages",
+                "--strict",
+                "--exclude",
+                "(setup|talker|test_flake8).py$",
+                ".",
+            ),
         ):
             status, printed = ended(sys.executable, "-m", *words, cwd=folder)
             assert status == 0, f"{name}: {printed}"
@@ -595,7 +602,7 @@ def test_it_asks_once_on_a_terminal(project):
             print(text.decode(), os.waitpid(pid, 0)[1])
         """
         said = run(sys.executable, "-c", talk, cwd=project)
-        assert said.count("The test runs the package's own build (setup.py). [y/N]: ") == 1
+        assert said.count("The test runs the package's own build. [y/N]: ") == 1
         assert Path("bot/msg").exists() == is_written, said
         assert ("`setup.py` was changed while idlc was running" in said) == (answer == "edit")
         assert Path("setup.py").read_text().endswith("# mine") == (answer != "n")
@@ -639,6 +646,22 @@ def test_a_service_looks_for_no_code_that_is_not_committed(service, project):
     assert "id: idlc-gen" not in text
     assert ('generated: "false"' in text) == (service == "github")
     assert yaml.safe_load(text)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "obstacle"),
+    [
+        ("package.xml", "<build_type>ament_cmake</build_type>", "", "has no `<build_type>`"),
+        ("CMakeLists.txt", "rosidl_generate_interfaces", "message", "installs no interface"),
+        ("CMakeLists.txt", "ament_package()", "add_library(field_msgs a.cpp)", "two targets"),
+    ],
+)
+def test_an_obstacle_to_the_build_is_reported(file, old, new, obstacle, project, capsys):
+    write_all(SAMPLES["ament_cmake"].files)
+    path = project / file
+    path.write_text(path.read_text().replace(old, new))
+    assert main(["init"]) == 1  # the changes are shown
+    assert obstacle in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

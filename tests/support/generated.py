@@ -37,6 +37,9 @@ class BuiltIn(NamedTuple):
     def nearby(self, _package):
         return None
 
+    def idl_file(self, _name):
+        return None
+
 
 def model_of(package, files, distro=DEFAULT):
     """Return the model of a package from texts by path, such as `msg/Pose.msg`."""

@@ -97,7 +97,7 @@ def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
 
 def _normal(text: str) -> str:
     """Return an output without what changes with idlc itself: its version, its support files."""
-    return re.sub(r"→ \d+ files", "→ <n> files", text.replace(__version__, "<version>"))
+    return re.sub(r": \d+ files from", ": <n> files from", text.replace(__version__, "<version>"))
 
 
 def _graph(path: str) -> RecordedGraph:

@@ -265,7 +265,7 @@ SAMPLES = {
     ),
     "ament_cmake": Sample(
         INTERFACES,
-        "an ament_cmake package with 1 interface; CMake still builds it",
+        "a package for CMake with 1 interface",
         "field_msgs.msg",
         "Field",
     ),

@@ -21,6 +21,7 @@ class Siblings:
     names = staticmethod(catalog.names)
     packages = staticmethod(catalog.packages)
     nearby = staticmethod(catalog.nearby)
+    idl_file = staticmethod(catalog.idl_file)
     distro = catalog.distro
 
     def __init__(self, case):

@@ -327,6 +327,10 @@ def test_links_of_a_revision_are_followed_within_it(alone, capsys):
     git("commit", "-qm", "links", cwd=folder)
     for name in ("p/msg/Loop.msg", "p/srv"):
         (folder / name).unlink()
+    status, codes, _ = compare(capsys, "r", "--against", "git:HEAD")
+    assert (status, codes) == (1, ["IDL601", "IDL601"])
+    # now the working tree's links are the user's
+    git("rm", "-q", "--cached", "p/msg/Out.msg", "p/msg/Up.msg", cwd=folder)
     status, codes, summary = compare(capsys, "r", "--against", "git:HEAD")
     assert (status, codes, summary["added"]) == (1, ["IDL520"], [])
     assert [one[2:] for one in summary["not_compared"]] == ["msg/Out", "msg/Up"]

@@ -4,7 +4,6 @@ import sys
 
 from my_robot_controller.srv import AddTwoInts
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import ok
 
@@ -31,10 +30,8 @@ def main(args: list[str] | None = None) -> None:
         a, b = map(int, sys.argv[1:3] or ['2', '3'])
         node = AddTwoIntsClient()
         node.call_add_two_ints(AddTwoInts.Request(a=a, b=b))
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal has shut rclpy down
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
             raise
 
 

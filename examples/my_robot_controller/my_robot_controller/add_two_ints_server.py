@@ -2,8 +2,8 @@
 
 from my_robot_controller.srv import AddTwoInts
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.utilities import ok
 
 
 class AddTwoIntsServer(Node):
@@ -26,8 +26,9 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         rclpy.spin(AddTwoIntsServer())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
+            raise
 
 
 if __name__ == '__main__':

@@ -2,8 +2,8 @@
 
 from my_robot_controller.msg import RobotCommand
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.utilities import ok
 
 
 class CommandPublisher(Node):
@@ -33,8 +33,9 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         rclpy.spin(CommandPublisher())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
+            raise
 
 
 if __name__ == '__main__':

@@ -6,7 +6,6 @@ from typing import Any
 from my_robot_controller.action import Countdown
 import rclpy
 from rclpy.action.client import ActionClient
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import ok
 
@@ -51,10 +50,8 @@ def main(args: list[str] | None = None) -> None:
                 target_count=count,
             ),
         )
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal has shut rclpy down
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
             raise
 
 

@@ -3,9 +3,9 @@
 from my_robot_controller.action import Countdown
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse, ServerGoalHandle
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class CountdownActionServer(Node):
@@ -53,8 +53,9 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         rclpy.spin(CountdownActionServer())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
+            raise
 
 
 if __name__ == '__main__':

@@ -32,7 +32,7 @@ class ExecuteTaskClient(Node):
     """
     The node execute_task_client.
 
-    It sends goals to execute_task.
+    Sends execute_task goals.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -136,7 +136,7 @@ def execute_task_request(options: argparse.Namespace) -> ExecuteTask.Goal:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Do what the command line asks for; return 0 if it succeeded."""
+    """Send the goal; return 0 if it succeeded."""
     options = parse_arguments(args)
     interrupted = Event()
     # not by rclpy, which would shut down before goals are cancelled

@@ -25,7 +25,7 @@ class ExecuteTaskServer(Node):
     """
     The node execute_task_server.
 
-    It executes goals of execute_task.
+    Executes execute_task goals.
     """
 
     def __init__(self) -> None:
@@ -106,7 +106,7 @@ def main(args: list[str] | None = None) -> None:
             node = ExecuteTaskServer()
             executor.add_node(node)
             while ok():
-                # not without end: rclpy can miss a signal that comes while it starts
+                # Wake up every second: rclpy can miss a signal that arrives during startup.
                 executor.spin_once(timeout_sec=1.0)
         except Exception:
             if ok():  # otherwise a signal shut rclpy down before the node was complete

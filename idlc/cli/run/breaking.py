@@ -15,7 +15,6 @@ from idlc.diagnostics.formats import notice
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.project.find import is_address
-from idlc.project.git import GIT
 from idlc.project.settings import Config, scope, settings_here
 from idlc.recordings.find import recordings_of
 from idlc.tasks.breaking.files import BreakingOptions, Verdict, breaking
@@ -23,6 +22,7 @@ from idlc.tasks.breaking.recordings import RecordedVerdict, compare_with_recordi
 from idlc.versions import packages
 from idlc.versions.changes import LEVELS
 from idlc.versions.distribution import is_distro
+from idlc.versions.revision import GIT
 
 if TYPE_CHECKING:
     from idlc.tasks.breaking.graph import GraphVerdict

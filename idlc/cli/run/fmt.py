@@ -9,7 +9,6 @@ from idlc.compiler.compiler import stage
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
-from idlc.project.files import read_source
 from idlc.project.find import find
 from idlc.project.settings import scope, settings_here
 from idlc.project.write import rewrite
@@ -26,7 +25,7 @@ def run(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...
     if not report.had_errors:
         left_out = scope(settings, exclude=exclude).exclude
         for file in find(paths or settings.paths or (".",), settings.root, report, left_out):
-            source = read_source(file.path, file.shown, report)
+            source = settings.root.read_source(file.path, file.shown, report)
             if source is None:
                 continue
             with stage("format", file.shown):

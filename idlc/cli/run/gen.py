@@ -60,17 +60,18 @@ def _document(
 
 
 def _line(package: Generated, check: bool, paint: Paint) -> str:
-    """Return the line about a package: its size, and the changes if only a part was written."""
+    """Return the line about a package: what was written, and the changes if it is only a part."""
     note = f" ({package.changes})"
     if check:
         note = " (up to date)"
     elif package.written >= package.files and not package.removed:
         note = ""
-    needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
+    imported = ["idlc_runtime"] * (package.runtime == "installed") + [*package.needs]
+    needs = f"; imports {', '.join(imported)}" if imported and not check else ""
+    verb = "wrote " if not check and (package.written or package.removed) else ""
     return (
-        f"{paint('good', package.package)}: {counted(package.interfaces, 'interface')} → "
-        f"{counted(package.files, 'file')} in {one_line(package.out)}, "
-        f"runtime {package.runtime}{note}{needs}\n"
+        f"{verb}{paint('good', one_line(package.out))}: {counted(package.files, 'file')} from "
+        f"{counted(package.interfaces, 'interface')}{note}{needs}\n"
     )
 
 

@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from idlc.generate.package import Generated
 
 
-TEST = "The test runs the package's own build (setup.py)."
+TEST = "The test runs the package's own build."
 
 
-CI_NOTE = "note: idlc's docs/ci.md describes what this file installs, and from where\n"
+CI_NOTE = "next: see docs/ci.md in idlc's repository, for how the job gets idlc\n"
 
 
 CONSENT = f"Write these changes, compile and test? {TEST}"

@@ -172,7 +172,7 @@ def router(listen: tuple[str, ...], connect: tuple[str, ...]) -> int:
     return 0
 
 
-ROBOT_HEAD = ("", "name", "type", "hash", "here", "from", "to", "QoS")
+ROBOT_HEAD = ("", "name", "type", "hash", "installed", "from", "to", "QoS")
 
 
 #: Nodes, profiles and mismatches that text lists.
@@ -195,9 +195,9 @@ def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
         )
         profiles = dict.fromkeys(map(_qos, each.qos or each.requested))
         qos = first_few(profiles, LISTED) if each.noun == "topic" else ""
-        hash_ = (each.hash or "-")[: output.SHORT]
+        hash_, installed = (each.hash or "-")[: output.SHORT], output.INSTALLED[each.here]
         rows.append(
-            (each.noun, each.name, each.type_name, hash_, each.here, senders, receivers, qos)
+            (each.noun, each.name, each.type_name, hash_, installed, senders, receivers, qos)
         )
     yield from output.table(ROBOT_HEAD, rows)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -123,14 +124,19 @@ CheckType = Callable[[Role, str], None]
 
 def ask(name: str, check_type: CheckType) -> spec.Node:
     """Return the node that the answers describe; every wrong answer is asked for again at once."""
-    click.echo(f"What should {name} do?")
     roles = {role.answer: role for role in ROLES}
-    choices = click.Choice([*roles, PARAMETER, DONE])
+    numbers = {str(number): answer for number, answer in enumerate((*roles, PARAMETER), start=1)}
+    listed = "".join(f"\n  {number}  {answer}" for number, answer in numbers.items())
+    click.echo(f"What should {name} do?{listed}")
+    question = f"Add (1-{len(numbers)}, Enter to finish)"
+    choices = click.Choice([*numbers, *numbers.values(), DONE])
+    ask_next = partial(
+        click.prompt, question, default=DONE, type=choices, show_choices=False, show_default=False
+    )
     endpoints: list[Endpoint] = []
     parameters: list[spec.Parameter] = []
-    while (
-        chosen := click.prompt(f"Add an endpoint ({DONE} to finish)", type=choices, default=DONE)
-    ) != DONE:
+    while (chosen := ask_next()) != DONE:
+        chosen = numbers.get(chosen, chosen)
         if chosen == PARAMETER:
             answer = _answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter)
             parameters.append(spec.parameter(answer))

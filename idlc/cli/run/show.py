@@ -18,7 +18,7 @@ from idlc.recordings.times import date_text
 from idlc.tasks import show
 from idlc.tasks.show import RecordingFacts, TopicFacts
 
-HEAD = ("topic", "type", "messages", "rate", "size", "QoS", "hash", "here")
+HEAD = ("topic", "type", "messages", "rate", "size", "QoS", "hash", "installed")
 
 
 def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
@@ -34,7 +34,7 @@ def _table(topic_facts: Sequence[TopicFacts]) -> Iterator[str]:
         type_ = one_line(facts.type_name)
         rate = "-" if facts.rate is None else f"{facts.rate:.4g} Hz"
         size = "-" if facts.size is None else size_text(facts.size)
-        qos, here = one_line(facts.qos or "-"), facts.here + no_definition
+        qos, here = one_line(facts.qos or "-"), output.INSTALLED[facts.here] + no_definition
         rows.append((name, type_, count, rate, size, qos, hash_[: output.SHORT], here))
     yield from output.table(HEAD, rows)
 

@@ -14,7 +14,7 @@ from idlc.diagnostics.source import Span
 from idlc.language import tree
 from idlc.language.escapes import EscapeError, through_idl
 from idlc.language.tree import Fault
-from idlc.model import ir
+from idlc.model import ir, names
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.distros import DEFAULT, Distro
 from idlc.model.lowering import lower_types
@@ -86,7 +86,8 @@ class _Section(msgspec.Struct):
             if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
             body = parse_definition(text)
-            if slip := lower_types.find_slip(text, body, self.name.kind):
+            slip = lower_types.find_slip(text, body, self.name.kind)
+            if slip and not (isinstance(body, tree.Constant) and self._is_recorded(body.name)):
                 self._add(line, 0, slip)
             elif isinstance(body, Fault):
                 self._add(line, 0, body, self._edits(line, body))
@@ -160,6 +161,10 @@ class _Section(msgspec.Struct):
             span = self._span(line, offset + fault.start, offset + fault.end)
             self.report.add(fault.code.at(span, fault.message, hint=fault.hint, edits=edits))
 
+    def _is_recorded(self, name: tree.Piece) -> bool:
+        """Return whether a name was recorded, and is harmless although ROS 2 may not allow it."""
+        return self.file.source.is_recorded and names.is_recorded_name(name.text)
+
     def _add_value(self, line: tree.Line, piece: tree.Piece, fault: Fault) -> None:
         if lower_types.has_comment(piece.text):
             fault = msgspec.structs.replace(fault, hint=lower_types.COMMENT_HINT)
@@ -182,7 +187,8 @@ class _Section(msgspec.Struct):
     def _field(
         self, line: tree.Line, body: tree.Field, about: Comment, *, optional: bool
     ) -> ir.Field:
-        self._add(line, body.name.start, lower_types.field_name(body.name.text))
+        if not self._is_recorded(body.name):
+            self._add(line, body.name.start, lower_types.field_name(body.name.text))
         type_ = self._type(line, body.type)
         return ir.Field(
             name=body.name.text,
@@ -214,7 +220,8 @@ class _Section(msgspec.Struct):
         return lowered
 
     def _constant(self, line: tree.Line, body: tree.Constant, about: Comment) -> ir.Constant | None:
-        self._add(line, body.name.start, lower_types.constant_name(body.name.text))
+        if not self._is_recorded(body.name):
+            self._add(line, body.name.start, lower_types.constant_name(body.name.text))
         name = body.type.whole.text
         if name not in ir.PRIMITIVES and name not in STRINGS:
             message = f"a constant cannot be of type `{name}`"

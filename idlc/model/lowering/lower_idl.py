@@ -26,7 +26,14 @@ from idlc.model.lowering.lower_types import STRINGS, as_parsed, positive
 from idlc.model.lowering.lower_values import MAX_ELEMENTS
 
 #: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
-_PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}
+_PRIMITIVES = {
+    **{info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()},
+    **{
+        f"{sign}{word}": ir.Primitive(f"{sign[:1]}int{bits}")
+        for sign in ("", "unsigned ")
+        for word, bits in (("short", 16), ("long", 32), ("long long", 64))
+    },
+}
 #: The annotations that ROS 2's adapter writes.
 ANNOTATIONS = frozenset({"verbatim", "default", "unit", "optional"})
 _CONSTANTS = "_Constants"
@@ -122,7 +129,8 @@ def lower_idl(file: IdlFile, names: Sequence[ir.TypeName], report: Report) -> li
     lowering = _Lowering(file.source, names, report)
     if file.broken is None:
         # a definition of a type may come after its uses
-        parts = sorted(file.tree.children, key=lambda part: getattr(part, "data", "") != "typedef")
+        order = {"enum": 0, "typedef": 1}
+        parts = sorted(file.tree.children, key=lambda part: order.get(getattr(part, "data", ""), 2))
         lowering.transform(Tree("file", parts))
     else:
         word = f"`{file.broken.text}`" if file.broken.text else "this end of the text"
@@ -158,16 +166,27 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
             self.foreign(kind, f"a module without `{missing}`")
 
     def typedef(self, target: _Type, name: Token, size: Token | None = None) -> None:
-        type_ = target.type
-        if length := self._positive(size, "the array's size"):
-            if isinstance(type_, (ir.Array, ir.Sequence)):
-                self.foreign(piece(name), "an array of arrays")
-                type_ = ir.Unknown()
-            else:
-                type_ = ir.Array(type_, length)
-        if self._typedefs.get(str(name), target._replace(type=type_)).type != type_:
+        self._name_type(name, target._replace(type=self._sized(target.type, name, size)))
+
+    def enum(self, *parts: Any) -> None:
+        name = next(part for part in parts if isinstance(part, Token))
+        # Connext, Fast DDS and Cyclone DDS write enumerations so
+        self._name_type(name, _Type(ir.Primitive("uint32"), piece(name)))
+
+    def _name_type(self, name: Token, target: _Type) -> None:
+        if self._typedefs.get(str(name), target).type != target.type:
             self.foreign(piece(name), f"a duplicate `{name}`")
-        self._typedefs[str(name)] = target._replace(type=type_)
+        self._typedefs[str(name)] = target
+
+    def _sized(self, type_: ir.FieldType, name: Token, size: Token | None) -> ir.FieldType:
+        """Return an array of a type; the type itself without a size."""
+        length = self._positive(size, "the array's size")
+        if length is None:
+            return type_
+        if isinstance(type_, (ir.Array, ir.Sequence)):
+            self.foreign(piece(name), "an array of arrays")
+            return ir.Unknown()
+        return type_ if isinstance(type_, ir.Unknown) else ir.Array(type_, length)
 
     def sequence(self, element: _Type, bound: Token | None = None) -> _Type:
         if isinstance(element.type, (ir.Array, ir.Sequence)):
@@ -179,7 +198,7 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
     def element(self, *tokens: Token) -> _Type:
         bound = tokens[-1] if tokens[-1].type == "SIZE" else None
         parts = [str(token) for token in tokens if token is not bound]
-        whole = Piece("::".join(parts), piece(tokens[0]).start)
+        whole = Piece(" ".join("::".join(parts).split()), piece(tokens[0]).start)
         if whole.text in STRINGS:
             length = self._positive(bound, "the string's bound")
             return _Type(ir.String(STRINGS[whole.text], length), whole)
@@ -188,6 +207,8 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
                 return _Type(_PRIMITIVES[whole.text], whole)
             if whole.text in self._typedefs:
                 return self._typedefs[whole.text]
+            if parts[:-1] == [self._top.package, self._top.kind] and parts[-1] in self._typedefs:
+                return self._typedefs[parts[-1]]
             package, kind, name = parts if len(parts) == 3 else ("", "", "")
             if kind == "msg" and names.is_package_name(package) and names.is_message_name(name):
                 return _Type(ir.Ref(ir.TypeName(package, "msg", name)), whole)
@@ -225,7 +246,9 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
             self.constants_of[name] += filter(None, constants)
 
     def member(self, *parts: Any) -> ir.Field:
-        *annotations, (type_, at), token = parts
+        size = parts[-1] if parts[-1].type == "SIZE" else None
+        *annotations, (type_, at), token = parts if size is None else parts[:-1]
+        type_ = self._sized(type_, token, size)
         name = self._name(token, annotations, lower_types.field_name)
         value = _parameter(annotations, "default", "value")
         unit = _parameter(annotations, "unit", "value")
@@ -290,12 +313,16 @@ class _Lowering(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x o
         annotations: Iterable[_Annotation],
         fault_of: Callable[[str], Fault | None],
     ) -> Piece:
-        """Return a name; report one that ROS 2 does not allow, and unknown annotations."""
+        """Return a name; report one that ROS 2 does not allow, and unknown annotations.
+
+        ROS 2 ignores annotations in files that people wrote.
+        """
         for annotation in annotations:
-            if annotation.name.text not in ANNOTATIONS:
+            if self._source.is_recorded and annotation.name.text not in ANNOTATIONS:
                 self.foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
         name = piece(token)
-        if fault := fault_of(name.text):
+        fault = None if names.is_recorded_name(name.text) else fault_of(name.text)
+        if fault:
             self._fault(fault.moved(name.start))
         return name
 

@@ -13,7 +13,7 @@ from idlc.model import ir
 from idlc.model.enums import enums
 from idlc.model.lowering.lower import lower
 from idlc.recordings.columns.plan import INSTANTS
-from idlc.runtime.typeinfo import Structure
+from idlc.runtime.typeinfo import FieldInfo, Structure
 
 
 class Leaf(NamedTuple):
@@ -21,7 +21,7 @@ class Leaf(NamedTuple):
 
     path: str
     structure: Structure
-    field: str
+    field: FieldInfo
 
 
 def leaves(structure: Structure, prefix: str = "") -> Iterator[Leaf]:
@@ -31,7 +31,7 @@ def leaves(structure: Structure, prefix: str = "") -> Iterator[Leaf]:
         if nested and nested.name not in INSTANTS:
             yield from leaves(nested, f"{prefix}{field.name}.")
         else:
-            yield Leaf(prefix + field.name, structure, field.name)
+            yield Leaf(prefix + field.name, structure, field)
 
 
 def metadata(structure: Structure) -> dict[str, dict[str, str]]:
@@ -42,7 +42,7 @@ def metadata(structure: Structure) -> dict[str, dict[str, str]]:
         name = leaf.structure.name
         if name not in by_type:
             by_type[name] = _of_fields(leaf.structure)
-        if facts := by_type[name].get(leaf.field):
+        if facts := by_type[name].get(leaf.field.name):
             result[leaf.path] = facts
     return result
 
@@ -64,6 +64,21 @@ def _of_fields(structure: Structure) -> dict[str, dict[str, str]]:
         for field in enum.fields:
             facts.setdefault(field.name, {})["ros2.enum"] = json.dumps(names)
     return facts
+
+
+def labels(structure: Structure) -> list[tuple[str, str]]:
+    """Return lists of numbers, each with a list of texts beside it, which may name its elements."""
+    lists = [leaf for leaf in leaves(structure) if leaf.field.is_list]
+    texts: dict[str, list[str]] = {}
+    for leaf in lists:
+        if leaf.field.text:
+            texts.setdefault(leaf.path.rpartition(".")[0], []).append(leaf.path)
+    return [
+        (leaf.path, label)
+        for leaf in lists
+        if leaf.field.is_numeric
+        for label in texts.get(leaf.path.rpartition(".")[0], ())
+    ]
 
 
 def quaternions(structure: Structure) -> list[list[str]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from idlc.recordings.aligned import blend
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
-from idlc.recordings.aligned.describe import leaves, metadata, quaternions
+from idlc.recordings.aligned.describe import labels, leaves, metadata, quaternions
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.values import needing
 from idlc.recordings.containers.messages import (
@@ -41,7 +41,11 @@ STAMP = "header.stamp"
 
 
 class Track(NamedTuple):
-    """A topic of the table: its fields, and how the value of a tick is found."""
+    """A topic of the table: its columns, and how the value of a tick is found.
+
+    `fields` and `decoded` are what is read of a message: also the `labels` of linear columns,
+    which are the texts that name the elements of lists.
+    """
 
     topic: str
     fields: tuple[str, ...] | None
@@ -49,7 +53,9 @@ class Track(NamedTuple):
     tolerance: int | None
     clock: str
     schema: pa.Schema
+    decoded: pa.Schema
     quaternions: list[list[str]]
+    labels: list[tuple[str, str]]
 
 
 class Times(NamedTuple):
@@ -321,15 +327,18 @@ def aligned(
         fields = (fields,) if isinstance(fields, str) else fields
         fields = None if fields is None else tuple(fields)
         selection = recording[name]
-        track = Track(
-            name,
-            fields,
-            way,
-            None if limit is None else int(length(limit)),
-            by,
-            selection.table(join_messages([]), fields).schema.remove_metadata(),
-            quaternions(selection.read_type) if way == "linear" else [],
-        )
+
+        def schema(names: tuple[str, ...] | None) -> Any:
+            return selection.table(join_messages([]), names).schema.remove_metadata()
+
+        columns, named, turned = schema(fields), [], []
+        if way == "linear":
+            turned = quaternions(selection.read_type)
+            named = [pair for pair in labels(selection.read_type) if pair[0] in columns.names]
+        if fields is not None:
+            fields = (*fields, *dict.fromkeys(label for _, label in named))
+        limit = None if limit is None else int(length(limit))
+        track = Track(name, fields, way, limit, by, columns, schema(fields), turned, named)
         return Source(track, selection)
 
     sources = {name: source(name, fields) for name, fields in wanted.items()}
@@ -377,7 +386,7 @@ def _scan(track: Track, selection: Any) -> Times:
     """Read the times of a topic's messages, and also the values if they are small."""
     none = np.zeros(0, np.int64)
     log_times, stamps, sizes = [none], [none], [none]
-    tables = [track.schema.empty_table()]
+    tables = [track.decoded.empty_table()]
     size = done = 0
     for batch in selection.recorded():
         numbers = np.arange(done, done + len(batch))
@@ -421,7 +430,7 @@ def _summary(topic: str, times: Times, each: Match) -> Summary:
 
 def _values(track: Track, selections: Iterable[Any], need: Needed) -> pa.Table:
     """Return the values of needed messages, without decoding others."""
-    tables = [track.schema.empty_table()]
+    tables = [track.decoded.empty_table()]
     done = last = 0
     for selection in selections:
         for batch in selection.recorded():
@@ -477,6 +486,12 @@ def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
         [column.take(pa.array(np.maximum(places, 0))) for column in columns]
         for places in (each.first, each.second)
     )
+    blended = pa.array(np.flatnonzero((each.first >= 0) & (each.weight != 0)))
+    for name, label in track.labels:
+        at = names.index(label)
+        if not first[at].take(blended).equals(second[at].take(blended)):
+            what = f"the elements of `{track.topic}.{name}` change: `{label}` names others"
+            raise RecordingError(f"{what} in the next message", "use how='last' for this topic")
     arrays: dict[str, Any] = {}
     for paths in track.quaternions:
         if paths[0] in names:
@@ -489,10 +504,11 @@ def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
                 path: pa.array(turned[:, at], table.schema.field(path).type)
                 for at, path in enumerate(paths)
             }
-    return [
-        arrays[name] if name in arrays else blend.line(f"{track.topic}.{name}", *pair, each.weight)
-        for name, pair in zip(names, zip(first, second, strict=True), strict=True)
-    ]
+    for name in track.schema.names:
+        if name not in arrays:
+            pair = first[names.index(name)], second[names.index(name)]
+            arrays[name] = blend.line(f"{track.topic}.{name}", *pair, each.weight)
+    return [arrays[name] for name in track.schema.names]
 
 
 def _masked(column: Any) -> Any:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Container, Iterable, Mapping
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.damage import Damage
@@ -16,6 +17,9 @@ SUFFIXES = (".mcap", ".db3")
 ZSTD = ".zstd"
 COMPRESSED = tuple(suffix + ZSTD for suffix in SUFFIXES)
 METADATA = "metadata.yaml"
+#: Keys in it.
+INFORMATION, TOPICS = "rosbag2_bagfile_information", "topics_with_message_count"
+TOPIC, COUNT, PATHS = "topic_metadata", "message_count", "relative_file_paths"
 TYPE_KEYS = ("type", "type_description_hash")
 #: No recorder writes more, or deeper.
 MOST_OF_METADATA = 1 << 23
@@ -89,8 +93,7 @@ def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | Non
         root = _root(data)
     except RecordingError:
         return None
-    text, at, parts = data.decode(), 0, list[str]()
-    edits: list[tuple[int, int, str]] = []
+    edits: list[_Edit] = []
     expected = []
     for topic in _topics(root):
         own = _type_of(topic)
@@ -100,10 +103,7 @@ def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | Non
         for key in new.keys() & own.keys():
             (old, *_) = _values([topic], key)
             edits.append((old.start_mark.index, old.end_mark.index, new[key] or '""'))
-    for start, end, value in sorted(edits):
-        parts += text[at:start], " " * (text[start - 1] != " "), value
-        at = end
-    text = "".join((*parts, text[at:]))
+    text = _edited(data.decode(), edits)
     try:  # an alias may be lost, or change the type of another topic, too
         is_done = list(map(_type_of, _topics(_root(text.encode())))) == expected
     except RecordingError:
@@ -111,6 +111,70 @@ def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | Non
     if not is_done:
         raise RecordingError(f"the types in `{metadata}` cannot be changed")
     return text.encode()
+
+
+def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, int]) -> bytes:
+    """Return a metadata.yaml with the numbers of messages of topics and files, by their names.
+
+    Other files are left out. `metadata` is what `retyped` returns.
+    """
+    root = _root(metadata)
+    information = _values([root], INFORMATION)
+    edits = [_number(node, sum(topics.values())) for node in _values(information, COUNT)]
+    for listed in _values(information, TOPICS):
+        for topic in listed.value if listed.id == "sequence" else ():
+            name = _type_of(*_values([topic], TOPIC)).get("name", "")
+            edits += [_number(node, topics.get(name, 0)) for node in _values([topic], COUNT)]
+    for paths in _values(information, PATHS):
+        names = [str(node.value) for node in paths.value if node.id == "scalar"]
+        edits.append(_listed(paths, [name for name in names if _plain_name(name) in files]))
+    for described in _values(information, "files"):
+        contents = [_content(node) for node in described.value if node.id == "mapping"]
+        present = [
+            {**content, COUNT: files[name]}
+            for content in contents
+            if (name := _plain_name(str(content.get("path", "")))) in files
+        ]
+        edits.append(_listed(described, present))
+    return _edited(metadata.decode(), edits).encode()
+
+
+#: A part of a text, from one offset to another, and what takes its place.
+_Edit: TypeAlias = tuple[int, int, str]
+
+
+def _edited(text: str, edits: Iterable[_Edit]) -> str:
+    at, parts = 0, list[str]()
+    for start, end, value in sorted(edits):
+        # the lines after a block belong to what follows
+        blanks = text[start:end][len(text[start:end].rstrip()) :]
+        parts += text[at:start], " " * (text[start - 1] != " "), value, blanks
+        at = end
+    return "".join((*parts, text[at:]))
+
+
+def _number(node: Any, number: int) -> _Edit:
+    return node.start_mark.index, node.end_mark.index, str(number)
+
+
+def _listed(node: Any, items: list[Any]) -> _Edit:
+    """Return the edit that writes a list on one line, further right than its key."""
+    return node.start_mark.index, node.end_mark.index, f"  {json.dumps(items)}"
+
+
+def _content(node: Any) -> Any:
+    """Return the content of a node of numbers and texts."""
+    if node.id == "mapping":
+        return {str(key.value): _content(value) for key, value in node.value}
+    if node.id == "sequence":
+        return list(map(_content, node.value))
+    is_number = node.style is None and re.fullmatch(r"-?\d{1,20}", node.value, re.ASCII)
+    return int(node.value) if is_number else node.value
+
+
+def _plain_name(path: str) -> str:
+    """Return the name of a file that may be compressed as a whole."""
+    return _own_name(path).removesuffix(ZSTD)
 
 
 def _type_of(topic: Any) -> dict[str, str]:
@@ -122,9 +186,9 @@ def _type_of(topic: Any) -> dict[str, str]:
 
 def _topics(root: Any) -> list[Any]:
     """Return the nodes that describe topics."""
-    lists = _values(_values([root], "rosbag2_bagfile_information"), "topics_with_message_count")
+    lists = _values(_values([root], INFORMATION), TOPICS)
     topics = [topic for own in lists if own.id == "sequence" for topic in own.value]
-    return _values(topics, "topic_metadata")
+    return _values(topics, TOPIC)
 
 
 def _contents(metadata: Path) -> tuple[list[str], int]:
@@ -132,10 +196,10 @@ def _contents(metadata: Path) -> tuple[list[str], int]:
 
     Raises RecordingError if they cannot be read.
     """
-    information = _values([_root(_read(metadata))], "rosbag2_bagfile_information")
-    counts = [str(node.value) for node in _values(information, "message_count")]
+    information = _values([_root(_read(metadata))], INFORMATION)
+    counts = [str(node.value) for node in _values(information, COUNT)]
     is_number = bool(counts) and re.fullmatch(r"\d{1,18}", counts[0], re.ASCII)
-    paths = _values(information, "relative_file_paths")
+    paths = _values(information, PATHS)
     lists = (path_list.value for path_list in paths if path_list.id == "sequence")
     names = [str(node.value) for node in chain.from_iterable(lists) if node.id == "scalar"]
     return names, int(counts[0]) if is_number else 0

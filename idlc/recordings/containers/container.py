@@ -149,8 +149,13 @@ class Container(AbstractContextManager["Container"]):
 
         for file in self.files:
             numbers = [number for _, number in file.topics]
-            messages = file.messages(numbers, file.pieces(numbers, ALWAYS), ALWAYS)
-            total, counted = sum(map(len, messages)), sum(topic.count for topic, _ in file.topics)
+            total = late = 0
+            for batch in file.messages(numbers, file.pieces(numbers, ALWAYS), ALWAYS):
+                total += len(batch)
+                late += batch.late()
+            if late:
+                self._late[Path(file.name).name] = late
+            counted = sum(topic.count for topic, _ in file.topics)
             if total != counted and not file.damage:
                 what = f"its index lists {counted:,} messages, but it has {total:,}"
                 file.damage.add(what)

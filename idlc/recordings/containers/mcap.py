@@ -256,10 +256,44 @@ class _Walk:
         self.chunk: tuple[int, int] | None = None
         self.indexes: list[tuple[int, int]] = []
         self.room = Room(source.size)
+        self.conflicts: list[tuple[RecordingError, int, int]] = []
 
     def content(self, at: int, size: int) -> memoryview:
         """Return the content of a record."""
         return self.source.view(at + HEAD.size, size - HEAD.size)
+
+    def define(
+        self,
+        op: int,
+        data: memoryview,
+        start: int,
+        stop: int,
+        *,
+        is_proven: bool = False,
+        is_repeated: bool = False,
+    ) -> None:
+        """Add a schema or a channel, unless it is damaged.
+
+        A checksum covers one that `is_proven`; one that `is_repeated` is in a summary.
+        """
+        try:
+            self.facts.add(op, data)
+        except DamageError as error:
+            self.damage.add(error.message, start, stop)
+        except RecordingError as error:
+            if is_proven:
+                raise
+            if not is_repeated:
+                self.conflicts.append((error, start, stop))
+
+    def end(self) -> None:
+        """Add the last messages, and definitions that contradict others if there is damage."""
+        self.end_of_chunk()
+        self.end_of_loose()
+        for error, start, stop in self.conflicts:
+            if not self.damage:
+                raise error
+            self.damage.add(error.message, start, stop)
 
     def message(self, at: int, size: int) -> None:
         """Count a message outside of any chunk, and make it part of a stretch of them."""
@@ -304,7 +338,7 @@ class _Walk:
             every = zip(records.read_records(content), self.room.records(), strict=False)
             for (op, _, data), _ in every:
                 if op != MESSAGE_OP:
-                    self.facts.add(op, data)
+                    self.define(op, data, at, at + size, is_proven=head.crc != 0)
                 elif len(data) >= CHANNEL_AND_TIME.size:
                     channel, _, time = CHANNEL_AND_TIME.unpack_from(data)
                     counts[channel] = counts.get(channel, 0) + 1
@@ -354,19 +388,15 @@ def _walk(walk: _Walk, reason: str, index: bool) -> Facts:
             walk.end_of_loose()
             walk.chunk = at, size
         elif op in (records.SCHEMA_OP, records.CHANNEL_OP):
-            try:
-                walk.facts.add(op, walk.content(at, size))
-            except DamageError as error:
-                walk.damage.add(error.message, at, end)
+            walk.define(op, walk.content(at, size), at, end, is_repeated=ended)
         # a summary follows, and nothing keeps a writer from going on
         ended = op == records.DATA_END_OP or (ended and op not in (MESSAGE_OP, records.CHUNK_OP))
-    walk.end_of_chunk()
-    walk.end_of_loose()
     for start, stop in skipped:
         if stop < source.size:
             walk.damage.add("there are no records", start, stop)
         elif not ended:
             walk.damage.add("the end of the file is not a whole record", start, stop)
+    walk.end()
     for number in walk.facts.counts.keys() - walk.facts.channels.keys():
         what = f"the definition of channel {number} is missing"
         walk.damage.add(what, messages=walk.facts.counts.pop(number))

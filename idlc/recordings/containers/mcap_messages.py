@@ -233,6 +233,20 @@ def _indexed(source: Source, chunk: Chunk, size: int, channels: Collection[int])
     return places
 
 
+def indexed_messages(
+    source: Source, chunk: Chunk, data: memoryview, channels: Iterable[int]
+) -> Iterator[tuple[int, int]]:
+    """Yield where in a chunk messages begin and end, for each channel whose index is sound."""
+    for channel in channels:
+        with suppress(DamageError):
+            places = _indexed(source, chunk, len(data), [channel])
+            if places is not None:
+                ends = np.full(len(places), len(data))
+                ranges = _messages(data, places, ends, [channel])
+                starts = ranges.starts - MESSAGE.itemsize
+                yield from zip(starts.tolist(), ranges.stops.tolist(), strict=True)
+
+
 def _walked(
     view: memoryview, chunk: Chunk, channels: Collection[int], room: Room, partial: bool
 ) -> list[int]:

@@ -6,7 +6,9 @@ Definitions may be anywhere in a chunk, so all are decompressed, and their messa
 from __future__ import annotations
 
 import zlib
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, TypeAlias
@@ -24,9 +26,9 @@ from idlc.recordings.containers.conversion import (
     converted,
     selected,
 )
-from idlc.recordings.containers.file import Schema, check_count, full_name
+from idlc.recordings.containers.file import Schema, full_name, wrong_count
 from idlc.recordings.containers.mcap import Facts, read_facts
-from idlc.recordings.containers.mcap_messages import MESSAGE
+from idlc.recordings.containers.mcap_messages import MESSAGE, indexed_messages
 from idlc.recordings.containers.mcap_writer import (
     Content,
     McapWriter,
@@ -42,6 +44,8 @@ from idlc.recordings.containers.records import (
     MAGIC,
     MESSAGE_OP,
     SCHEMA_OP,
+    Chunk,
+    ChunkHead,
     Fields,
     heads,
     sound_heads,
@@ -189,12 +193,13 @@ class Rewriting:
         progress(self.source.size)
 
     def check(self, facts: Facts) -> None:
-        """Raise RecordingError if other numbers of messages were written than are counted."""
+        """Add it to the damage if other numbers of messages were written than are counted."""
         if self.damage:
             return
         for number, own in facts.channels.items():
-            count = self.writer.counts.get(number, 0)
-            check_count(own.topic, facts.counts.get(number, 0), count)
+            counted, count = facts.counts.get(number, 0), self.writer.counts.get(number, 0)
+            if counted != count:
+                self.damage.add(wrong_count(own.topic, counted, count))
 
     def topics(self) -> dict[str, RewrittenTopic]:
         """Return the fate of each topic."""
@@ -218,7 +223,19 @@ class Rewriting:
             self.damage.add(error.message, at, at + size)
 
     def _skip(self, start: int, stop: int) -> None:
-        """Add a part without records to the damage, unless it is the end of a summary."""
+        """Write the chunks that a summary lists in a part without records.
+
+        Without any, the part is damage, unless it is the end of a summary.
+        """
+        first, last = (bisect_left(self._places, at) for at in (start, stop))
+        for at in self._places[first:last]:
+            size = self._chunks[at].size
+            try:
+                self._chunk(at, size, is_proof_needed=True)
+            except DamageError as error:
+                self.damage.add(error.message, at, at + size)
+        if first < last:
+            return
         if stop < self.source.size or not self.facts.is_ended:
             self.damage.add("there are no records", start, stop)
 
@@ -230,14 +247,29 @@ class Rewriting:
         edits = self._edits(content, self.known)
         self.writer.add(Content(_edited(content.data, edits)) if edits else content)
 
-    def _chunk(self, at: int, size: int) -> None:
+    def _decompressed(self, head: ChunkHead) -> tuple[memoryview, memoryview]:
+        """Return the content of a chunk as it is stored, and decompressed."""
+        self.room.reserve(max(head.size, head.stored))
+        stored = self.source.view(head.start, head.stored)
+        if not head.compression and head.size == head.stored:
+            return stored, stored
+        data = memoryview(bytearray(head.size))
+        decompress(stored, head.compression, data)
+        return stored, data
+
+    def _chunk(self, at: int, size: int, is_proof_needed: bool = False) -> None:
         """Write a chunk, compressed anew only if something in it changes."""
         head = records.read_chunk_head(self.source, at, size)
-        self.room.reserve(max(head.size, head.stored))
-        stored = data = self.source.view(head.start, head.stored)
-        if head.compression or head.size != head.stored:
-            data = memoryview(bytearray(head.size))
-            decompress(stored, head.compression, data)
+        if is_proof_needed and not head.crc:
+            raise DamageError(f"there is no chunk at byte {at}, although an index lists one")
+        try:
+            stored, data = self._decompressed(head)
+        except DamageError:
+            proven = records.proven_head(self.source, head)
+            if proven is None or self.damage.is_strict:
+                raise
+            head = proven
+            stored, data = self._decompressed(head)
         crc = head.crc
         if crc and zlib.crc32(data) != crc:
             raise DamageError(f"the checksum of the chunk at byte {at} is wrong")
@@ -250,7 +282,7 @@ class Rewriting:
             # without a checksum, the messages before the damage are as good as any
             is_cut = True
             self.damage.add(error.message, at, at + size)
-            content = Content(data[: records.sound_size(data)], self.room)
+            content = Content(memoryview(self._salvaged(at, data)), self.room)
         self._define_channels(content)
         edits = self._edits(content, set())
         if edits or is_cut:
@@ -259,6 +291,31 @@ class Rewriting:
             content, crc = Content(new), zlib.crc32(new)
             stored = memoryview(compress(new, head.compression))
         self.writer.add_chunk(content, head.compression, stored, crc)
+
+    @cached_property
+    def _chunks(self) -> dict[int, Chunk]:
+        """The known chunks, by their places."""
+        every = self.facts.chunks
+        return {chunk.at: chunk for chunk in every if chunk.compression is not None}
+
+    @cached_property
+    def _places(self) -> list[int]:
+        return sorted(self._chunks)
+
+    def _salvaged(self, at: int, data: memoryview) -> bytes:
+        """Return the records of a damaged chunk before the damage, and messages in its indexes."""
+        sound = size = records.sound_size(data)
+        parts: list[Raw] = [data[:sound]]
+        chunk = self._chunks.get(at)
+        if chunk is not None:
+            indexed = indexed_messages(self.source, chunk, data, self.facts.channels)
+            walked = set(Content(data[:sound], self.room).places.tolist())
+            for start, stop in sorted(indexed):
+                # messages of damaged sizes may overlap
+                if start not in walked and size + stop - start <= 2 * len(data):
+                    parts.append(data[start:stop])
+                    size += stop - start
+        return b"".join(parts)
 
     def _other(self, op: int, at: int, size: int) -> None:
         """Copy a record, of any size."""
@@ -297,14 +354,33 @@ class Rewriting:
         edits: list[Edit] = []
         for op, at, number, data in content.definitions:
             if (op, number) not in self.facts.raws:
-                raise _UnlistedError
-            self.facts.add(op, data)
+                if self.facts.loose is not None or not self.damage:
+                    raise _UnlistedError
+                edits.append((at, at + HEAD.size + len(data), b""))  # it is damaged
+                continue
+            is_sound = self._is_sound(op, data)
             new = self._definition(op, number, known)
+            if new is None and not is_sound:
+                new = record(op, self.plan.contents[op, number])
             end = at + HEAD.size + len(data)
             if new is not None and new != content.data[at:end]:
                 edits.append((at, end, new))
         edits += self._messages(content)
         return sorted(edits)
+
+    def _is_sound(self, op: int, data: memoryview) -> bool:
+        """Return whether a definition is the known one; if it is damaged, that takes its place."""
+        try:
+            self.facts.add(op, data)
+        except DamageError as error:
+            self.damage.add(error.message)
+        except RecordingError as error:
+            if self.facts.loose is None and not self.damage:  # nothing says which one is right
+                raise
+            self.damage.add(error.message)
+        else:
+            return True
+        return False
 
     def _definition(self, op: int, number: int, known: set[int]) -> bytes | None:
         """Return what takes the place of a definition, None if it stays."""
@@ -326,7 +402,13 @@ class Rewriting:
         return new
 
     def _messages(self, content: Content) -> Iterator[Edit]:
-        """Yield the messages with new payloads."""
+        """Yield the messages with new payloads, and those of channels without a definition."""
+        for number in content.by_channel.keys() - self.facts.channels.keys():
+            mine = content.by_channel[number]
+            starts = content.places[mine]
+            stops = starts + HEAD.size + content.heads["size"][mine].astype(np.int64)
+            for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+                yield start, stop, b""
         by_topic: dict[tuple[str, str | None], list[Any]] = {}
         for number, mine in content.by_channel.items():
             change = self.plan.changed.get(number)

@@ -12,15 +12,15 @@ from contextlib import contextmanager, suppress
 
 from idlc.robot.dds import address, formats, wire
 from idlc.robot.dds.participant import Participant
-from idlc.robot.dds.reader import Outgoing
+from idlc.robot.dds.shared import Outgoing
 from idlc.robot.dds.writer import Writer
 
 #: The longest sleep of the thread, in which another thread may make something due.
 _TICK = 0.05
 #: Seconds between two looks at the own addresses, which change with the network.
 _LOOK = 3.0
-#: Packets that are read before what is due is sent.
-_AT_ONCE = 64
+#: Packets that are read before what is due is done: one after so many seconds without any.
+_AT_ONCE, _NAP = 64, 0.0001
 _MOST_PACKET = 65_536
 
 
@@ -35,7 +35,7 @@ class Connection:
         self._selector = selectors.DefaultSelector()
         for each in self._sockets:
             self._selector.register(each, selectors.EVENT_READ, each)
-        self._place, self._looked = place, 0.0
+        self._place, self._looked, self._ticked = place, 0.0, 0.0
         self._port = port = self._sockets[0].getsockname()[1]
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
         others = [each for each in address.searched(place) if each != ("127.0.0.1", port)]
@@ -63,24 +63,34 @@ class Connection:
             for group in self._sockets[1:]:
                 address.join(group, self._hosts)
 
-    def _tick(self) -> None:
-        if (now := time.monotonic()) > self._looked + _LOOK:
+    def _tick(self, now: float) -> None:
+        self._ticked = now
+        if now > self._looked + _LOOK:
             self._look(now)
         self.send(self.participant.tick(now))
         self._tick_above()
 
     def _run(self) -> None:
         while self._is_open:
-            with self.lock:
-                wait = self.participant.deadline - time.monotonic()
-            for key, _ in self._selector.select(min(max(wait, 0), _TICK)):
-                self._receive(key.data)
-            with self.lock:
-                if self._is_open:
-                    self._tick()
+            wait = self._due() - time.monotonic()
+            begin = time.monotonic()
+            ready = self._selector.select(max(wait, 0))
+            # to look for another packet would let other threads run first
+            most = 1 if time.monotonic() - begin > _NAP else _AT_ONCE
+            for key, _ in ready:
+                self._receive(key.data, most)
+            # most messages of others make nothing due
+            if (now := time.monotonic()) >= self._due() or self.changed_at > self._ticked:
+                with self.lock:
+                    if self._is_open:
+                        self._tick(now)
 
-    def _receive(self, each: socket.socket) -> None:
-        for _ in range(_AT_ONCE):
+    def _due(self) -> float:
+        with self.lock:
+            return min(self.participant.deadline, self._ticked + _TICK)
+
+    def _receive(self, each: socket.socket, most: int) -> None:
+        for _ in range(most):
             try:
                 packet, source = each.recvfrom(_MOST_PACKET)
             except BlockingIOError:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.reader import Address, Received
+from idlc.robot.dds.shared import Address, Received
 from idlc.robot.qos import (
     INFINITE,
     MOST_DEPTH,

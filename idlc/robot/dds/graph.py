@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from idlc.robot.dds import info, wire
 from idlc.robot.dds.discovery import Endpoint
-from idlc.robot.dds.reader import Received
+from idlc.robot.dds.shared import Received
 from idlc.robot.keys import Entity, Kind
 from idlc.robot.names import ros_type
 

@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.discovery import Endpoint, Peer, fits
-from idlc.robot.dds.reader import Address, Outgoing, Reader, Received, Remote, Shared
+from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.shared import Address, Outgoing, Received, Remote, Shared
 from idlc.robot.dds.writer import Writer
 
 #: Participants, the announcements that a stranger gets, and the endpoints of one and of all.
@@ -314,15 +315,12 @@ class Participant:
     @property
     def deadline(self) -> float:
         """When `tick` has something to do."""
-        times = [end.deadline for end in self._ends.values() if isinstance(end, Writer)]
-        return min([self._announce_at, *(time for time in times if time is not None)])
+        return min([self._announce_at, *self.shared.due.values()])
 
     def tick(self, now: float) -> list[Outgoing]:
         """Do what is due; return the packets to send."""
         self.shared.now = now
-        for end in self._ends.values():
-            if isinstance(end, Writer):
-                end.tick()
+        self.shared.tick()
         if now >= self._announce_at:
             self._announce_at = now + next(self._periods, _PERIOD)
             self._greetings = 0

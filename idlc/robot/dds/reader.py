@@ -2,111 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+from collections import OrderedDict
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, TypeAlias
 
 from idlc.robot.dds import formats, wire
+from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 
-#: The IP address and the port of a socket.
-Address: TypeAlias = tuple[str, int]
-#: Bytes of a sample, and of all samples that cannot be delivered yet.
+#: Bytes of a sample.
 MOST_SAMPLE = 64 << 20
-MOST_WAITING = 512 << 20
 #: The bytes that a sample or fragment takes besides its payload, at least.
 _OVERHEAD = 256
 #: Numbers that a reader asks for at a time, and samples of which it holds fragments.
 _AHEAD = 256
 _MOST_PARTIAL = 8
 _MOST_REMEMBERED = 256
-#: Cyclone DDS as a vendor.
-_CYCLONE = b"\x01\x10"
-
-
-class Outgoing(NamedTuple):
-    """Parts of a packet for a participant at an address."""
-
-    address: Address
-    prefix: bytes
-    parts: tuple[bytes, ...]
-
-
-class Remote:
-    """The other end of a connection."""
-
-    def __init__(self, guid: bytes, address: Address, reliable: bool) -> None:
-        self.guid = guid
-        self.prefix, self.id = guid[: wire.PREFIX], guid[wire.PREFIX :]
-        self.address = address
-        self.reliable = reliable
-
-
-class Shared:
-    """What the ends of a participant share: the time, packets to send, and room for samples.
-
-    `fragment` returns the most bytes of a fragment for a host. Of the room, a participant gets at
-    most as much as is left for the others.
-    """
-
-    def __init__(self, fragment: Callable[[str], int]) -> None:
-        self.fragment = fragment
-        self.now = 0.0
-        self._packets: list[Outgoing] = []
-        self._used: Counter[bytes] = Counter()
-
-    def send(self, end: Remote, *parts: bytes) -> None:
-        """Send parts of a packet to an end."""
-        self._packets.append(Outgoing(end.address, end.prefix, parts))
-
-    def collect(self) -> list[Outgoing]:
-        """Return the packets to send, once."""
-        packets, self._packets = self._packets, []
-        return packets
-
-    def take(self, prefix: bytes, size: int) -> bool:
-        """Take bytes for samples of a participant; return whether there was room."""
-        if self._used[prefix] + size > MOST_WAITING - self._used.total():
-            return False
-        self._used[prefix] += size
-        return True
-
-    def free(self, prefix: bytes, size: int) -> None:
-        """Give bytes back."""
-        self._used[prefix] -= size
-        if not self._used[prefix]:
-            del self._used[prefix]
-
-
-class Received(NamedTuple):
-    """A sample as a reader's callback gets it; without a payload, an instance ended."""
-
-    writer: bytes
-    number: int
-    parameters: wire.Parameters
-    payload: bytes
-    is_key: bool
-    time: int
-
-
-class Room:
-    """The bytes of the samples that wait, by the participant that sent them."""
-
-    def __init__(self) -> None:
-        self._used: Counter[bytes] = Counter()
-
-    def take(self, prefix: bytes, size: int) -> bool:
-        """Take bytes; a participant gets at most as many as are left for the others."""
-        if self._used[prefix] + size > MOST_WAITING - self._used.total():
-            return False
-        self._used[prefix] += size
-        return True
-
-    def free(self, prefix: bytes, size: int) -> None:
-        """Give bytes back."""
-        self._used[prefix] -= size
-        if not self._used[prefix]:
-            del self._used[prefix]
+#: Seconds until a writer is told that nothing is missing.
+_ANSWER = 0.01
 
 
 class _Partial:
@@ -155,6 +67,8 @@ class RemoteWriter(Remote):
         self.partial: OrderedDict[int, _Partial] = OrderedDict()
         self.bytes = 0
         self.count = 0
+        #: True if it waits to be told that nothing is missing.
+        self.waits = False
 
 
 class Reader:
@@ -199,7 +113,7 @@ class Reader:
         if reliable:
             writer.count += 1
             # 0 asks where to begin; Cyclone DDS calls it malformed
-            base = 1 if guid.startswith(_CYCLONE) else 0
+            base = 1 if is_cyclone(guid) else 0
             ids = self.id, writer.id
             question = formats.format_acknack(*ids, base, [], writer.count, is_final=False)
             self._shared.send(writer, question)
@@ -335,11 +249,27 @@ class Reader:
         if writer.next < part.first:
             self._skip(writer, part.first)
         self._drain(writer)
-        base = writer.next
-        ahead = range(base, min(part.last, base + _AHEAD - 1) + 1)
-        missing = [number for number in ahead if number not in writer.early]
-        if part.is_final and not missing:
-            return
+        missing = self._missing(writer, writer.next)
+        if missing:
+            self._answer(writer, missing)
+        elif not part.is_final:
+            writer.waits = True
+            self._shared.due.setdefault(self.tick, self._shared.now + _ANSWER)
+
+    def tick(self) -> None:
+        """Tell the writers that wait that nothing is missing, or what is missing now."""
+        for writer in self.writers.values():
+            if writer.waits and writer.next is not None:
+                self._answer(writer, self._missing(writer, writer.next))
+
+    def _missing(self, writer: RemoteWriter, base: int) -> list[int]:
+        """Return the numbers that a writer has told of and that have not arrived, of 256."""
+        ahead = range(base, min(writer.last, base + _AHEAD - 1) + 1)
+        return [number for number in ahead if number not in writer.early]
+
+    def _answer(self, writer: RemoteWriter, missing: list[int]) -> None:
+        """Ask a writer for what is missing, and tell it that all before has arrived."""
+        writer.waits = False
         writer.count += 1
         ids = self.id, writer.id
         parts = []
@@ -348,5 +278,7 @@ class Reader:
                 lacking = writer.partial[number].missing()
                 parts.append(formats.format_nack_fragment(*ids, number, lacking, writer.count))
         whole = [number for number in missing if number not in writer.partial]
-        acknack = formats.format_acknack(*ids, base, whole, writer.count, is_final=not whole)
+        acknack = formats.format_acknack(
+            *ids, writer.next or 0, whole, writer.count, is_final=not whole
+        )
         self._shared.send(writer, *parts, acknack)

@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.robot.dds import discovery, wire
+from idlc.robot.dds import cyclone, discovery, wire
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.graph import HALVES, READER, WRITER, guid_of
-from idlc.robot.dds.reader import Reader, Received
+from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.shared import Received, is_cyclone
 from idlc.robot.dds.writer import Writer
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import dds_type
@@ -58,12 +59,13 @@ class _Client:
 
     def receive(self, received: Received) -> None:
         """Take a reply; those to other clients arrive, too."""
-        named = discovery.related(received.parameters)
+        start = self.pair.reader.guid[:8]
+        payload, named = cyclone.unwrap(received, start)
         if named is None or named[0] not in {each.guid for each in self.pair}:
             return
         if (call := self.calls.pop(named[1], None)) is not None:
             if not received.is_key:
-                call.callback(Sample(received.payload, call.attachment))
+                call.callback(Sample(payload, call.attachment))
             call.callback(None)
 
     def end_calls(self, now: float) -> None:
@@ -89,16 +91,17 @@ class _Request:
     def __init__(self, services: Services, writer: Writer, received: Received) -> None:
         self._services = services
         self._writer = writer
-        named = discovery.related(received.parameters)
+        self.payload, named = cyclone.unwrap(received, bytes(8))
         # Fast DDS names the reader of the reply
         self._target = named[0] if named else received.writer
-        self._number = received.number
-        self.payload = received.payload
+        self._number = named[1] if named and is_cyclone(received.writer) else received.number
+        self._client = received.writer[: wire.PREFIX]
         self.attachment = pack_attachment(received.number, time.time_ns(), self._target)
 
     def reply(self, payload: bytes, attachment: bytes) -> None:  # noqa: ARG002 - it is Zenoh's
         """Send the reply, now or when its client is matched."""
-        self._services.reply(self._writer, self._target, self._number, payload)
+        named = discovery.format_related(self._target, self._number)
+        self._services.reply(self._writer, self._client, named, payload)
 
     def drop(self) -> None:
         """Finish without a reply; clients of idlc are told."""
@@ -172,15 +175,15 @@ class Services:
         end = time.monotonic() + min(limit, _APPEARING)
         self._send(_Waiting(client.is_matched, send, lambda: callback(None), end))
 
-    def reply(self, writer: Writer, target: bytes, number: int, payload: bytes) -> None:
-        """Send the reply to a request of a reader, now or when the reader is matched."""
+    def reply(self, writer: Writer, client: bytes, named: bytes, payload: bytes) -> None:
+        """Send the reply to a request of a participant, now or when its reader is matched."""
 
         def is_matched() -> bool:
             guids = (*writer.readers, *(reader.guid for reader in writer.local))
-            return any(guid.startswith(target[: wire.PREFIX]) for guid in guids)
+            return any(guid.startswith(client) for guid in guids)
 
         def send() -> None:
-            self._connection.write(writer, payload, discovery.format_related(target, number))
+            self._connection.write(writer, payload, named)
 
         with self._connection.lock:
             end = time.monotonic() + _APPEARING

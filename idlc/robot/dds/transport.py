@@ -10,8 +10,8 @@ from idlc.robot.dds.address import Place
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
-from idlc.robot.dds.reader import Received
 from idlc.robot.dds.services import Services
+from idlc.robot.dds.shared import Received
 from idlc.robot.dds.writer import Writer, unpadded
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import dds_type
@@ -60,6 +60,8 @@ class _Sender(_Closer):
 
 class DdsTransport:
     """The declarations of one participant."""
+
+    connects_all = False
 
     def __init__(self, place: Place) -> None:
         self.place = place

@@ -160,12 +160,11 @@ def _nanoseconds(data: bytes, order: str) -> int:
     return int(seconds) * 10**9 + (int(fraction) * 10**9 >> 32)
 
 
-def _number(data: bytes, order: str, at: int) -> int:
+def _number(high: int, low: int) -> int:
     """Return a sequence number; raise WireError if it is below 0."""
-    high, low = struct.unpack_from(order + "iI", data, at)
     if high < 0:
         raise WireError("a negative number")
-    return int(high) << 32 | int(low)
+    return high << 32 | low
 
 
 def _bits(data: bytes, order: str, at: int, base: int) -> tuple[tuple[int, ...], int]:
@@ -178,15 +177,12 @@ def _bits(data: bytes, order: str, at: int, base: int) -> tuple[tuple[int, ...],
     return tuple(members), at + 4 + 4 * len(words)
 
 
-def _ids(data: bytes, at: int) -> tuple[bytes, bytes]:
-    return _exactly(data[at:], 8)[:4], data[at + 4 : at + 8]
-
-
-def _content(data: bytes, order: str, flags: int, rest: int) -> tuple[Parameters, bytes]:
-    """Return the inline parameters and the payload, which begin after `rest` more bytes."""
-    (offset,) = struct.unpack_from(order + "H", data, 2)
+def _content(
+    data: bytes, order: str, flags: int, offset: int, least: int
+) -> tuple[Parameters, bytes]:
+    """Return the inline parameters and the payload, which begin at an offset."""
     at = 4 + offset
-    if offset < rest or at > len(data):
+    if offset < least or at > len(data):
         raise WireError("cut off")
     parameters = NONE
     if flags & INLINE:
@@ -195,51 +191,56 @@ def _content(data: bytes, order: str, flags: int, rest: int) -> tuple[Parameters
 
 
 def _data(data: bytes, order: str, flags: int, time: int) -> Data:
-    parameters, payload = _content(data, order, flags, 16)
-    is_key = not flags & PAYLOAD
+    offset, reader, writer, high, low = struct.unpack_from(order + "2xH4s4siI", data)
+    parameters, payload = _content(data, order, flags, offset, 16)
     if not flags & (PAYLOAD | KEY):
         payload = b""
-    return Data(*_ids(data, 4), _number(data, order, 12), parameters, payload, is_key, time)
+    number, is_key = _number(high, low), not flags & PAYLOAD
+    return Data(reader, writer, number, parameters, payload, is_key, time)
 
 
 def _fragment(data: bytes, order: str, flags: int, time: int) -> Fragment:
-    parameters, payload = _content(data, order, flags, 28)
-    first, count, size, total = struct.unpack_from(order + "IHHI", data, 20)
+    offset, reader, writer, high, low, first, count, size, total = struct.unpack_from(
+        order + "2xH4s4siIIHHI", data
+    )
+    parameters, payload = _content(data, order, flags, offset, 28)
     last = first + count - 1
     if not (first and count and size) or (last - 1) * size >= total or last > MOST_FRAGMENTS:
         raise WireError("fragments outside of the sample")
     if len(payload) < min(count * size, total - (first - 1) * size):
         raise WireError("cut off")
-    number = _number(data, order, 12)
-    return Fragment(*_ids(data, 4), number, parameters, first, size, total, payload, time)
+    ids = reader, writer, _number(high, low)
+    return Fragment(*ids, parameters, first, size, total, payload, time)
 
 
 def _heartbeat(data: bytes, order: str, flags: int, _time: int) -> Heartbeat:
-    first, last = _number(data, order, 8), _number(data, order, 16)
-    (count,) = struct.unpack_from(order + "I", data, 24)
+    reader, writer, high, low, top, rest, count = struct.unpack_from(order + "4s4siIiII", data)
+    first, last = _number(high, low), _number(top, rest)
     if first == 0 or last < first - 1:
         raise WireError("numbers in the wrong order")
-    return Heartbeat(*_ids(data, 0), first, last, count, bool(flags & FINAL))
+    return Heartbeat(reader, writer, first, last, count, bool(flags & FINAL))
 
 
 def _acknack(data: bytes, order: str, _flags: int, _time: int) -> AckNack:
-    base = _number(data, order, 8)
+    reader, writer, high, low = struct.unpack_from(order + "4s4siI", data)
+    base = _number(high, low)
     missing, at = _bits(data, order, 16, base)
     (count,) = struct.unpack_from(order + "I", data, at)
-    return AckNack(*_ids(data, 0), base, missing, count)
+    return AckNack(reader, writer, base, missing, count)
 
 
 def _gap(data: bytes, order: str, _flags: int, _time: int) -> Gap:
-    first, base = _number(data, order, 8), _number(data, order, 16)
+    reader, writer, high, low, top, rest = struct.unpack_from(order + "4s4siIiI", data)
+    first, base = _number(high, low), _number(top, rest)
     if first == 0 or base < first:
         raise WireError("numbers in the wrong order")
-    return Gap(*_ids(data, 0), first, base, _bits(data, order, 24, base)[0])
+    return Gap(reader, writer, first, base, _bits(data, order, 24, base)[0])
 
 
 def _nack_fragment(data: bytes, order: str, _flags: int, _time: int) -> NackFragment:
-    (base,) = struct.unpack_from(order + "I", data, 16)
+    reader, writer, high, low, base = struct.unpack_from(order + "4s4siII", data)
     missing, _ = _bits(data, order, 20, base)
-    return NackFragment(*_ids(data, 0), _number(data, order, 8), missing)
+    return NackFragment(reader, writer, _number(high, low), missing)
 
 
 _PARSERS: Mapping[int, Callable[[bytes, str, int, int], Part]] = {

@@ -6,8 +6,9 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from idlc.robot.dds import formats, wire
-from idlc.robot.dds.reader import Address, Reader, Received, Remote, Shared
+from idlc.robot.dds import cyclone, formats, wire
+from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 #: Seconds between heartbeats for readers that lack something.
@@ -72,8 +73,6 @@ class Writer:
         self.local: list[Reader] = []
         self.history: OrderedDict[int, Sample] = OrderedDict()
         self.last = 0
-        #: When the next heartbeat is due; `None` if all readers have everything.
-        self.deadline: float | None = None
         self._shared = shared
         self._count = 0
         self._bytes = 0
@@ -89,8 +88,8 @@ class Writer:
         size = self._shared.fragment(address[0])
         reader = self.readers[guid] = RemoteReader(guid, address, reliable, size, first)
         if reliable:
-            self.deadline = self._shared.now
-            self.tick()
+            self._shared.send(reader, self._heartbeat(reader))
+            self._expect()
         elif is_late:  # such a reader never asks
             for number in self.history:
                 self._send(reader, number)
@@ -124,7 +123,7 @@ class Writer:
         for reader in self.readers.values():
             if reader.reliable:
                 self._send(reader, self.last, self._heartbeat(reader))
-                self.deadline = self.deadline or self._shared.now + HEARTBEAT
+                self._expect()
             else:
                 self._send(reader, self.last)
         for local in [*self.local]:
@@ -152,6 +151,8 @@ class Writer:
         `tail` follows in the same packet.
         """
         payload, inline, time = self.history[number]
+        if inline and payload and is_cyclone(reader.guid):
+            payload, inline = cyclone.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
         if len(payload) <= size:
             self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
@@ -188,7 +189,7 @@ class Writer:
             self._shared.send(reader, formats.format_gap(reader.id, self.id, gone))
         if part.missing or part.base == 0:
             self._shared.send(reader, self._heartbeat(reader))
-            self.deadline = self.deadline or self._shared.now + HEARTBEAT
+            self._expect()
 
     def nack_fragment(self, guid: bytes, part: wire.NackFragment) -> None:
         """Send fragments again."""
@@ -200,12 +201,13 @@ class Writer:
         if chosen:
             self._send(reader, part.number, self._heartbeat(reader), chosen=chosen)
 
+    def _expect(self) -> None:
+        """Send heartbeats until the readers have everything."""
+        self._shared.due.setdefault(self.tick, self._shared.now + HEARTBEAT)
+
     def tick(self) -> None:
-        """Send heartbeats to the readers that lack something, if they are due."""
-        if self.deadline is None or self._shared.now < self.deadline:
-            return
-        self.deadline = None
+        """Send heartbeats to the readers that lack something."""
         for reader in self.readers.values():
             if reader.reliable and (reader.base <= self.last or not reader.is_told):
                 self._shared.send(reader, self._heartbeat(reader))
-                self.deadline = self._shared.now + HEARTBEAT
+                self._expect()

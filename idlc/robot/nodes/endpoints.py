@@ -1,4 +1,4 @@
-"""Publishers and subscriptions, with their deadlines, and streams for asyncio."""
+"""Publishers and subscriptions, and streams for asyncio."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import suppress
 from functools import partial
-from itertools import count, repeat
+from itertools import count
 from threading import Lock
 from time import time_ns
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import ATTACHMENT, GID_SIZE, Entity, Kind, parse_attachment
-from idlc.robot.nodes.clock import Clock, ClockType, Timer
+from idlc.robot.nodes.clock import Timer
+from idlc.robot.nodes.events import EventCallbacks, Events
 from idlc.robot.nodes.executor import Ready
 from idlc.robot.nodes.interfaces import M, interface_of
-from idlc.robot.qos import FOLLOWS, HistoryPolicy, QoSProfile, qos_profile
+from idlc.robot.qos import HistoryPolicy, QoSProfile, qos_profile
 from idlc.robot.transport import Closeable, Sample
 from idlc.runtime.names import DecodeError
 from idlc.runtime.typeinfo import is_copy
@@ -39,6 +40,7 @@ class Endpoint(Ready):
 
     kind: ClassVar[Kind]
     deadline: Timer | None = None
+    events: Events | None = None
 
     def __init__(
         self, node: Any, name: str, kind: Any, qos: QoSProfile | int, group: Any, call: Any = None
@@ -72,17 +74,14 @@ class Endpoint(Ready):
         """Withdraw the endpoint; may be called twice."""
         while self._closeables:
             self._closeables.pop().close()
-        if self.deadline is not None:
-            self.node.destroy_timer(self.deadline)
+        if self.events is not None:
+            self.events.destroy()
 
-    def watch(self, events: EventCallbacks | None) -> None:
-        """Call back if no message came in time; the first message begins the period."""
-        callback, seconds = events and events.deadline, self.qos_profile.deadline / 1e9
-        if callback is not None and self.qos_profile.deadline < FOLLOWS:
-            infos = map(DeadlineInfo, count(1), repeat(1))
-            miss, clock = (lambda: callback(next(infos))), Clock(clock_type=ClockType.STEADY_TIME)
-            self.deadline = self.node.create_timer(seconds, miss, self.callback_group, clock)
-            self.deadline.cancel()
+    def watch(self, callbacks: EventCallbacks | None) -> None:
+        """Call back for events."""
+        if callbacks is not None:
+            self.events = Events(self, callbacks)
+            self.deadline = self.events.deadline
 
     def count_others(self, kind: Kind) -> int:
         """Return the number of endpoints with the same name, type and hash."""
@@ -144,22 +143,6 @@ class Bounded(Generic[T]):
             return item
 
 
-class DeadlineInfo(NamedTuple):
-    """The argument of a deadline's callback."""
-
-    total_count: int
-    total_count_change: int
-
-
-class EventCallbacks(NamedTuple):
-    """Callbacks for events: `deadline` if no message came in the period of the profile."""
-
-    deadline: Callable[[DeadlineInfo], Any] | None = None
-
-
-PublisherEventCallbacks = SubscriptionEventCallbacks = EventCallbacks
-
-
 class Publisher(Endpoint, Generic[M]):
     """Sends messages of a topic, from any thread."""
 
@@ -208,9 +191,12 @@ class Subscription(Endpoint, Generic[M]):
         return (self.node.transport.subscriber(self.entity, self._receive),)
 
     def _receive(self, sample: Sample) -> None:
-        if parse_attachment(sample.attachment) is None:
+        attachment = parse_attachment(sample.attachment)
+        if attachment is None:
             self.ignored += 1
             return
+        if self.events is not None:
+            self.events.note(attachment)
         self._queue.append(sample.payload, len(sample.payload))
         if self.deadline is not None:
             self.deadline.begin_period()

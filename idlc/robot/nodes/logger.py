@@ -92,3 +92,21 @@ def _text(value: object) -> str:
 
 #: Without a node, a logger writes to stderr only.
 get_logger = Logger
+
+
+def answer_levels(request: Any, response: Any) -> Any:
+    """Answer rcl_interfaces/srv/GetLoggerLevels with the levels that were set."""
+    levels = [{"name": name, "level": _levels.get(name, 0)} for name in request.names]
+    return type(response).from_dict({"levels": levels})
+
+
+def set_levels(request: Any, response: Any) -> Any:
+    """Set the levels in rcl_interfaces/srv/SetLoggerLevels that exist."""
+    results = []
+    for each in request.levels:
+        is_level = each.level in [*LoggingSeverity]
+        if is_level:
+            _levels[each.name] = LoggingSeverity(each.level)
+        reason = "" if is_level else "Failed reason: Invalid logger level."
+        results.append({"successful": is_level, "reason": reason})
+    return type(response).from_dict({"results": results})

@@ -17,16 +17,16 @@ from idlc.robot.nodes.clock import Clock, ClockType, GuardCondition, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
 from idlc.robot.nodes.endpoints import (
     Endpoint,
-    EventCallbacks,
     Publisher,
     RawSubscription,
     Stream,
     Subscription,
 )
+from idlc.robot.nodes.events import EventCallbacks
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
-from idlc.robot.nodes.logger import Logger
-from idlc.robot.nodes.overrides import overrides_of
+from idlc.robot.nodes.logger import Logger, answer_levels, set_levels
+from idlc.robot.nodes.overrides import QoSOverridingOptions, overridden, overrides_of
 from idlc.robot.nodes.services import SERVICE, START_SERVICE, Client, DeepService, Service, describe
 from idlc.robot.parameters import HasParameters, Parameter
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
@@ -54,6 +54,7 @@ class Node(HasParameters):
         parameter_overrides: Sequence[Parameter] = (),
         allow_undeclared_parameters: bool = False,
         automatically_declare_parameters_from_overrides: bool = False,
+        enable_logger_service: bool = False,
     ) -> None:
         self.context = Context(session) if session else context or get_default_context()
         self.session = self.context.session
@@ -94,8 +95,8 @@ class Node(HasParameters):
         overrides = overrides_of(self.arguments, self.get_fully_qualified_name())
         overrides |= {each.name: each for each in parameter_overrides or ()}
         if START_SERVICE not in overrides or overrides[START_SERVICE].value is not False:
-            answer, service = partial(describe, self), standard(SERVICE)
-            DeepService[Any, Any](self, "~/get_type_description", service, 10, None, answer)
+            describe_used, service = partial(describe, self), standard(SERVICE)
+            DeepService[Any, Any](self, "~/get_type_description", service, 10, None, describe_used)
         self._begin_parameters(
             overrides,
             allow_undeclared=allow_undeclared_parameters,
@@ -103,6 +104,10 @@ class Node(HasParameters):
         )
         if start_parameter_services:
             self._serve_parameters(self.create_service)
+        if enable_logger_service:
+            for verb, answer in (("Get", answer_levels), ("Set", set_levels)):
+                levels = standard(f"rcl_interfaces/srv/{verb}LoggerLevels")
+                self.create_service(levels, f"{name}/{verb.lower()}_logger_levels", answer)
 
     # the node itself
 
@@ -200,9 +205,14 @@ class Node(HasParameters):
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: EventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
+        publisher_class: type[Publisher[Any]] = Publisher,
     ) -> Publisher[M]:
         """Return a publisher; a number is the depth of the default profile."""
-        publisher = Publisher[M](self, topic, msg_type, qos_profile, callback_group)
+        qos_profile = overridden(self, "publisher", topic, qos_profile, qos_overriding_options)
+        publisher: Publisher[M] = publisher_class(
+            self, topic, msg_type, qos_profile, callback_group
+        )
         publisher.watch(event_callbacks)
         return publisher
 
@@ -216,6 +226,7 @@ class Node(HasParameters):
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: EventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: Literal[False] = False,
     ) -> Subscription[M]: ...
 
@@ -229,6 +240,7 @@ class Node(HasParameters):
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: EventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: Literal[True],
     ) -> Subscription[Any]: ...
 
@@ -241,9 +253,11 @@ class Node(HasParameters):
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: EventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
     ) -> Subscription[Any]:
         """Return a subscription; `callback` gets each message, or its bytes if it is `raw`."""
+        qos_profile = overridden(self, "subscription", topic, qos_profile, qos_overriding_options)
         kind: Any = RawSubscription if raw else Subscription
         subscription: Subscription[Any] = kind(
             self, topic, msg_type, qos_profile, callback_group, callback

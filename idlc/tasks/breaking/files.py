@@ -28,7 +28,6 @@ from idlc.project.find import (
     list_files,
     no_interfaces,
 )
-from idlc.project.git import GIT, Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
@@ -48,6 +47,7 @@ from idlc.versions.packages import (
     part_to_raise,
     raised,
 )
+from idlc.versions.revision import GIT, Revision, checked_out, is_revision
 from idlc.wire.layout import oversized
 
 #: The inputs of packages.
@@ -276,7 +276,7 @@ def _compare(
         changes = with_rules(whole.changes, old, new, places, options.scope.root)
         whole = whole._replace(changes=changes)
     rest = out.difference(*(each.names for each in skipped))
-    skipped += [Skipped(tuple(sorted(rest)), "they contain errors")]
+    skipped += [Skipped(tuple(sorted(rest)), "the new version contains errors")]
     return whole._replace(skipped=tuple(each for each in skipped if each.names))
 
 
@@ -297,11 +297,11 @@ def _outside(
         and not revision.holds(file.path)
     }
     places = (*sorted(others), *revision.unknown(options.paths))
-    yield Skipped(places, "their history is in other git repositories", _SUBMODULES)
+    yield Skipped(places, "the history is in another git repository", _SUBMODULES)
     absent = (own for own in before.interfaces if own.name not in present)
     hidden = [own for own in absent if own.source and revision.is_skipped(own.source.path)]
     names = tuple(sorted(str(own.name) for own in hidden))
-    yield Skipped(names, "this sparse checkout omits them", _CHECK_OUT)
+    yield Skipped(names, "this sparse checkout omits the new version", _CHECK_OUT)
 
 
 def _before(
@@ -386,7 +386,8 @@ def _moved(
             moved += _moved_files(files, names, [earlier.home / part for part in parts])
         elif submodules:
             gone_from = first_few((f"`{each}`" for each in sorted(submodules)), NAMED)
-            skipped.append(Skipped(listed, f"they may come from the submodule {gone_from}"))
+            reason = f"the earlier version may be in the submodule {gone_from}"
+            skipped.append(Skipped(listed, reason))
     return tuple(moved), skipped
 
 

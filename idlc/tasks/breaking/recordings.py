@@ -101,18 +101,18 @@ def _skipped(
     """Yield the types and topics that were not compared, with the reasons."""
     undefined = earlier.undefined
     if later:
-        yield Skipped(_sorted(earlier.names - seen), "the other recordings do not contain them")
+        yield Skipped(_sorted(earlier.names - seen), "absent from the other recordings")
     else:
-        yield Skipped(_sorted(local.unknown), "idlc did not find them")
+        yield Skipped(_sorted(local.unknown), "not found")
         if local.packages:  # what else was recorded is not meant
             undefined = {
                 topic: name
                 for topic, name in undefined.items()
                 if name and name.package in local.packages
             }
-    yield Skipped(tuple(sorted(undefined)), "their types are not defined")
+    yield Skipped(tuple(sorted(undefined)), "the recording contains no definition")
     if later:
-        yield Skipped(tuple(sorted(later.undefined)), "their types are not defined")
+        yield Skipped(tuple(sorted(later.undefined)), "the recording contains no definition")
 
 
 def _sorted(names: Iterable[ir.TypeName]) -> tuple[str, ...]:

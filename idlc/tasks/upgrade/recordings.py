@@ -21,7 +21,6 @@ from idlc.diagnostics.report import Label, Report
 from idlc.model import ir
 from idlc.project.files import is_folder
 from idlc.project.find import RULES, is_address
-from idlc.project.git import GIT
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.columns import unread_bytes
@@ -50,6 +49,7 @@ from idlc.versions.converters import RunRules
 from idlc.versions.distribution import PREFIX
 from idlc.versions.exact import Payloads
 from idlc.versions.meanings import renumbered
+from idlc.versions.revision import GIT
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 #: Called with a recording, and how much of it is done.

@@ -16,13 +16,13 @@ from idlc.model import catalog, derive, ir
 from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.project import inputs
 from idlc.project.find import InterfaceFile, find
-from idlc.project.git import GIT, checked_out
 from idlc.project.library import InterfaceTexts, Library
 from idlc.project.settings import Scope
 from idlc.recordings.find import is_recording
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import topics_of, versions
 from idlc.versions.distribution import PREFIX, is_distro
+from idlc.versions.revision import GIT, checked_out
 from idlc.wire.layout import oversized
 
 
@@ -91,6 +91,7 @@ class Target:
             own={} if self.texts else inputs.nearby_packages(scope.root),
             exclude=scope.exclude,
             distro=self.distro or scope.distro,
+            idl=True,
         )
         return Compiler(library)
 

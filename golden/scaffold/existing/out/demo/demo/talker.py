@@ -1,8 +1,8 @@
 """Publishes to chatter."""
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 
@@ -21,8 +21,9 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         rclpy.spin(Talker())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
+            raise
 
 
 if __name__ == '__main__':

@@ -39,10 +39,10 @@ class Keeper(LifecycleNode):
     """
     The lifecycle node keeper.
 
-    It publishes to beat.
-    It listens to beat.
-    It serves reset.
-    It calls switch.
+    Publishes to beat.
+    Listens to beat.
+    Serves reset.
+    Calls switch.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -254,7 +254,7 @@ def main(args: list[str] | None = None) -> None:
             node = Keeper(options)
             executor.add_node(node)
             while ok():
-                # not without end: rclpy can miss a signal that comes while it starts
+                # Wake up every second: rclpy can miss a signal that arrives during startup.
                 executor.spin_once(timeout_sec=1.0)
         except Exception:
             if ok():  # otherwise a signal shut rclpy down before the node was complete

@@ -26,7 +26,7 @@ class Asker(Node):
     """
     The node asker.
 
-    It calls ask.
+    Calls ask.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -117,7 +117,7 @@ def ask_request(options: argparse.Namespace) -> Ask.Request:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Do what the command line asks for; return 0 if it succeeded."""
+    """Send the request; return 0 if it succeeded."""
     options = parse_arguments(args)
     interrupted = Event()
     # not by rclpy, which would shut down before goals are cancelled

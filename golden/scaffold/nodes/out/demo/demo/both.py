@@ -33,8 +33,8 @@ class Both(Node):
     """
     The node both.
 
-    It calls ask.
-    It sends goals to dock.
+    Calls ask.
+    Sends dock goals.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -184,7 +184,7 @@ def dock_request(options: argparse.Namespace) -> Dock.Goal:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Do what the command line asks for; return 0 if it succeeded."""
+    """Send the request and the goal; return 0 if it succeeded."""
     options = parse_arguments(args)
     interrupted = Event()
     # not by rclpy, which would shut down before goals are cancelled

@@ -2,7 +2,6 @@
 
 from demo.srv import Ask
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import ok
 
@@ -28,10 +27,8 @@ def main(args: list[str] | None = None) -> None:
     try:
         node = Caller()
         node.call_ask(Ask.Request(question='', loud=False, weights=[]))
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal has shut rclpy down
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
             raise
 
 

@@ -1,11 +1,10 @@
-"""Sends goals to dock."""
+"""Sends dock goals."""
 
 from typing import Any
 
 from demo.action import Dock
 import rclpy
 from rclpy.action.client import ActionClient
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import ok
 
@@ -42,10 +41,8 @@ def main(args: list[str] | None = None) -> None:
     try:
         node = Sender()
         node.send_dock_goal(Dock.Goal(station=1))
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():  # otherwise a signal has shut rclpy down
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
             raise
 
 

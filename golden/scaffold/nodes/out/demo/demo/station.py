@@ -1,11 +1,11 @@
-"""Executes goals of dock."""
+"""Executes dock goals."""
 
 from demo.action import Dock
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse, ServerGoalHandle
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class Station(Node):
@@ -50,8 +50,9 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         rclpy.spin(Station())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
+            raise
 
 
 if __name__ == '__main__':

@@ -8,9 +8,9 @@ Listens to ~/words.
 from demo.msg import Command
 from geometry_msgs.msg import Twist, Vector3
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -48,8 +48,9 @@ def main(args: list[str] | None = None) -> None:
     rclpy.init(args=args)
     try:
         rclpy.spin(Talker())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except BaseException as error:
+        if ok() and not isinstance(error, KeyboardInterrupt):  # otherwise a signal ended it
+            raise
 
 
 if __name__ == '__main__':

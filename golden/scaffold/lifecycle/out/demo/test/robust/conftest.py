@@ -38,7 +38,7 @@ class Running:
         return self._log.read_text()
 
     def said(self, text: str, times: int = 1) -> bool:
-        """Return whether the node has logged that many lines that begin with the text."""
+        """Return whether at least this many lines of the log start with the text."""
         return self.output.count(f']: {text}') >= times
 
     def ended(self) -> bool:
