@@ -19,7 +19,7 @@ RCLPY = "rclpy"
 ROUNDS = 3
 DEPTH = 1000
 #: Seconds without a message after which a receiver gives up.
-PATIENCE = 10
+PATIENCE = 15
 STRING, IMAGE, IMU = "std_msgs/String", "sensor_msgs/Image", "sensor_msgs/Imu"
 FIELDS = {STRING: {"data": "hello world"}, IMAGE: {"data": bytes(900_000)}}
 
@@ -111,7 +111,8 @@ def start(library: str, kind: str, role: str, *words: object) -> subprocess.Pope
     command = [sys.executable, "-m", "benchmarks.dds", library, kind, role, *map(str, words)]
     domain = {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "RMW_IMPLEMENTATION": ""}
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **domain}
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    return subprocess.Popen(command, env=environment, text=True, **pipes)
 
 
 def results(program: subprocess.Popen[str]) -> list[float]:
@@ -140,8 +141,9 @@ def publishing() -> dict[str, float]:
     found = {}
     for library in (IDLC, RCLPY):
         receiver = start(RCLPY, STRING, "receive", 4000)
-        (found[library],) = results(start(library, STRING, "publish", 4000, 20, 0.02, 1))
+        sender = start(library, STRING, "publish", 4000, 20, 0.02, 1)
         results(receiver)
+        (found[library],) = results(sender)
     return found
 
 
@@ -186,7 +188,6 @@ if __name__ == "__main__":
         numbers = [float(word) if "." in word else int(word) for word in words]
         for result in getattr(Program(library, kind), role)(*numbers):
             print(result, flush=True)
-        # a sender stays until all is delivered
-        if role == "publish":
-            time.sleep(2)
+        # a sender stays until all is received
+        sys.stdin.read()
         os._exit(0)

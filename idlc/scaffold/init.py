@@ -66,10 +66,20 @@ SERVICES = {
     "gitlab": (".gitlab-ci.yml", "ci/gitlab.yml.jinja"),
     "pre-commit": (".pre-commit-config.yaml", "ci/pre_commit.yaml.jinja"),
 }
+#: A revision that pre-commit warns of, and each revision.
+_MOVING, _REVISION = "rev: HEAD", re.compile(r"(?m)^ *rev: .*$")
+#: Commands by which a repository gets idlc's wheel and action from a clone beside it.
+_WHEEL = "python3 -I -m pip wheel --no-deps --wheel-dir wheels ../idlc"
+_ACTION = (
+    "mkdir -p tools/idlc && git -C ../idlc archive HEAD action.yml .ci README.md LICENSE "
+    "pyproject.toml idlc templates | tar -x -C tools/idlc"
+)
 #: Edits of setup.py make room for others.
 _ROUNDS = 3
 #: The package of a field's type.
 _USED = re.compile(r"(?m)^[ \t]*([a-z][a-z0-9_]*)/[A-Z]")
+#: A requirement of builds that compile the interfaces.
+_IDLC = re.compile(r"idlc(?![\w.-])")
 #: The distribution's name in pyproject.toml or setup.cfg.
 _NAME = re.compile(r"(?ms)^\[(?:project|metadata)\](?:(?!^\[).)*?^\s*name\s*[=:]")
 _BUILD_SYSTEM = '[build-system]\nrequires = ["setuptools"]\nbuild-backend = '
@@ -139,15 +149,15 @@ class Draft:
 class Preparation(NamedTuple):
     """The planned changes to one package; `classes` are the generated ones, in the folder `out`.
 
-    `note` is on what idlc cannot see. Where `is_packed` is false, a report said by which line of
-    yours the build takes the classes.
+    `notes` are on what idlc cannot see or prevent. Where `is_packed` is false, a report said by
+    which line of yours the build takes the classes.
     """
 
     layout: Layout
     draft: Draft
     out: str
     classes: tuple[str, ...]
-    note: str = ""
+    notes: tuple[str, ...] = ()
     is_packed: bool = True
 
     def source(self) -> Path:
@@ -230,14 +240,14 @@ def prepare(
     if compiled is None:
         return None
     inputs, model = compiled
-    note = _wire(draft, layout, out, inputs, model, report)
+    notes = _built(draft, layout, inputs, model, out, report)
     _ignored(draft, layout, out)
     draft.write(report, dry_run=True)  # which reports links and others that are in the way
     _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
     module = module_of(out) if layout.kind == "library" else layout.name
     classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
     is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
-    plan = Preparation(layout, draft, out, classes, note, is_packed)
+    plan = Preparation(layout, draft, out, classes, notes, is_packed)
     return None if report.had_errors else plan
 
 
@@ -294,20 +304,23 @@ def _compiled(
     return next((each for each in compiled if each[0].package == layout.name), compiled[0])
 
 
-def _wire(
-    draft: Draft, layout: Layout, out: str, inputs: Inputs, model: Model, report: Report
-) -> str:
-    """Have the package's build compile the interfaces; return a note on what idlc cannot see."""
-    root = draft.root()
+def _built(
+    draft: Draft, layout: Layout, inputs: Inputs, model: Model, out: str, report: Report
+) -> tuple[str, ...]:
+    """Have the package's build install interfaces and classes; return notes."""
+    root, note, more = draft.root(), "", ""
     files = {entry.file.key: root.shown(entry.file.path) for entry in inputs.files}
     if layout.kind in ("ament_python", "empty"):
-        return _ament_python(draft, layout, model, files, report)
-    if layout.kind == "ament_cmake":
+        note = _ament_python(draft, layout, model, files, report)
+    elif layout.kind == "ament_cmake":
         _ament_cmake(draft, inputs, report)
-        return ""
-    if layout.backend.startswith("setuptools."):
+    elif layout.backend.startswith("setuptools."):
         _setuptools(draft, out, files, report)
-    return _numpy(draft) if _has_arrays(model) else ""
+    if layout.kind == "library" and _has_arrays(model):
+        note = _numpy(draft)
+    if layout.kind != "ament_cmake":
+        more = _outdated_builds(draft, layout)
+    return tuple(filter(None, (note, more)))
 
 
 def _places(
@@ -551,6 +564,21 @@ def _setuptools(draft: Draft, out: str, files: Mapping[str, str], report: Report
             report.add(problem)
 
 
+def _outdated_builds(draft: Draft, layout: Layout) -> str:
+    """Return a note on a build that does not notice if the classes are out of date."""
+    system = toml(draft.text(SETTINGS_FILE) or "").get("build-system", {})
+    requires = system.get("requires", ()) if isinstance(system, dict) else ()
+    if any(_IDLC.match(str(name)) for name in requires):
+        return ""
+    if layout.kind != "library" and layout.backend.startswith("setuptools."):
+        return ""  # setup.py stops the build
+    tool = tool_of(layout.backend)
+    return (
+        f"{tool} installs the classes that the last `idlc gen` wrote, even if the interfaces have "
+        "changed since: run `idlc gen --check` before you build a wheel"
+    )
+
+
 def _has_arrays(model: Model) -> bool:
     """Return whether the classes need numpy: they have numeric arrays of a fixed size."""
     sections = (section for each in model.interfaces.values() for section in derive.sections(each))
@@ -623,13 +651,25 @@ def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
     is_committed = top == layout.folder and layout.kind not in ("ament_cmake", "workspace")
     text = code().get_template(template).render(is_committed=is_committed)
     draft = Draft(Project(".", Settings(Root(top)), report))
-    if draft.text(path) in (None, text):
+    if _MOVING in text and (commit := git.commit("HEAD", top.parent / "idlc")):
+        text = text.replace(_MOVING, f"rev: {commit}")
+    present = draft.text(path)
+    if present is None or _REVISION.sub("", present) == _REVISION.sub("", text):
+        text = present or text
         draft.put(path, text, "CI checks the interfaces")
         return draft
     message = f"`{path}` exists, and idlc does not edit it"
     hint = "add the missing lines"
     report.add(codes.EXISTING_FILE.of(path, message, hint=hint, detail=text.rstrip()))
     return None
+
+
+def obtaining(draft: Draft) -> list[str]:
+    """Return the commands after which a repository contains what its CI runs."""
+    text = "".join(draft.text(path) or "" for path in draft.reasons)
+    if "./tools/idlc" in text:  # the action installs the wheel
+        return [_WHEEL, _ACTION, "git add --force wheels tools/idlc"]
+    return [_WHEEL, "git add --force wheels"] if "wheels/idlc" in text else []
 
 
 def recommendation(root: Root, report: Report) -> Draft:

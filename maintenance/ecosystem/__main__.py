@@ -1,8 +1,9 @@
 """`python -m maintenance.ecosystem FOLDER...`: run idlc on the clones in folders, and sum up.
 
 Each line is a repository with the results of its commands. `--json FILE` writes them, so that the
-files of two versions of idlc can be compared. The clones are not changed. `idlc init` runs the
-builds of the packages: use it in a container if you do not trust them.
+files of two versions of idlc can be compared. The clones are not changed. Before `idlc init`, the
+copy of each Python package gets a message. `idlc init` runs the builds of the packages: use it in
+a container if you do not trust them.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ PATIENCE = 600
 #: Exit statuses of idlc that are answers.
 ANSWERS = (0, 1, 2)
 PIP = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index", "--no-build-isolation")
+#: A message that packages get, and the module of its class.
+ADDED, MODULE = "EcosystemExample", "ecosystem_example"
 #: Imports all modules of generated packages.
 IMPORT = """
 import importlib, pkgutil, sys
@@ -76,6 +79,14 @@ def python_packages(folder: Path) -> Iterator[Path]:
             yield Path(place)
 
 
+def with_messages(clone: Path) -> None:
+    """Give each Python package that has no folder for messages a message."""
+    for package in python_packages(clone):
+        if not (package / "msg").exists():
+            (package / "msg").mkdir()
+            (package / "msg" / f"{ADDED}.msg").write_text("int32 number\n", "utf-8")
+
+
 def wheel_files(package: Path, scratch: Path) -> set[str] | None:
     """Return the names of the files in a package's wheel, `None` if it cannot be built."""
     with tempfile.TemporaryDirectory(dir=scratch) as place:
@@ -88,7 +99,10 @@ def wheel_files(package: Path, scratch: Path) -> set[str] | None:
 
 
 def lost_files(clone: Path, changed: Path, scratch: Path) -> tuple[str, list[str]]:
-    """Return how many wheels have all their files after a change, and the lost files."""
+    """Return how many wheels have all their files after a change, and the lost files.
+
+    Classes of a message that was added are lost, too, if `idlc init` compiled them.
+    """
     counts: Counter[str] = Counter()
     lost: list[str] = []
     for package in python_packages(clone):
@@ -100,8 +114,12 @@ def lost_files(clone: Path, changed: Path, scratch: Path) -> tuple[str, list[str
         elif before is not None and after is not None:
             counts["whole"] += not before - after
             lost += sorted(f"{inside}: {name}" for name in before - after)
+            is_compiled = any((changed / inside).glob(f"**/msg/_{MODULE}.py"))
+            if is_compiled and not any(name.endswith(f"/msg/_{MODULE}.py") for name in after):
+                lost.append(f"{inside}: the classes are not installed")
         counts["built" if before is not None else "cannot be built"] += 1
-    return f"{counts['whole']}/{counts['built']}", lost
+    others = f" ({counts['cannot be built']} not built)" if counts["cannot be built"] else ""
+    return f"{counts['whole']}/{counts['built']}{others}", lost
 
 
 def last_tags(clone: Path) -> list[str]:
@@ -120,6 +138,8 @@ def examine(clone: Path) -> dict[str, object]:
             copy = shutil.copytree(clone, scratch / name / clone.name, symlinks=True)
             if name == "fix":
                 facts["check"] = idlc(copy, "check", ".")
+            else:
+                with_messages(copy)
             facts[name] = idlc(copy, *words)
             facts[f"wheels after {name}"], lost = lost_files(clone, copy, scratch)
             facts[f"lost by {name}"] = lost

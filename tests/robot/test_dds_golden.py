@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pytest
 
-from idlc.robot.dds import discovery, info, wire
+from idlc.robot.dds import discovery, graph, wire
 from tests.support.paths import GOLDEN
 from tests.support.refresh import refreshed, wanted
 
@@ -44,7 +44,7 @@ def meaning(part):
         yield discovery.parse_endpoint(part.payload)
     elif part.writer[3] == 3 and len(part.payload) > 60:
         try:
-            yield Nodes(*info.parse_info(part.payload))
+            yield Nodes(*graph.parse_info(part.payload))
         except wire.WireError:
             return
 

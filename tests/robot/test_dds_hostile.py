@@ -7,11 +7,13 @@ from collections import Counter
 
 import pytest
 
-from idlc.robot.dds import cyclone, discovery, formats, info, wire
+from idlc.robot.dds import discovery, formats, graph, wire
+from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.formats import MOST_WAITING, Received
+from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import MOST_WAITING, Received
-from tests.robot.test_dds_network import ALL, LATCHED, PORT, Network, text
+from tests.robot.test_dds_network import ALL, LATCHED, PORT, TYPE, Network, text
 from tests.support.rounds import SEED, rounds
 
 #: A head, from a participant that a test makes known.
@@ -116,6 +118,19 @@ def test_what_a_peer_draws_and_keeps_is_bounded():
         answers = own.receive(head + question + ask + pieces, ("10.0.0.2", PORT), network.now)
         drawn += sum(len(each) for answer in answers for each in answer.parts)
     assert 1_000_000 < drawn < 10_000_000
+    # and with one packet, for all small samples many times
+    for number in range(200):
+        network.write(own, writer, text(number))
+    network.now += 60
+    asks = [
+        formats.format_acknack(
+            reader.id, writer.id, writer.last - 2, [*range(writer.last - 2, writer.last + 1)],
+            count, is_final=False,
+        )
+        for count in range(2000, 3300)
+    ]  # fmt: skip
+    answers = own.receive(head + b"".join(asks), ("10.0.0.2", PORT), network.now)
+    assert 0 < len(answers) < 5000
     # it sends the second half of everything
     far = next(end for end in own._ends.values() if end.qos is ALL and hasattr(end, "writers"))
     theirs = next(iter(far.writers.values()))
@@ -191,13 +206,60 @@ def test_extremes_are_refused_at_once(case, order):
 def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order):
     inline = discovery.format_related(b"a name of 16 byt", 2**40)
     body = order + b"\0\0" + b"body"
-    sent = cyclone.wrap(body, inline)
+    sent = discovery.wrap(body, inline)
     for end in range(len(sent) + 1):
         sample = Received(b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
-        payload, named = cyclone.unwrap(sample, b"a name o")
+        payload, named = discovery.unwrap(sample, b"a name o")
         assert (named is None) == (end < 20)
         assert named in (None, (b"a name of 16 byt", 2**40))
     assert payload == body
+
+
+def test_many_heartbeats_draw_one_answer_at_a_time():
+    network, _ = conversation()
+    own = network.hosts["10.0.0.1"]
+    reader = next(end for end in own._ends.values() if end.qos is ALL and hasattr(end, "writers"))
+    (theirs,) = reader.writers.values()
+    beats = [
+        formats.format_heartbeat(reader.id, theirs.id, theirs.next, theirs.next + 9, count)
+        for count in range(1000, 3000)
+    ]
+    head = HEAD + formats.for_participant(own.prefix)
+    answers = own.receive(head + b"".join(beats), ("10.0.0.2", PORT), network.now)
+    assert len(answers) == 1
+    assert len(own.tick(network.now + 0.02)) in (1, 2)
+
+
+def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():
+    topics = ("rt/a", "rt/\x1b[2J", "rt/a%b", "rt/a/", "rt/", "a", "rt//a")
+    ends = [
+        Endpoint(SOURCE + bytes([0, 0, number, 3]), topic, TYPE, ALL)
+        for number, topic in enumerate(topics)
+    ]
+    names = (("/", "a"), ("/a%b", "c"), ("/", "a%b"), ("", "b\n"))
+    nodes = [graph.NodeInfo(*each, (), ()) for each in names]
+    remote = RemoteNodes(0)
+    payload = graph.format_info(SOURCE, nodes)
+    assert remote.learn(Received(SOURCE + bytes(4), 1, wire.NONE, payload, False, 0))
+    shown = [*remote.entities([SOURCE], ends, {})]
+    assert [(entity.node, entity.name) for entity in shown] == [
+        ("a", ""), ("_NODE_NAME_UNKNOWN_", "/a"),
+    ]  # fmt: skip
+
+
+def test_what_participants_tell_of_nodes_is_bounded():
+    remote = RemoteNodes(0)
+    nodes = [graph.NodeInfo("/", "a", (bytes(16),) * 4000, ()) for _ in range(10)]
+    payload = graph.format_info(SOURCE, nodes)
+    taken = 0
+    for number in range(10):
+        name = bytes([number]) * 12
+        told = payload[:4] + name + payload[16:]
+        for _ in range(2):
+            taken += remote.learn(Received(name + bytes(4), 1, wire.NONE, told, False, 0))
+    assert taken == 2
+    with pytest.raises(wire.WireError):
+        graph.parse_info(bytes(2_000_000))
 
 
 def test_other_packets_than_rtps_are_counted():
@@ -207,17 +269,17 @@ def test_other_packets_than_rtps_are_counted():
     assert own.malformed == 5
 
 
-NODES = [info.NodeInfo("/ns", "talker", (b"r" * 16,), (b"w" * 16, b"x" * 16))]
+NODES = [graph.NodeInfo("/ns", "talker", (b"r" * 16,), (b"w" * 16, b"x" * 16))]
 
 
 def test_nodes_are_read_as_they_were_written_and_cut_off_ones_are_refused():
-    payload = info.format_info(b"p" * 12, NODES)
-    assert info.parse_info(payload) == (b"p" * 12 + b"\0\0\1\xc1", tuple(NODES))
+    payload = graph.format_info(b"p" * 12, NODES)
+    assert graph.parse_info(payload) == (b"p" * 12 + b"\0\0\1\xc1", tuple(NODES))
     for end in range(len(payload) - 4):
         with pytest.raises(wire.WireError):
-            info.parse_info(payload[:end])
+            graph.parse_info(payload[:end])
     with pytest.raises(wire.WireError):
-        info.parse_info(payload[:20] + b"\xff\xff\xff\xff" + payload[24:])
+        graph.parse_info(payload[:20] + b"\xff\xff\xff\xff" + payload[24:])
 
 
 def test_the_ids_of_humble_have_24_bytes():
@@ -227,4 +289,4 @@ def test_the_ids_of_humble_have_24_bytes():
     payload = b"\0\1\0\0" + gid(b"p") + struct.pack("<I", 1) + struct.pack("<I", 4) + b"/ns\0"
     payload += struct.pack("<I", 7) + b"talker\0\0" + struct.pack("<I", 1) + gid(b"r")
     payload += struct.pack("<I", 2) + gid(b"w") + gid(b"x")
-    assert info.parse_info(payload) == (b"p" * 16, tuple(NODES))
+    assert graph.parse_info(payload) == (b"p" * 16, tuple(NODES))

@@ -26,6 +26,7 @@ from idlc.robot import (
     open_session,
 )
 from idlc.robot.keys import Kind
+from idlc.robot.lifecycle import LifecycleNode
 from tests.ros.conftest import domain_of_its_own
 from tests.support.paths import PROGRAMS, ROOT
 from tests.support.waiting import LIMIT, wait_for
@@ -35,6 +36,8 @@ PARAMETERS = "rcl_interfaces/srv/"
 TYPES = "type_description_interfaces/srv/GetTypeDescription"
 KINDS = ("sensor_msgs/msg/Image", "std_msgs/msg/String", "std_srvs/srv/SetBool")
 Image, String, SetBool = (idlc.load(name)[name] for name in KINDS)
+LIFECYCLE = ("lifecycle_msgs/srv/ChangeState", "lifecycle_msgs/srv/GetState")
+ChangeState, GetState = (idlc.load(name)[name] for name in LIFECYCLE)
 Fibonacci = idlc.load("test_msgs/action/Fibonacci")["test_msgs/action/Fibonacci"]
 #: Puts idlc into the place of rclpy, which is installed here.
 WITHOUT_RCLPY = """
@@ -116,6 +119,7 @@ def running(words, **variables):
         node = Node("ours", session=session)
         with Executor(context=node.context) as executor, suppress(ExternalShutdownException):
             executor.add_node(node)
+            executor.add_node(LifecycleNode("our_cycle", session=session))
             offer(node)
             yield Pair(node, peer)
         peer.stdin.close()
@@ -211,6 +215,18 @@ def parameters_of_theirs(pair):
     assert [value.double_value for value in response.values] in ([1.5], [2.5])
 
 
+def lifecycle_of_ours(pair):
+    assert pair.report("lifecycle") == [True, "inactive"]
+
+
+def lifecycle_of_theirs(pair):
+    request = ChangeState.Request()
+    request.transition.id = 1
+    assert pair.ask(ChangeState, "their_cycle/change_state", request).success
+    state = pair.ask(GetState, "their_cycle/get_state", GetState.Request()).current_state
+    assert state.label == "inactive"
+
+
 def graph_of_ours(pair):
     nodes, topics, services = pair.report("graph")
     assert {"ours", "peer"} <= {*nodes}
@@ -247,7 +263,14 @@ CELLS = {
     for cell in (
         *(topics_of_both, topics_that_are_latched, services_of_ours, services_of_theirs),
         *(actions_of_ours, actions_of_theirs, parameters_of_ours, parameters_of_theirs),
-        *(graph_of_ours, graph_of_theirs, types_of_ours, types_of_theirs),
+        *(
+            lifecycle_of_ours,
+            lifecycle_of_theirs,
+            graph_of_ours,
+            graph_of_theirs,
+            types_of_ours,
+            types_of_theirs,
+        ),
     )
 }
 

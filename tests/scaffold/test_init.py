@@ -32,6 +32,7 @@ from tests.support.projects import (
     backend,
     library,
 )
+from tests.support.repositories import git
 
 BIN = Path(sys.executable).parent
 
@@ -117,6 +118,9 @@ def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys
     assert main(["init"]) == 1, "not without a terminal"
     printed = capsys.readouterr().out
     assert sample.words in printed
+    # a setup.py stops a build of outdated classes, and CMake compiles the interfaces
+    is_unnoticed = "a Python library" in printed or "idlc writes no setup.py" in printed
+    assert ("run `idlc gen --check` before you build" in printed) == is_unnoticed
     assert tree(project) == before
     warning = r"The test runs the package's own build\."
     assert re.search(rf"{warning}\nnothing was written; next: idlc init --yes\n$", printed)
@@ -634,6 +638,33 @@ def test_a_service_gets_the_file_of_the_documents(service, after, path, project,
     assert main(["init", "bot", "--ci", service, "--yes"]) == 1
     assert "add the missing lines" in capsys.readouterr().err
     assert tree(project) == before
+
+
+@pytest.mark.usefixtures("unproved")
+def test_a_service_gets_the_idlc_that_it_runs(project, capsys):
+    """A workflow needs idlc in the repository; pre-commit needs a fixed commit of a clone."""
+    (block,) = re.findall(r"(?ms)^```sh\n(python3 -I.*?)^```$", (DOCS / "ci.md").read_text())
+    wheel, action, added = block.splitlines()
+    git("init", "-q")
+    git("init", "-q", "../idlc")
+    git("commit", "-q", "--allow-empty", "-m", "one", cwd="../idlc")
+    write_all(SAMPLES["ament_cmake"].files)
+    expected = {
+        "github": [wheel, action, added],
+        "gitlab": [wheel, added.removesuffix(" tools/idlc")],
+        "pre-commit": [],
+    }
+    for service, commands in expected.items():
+        assert main(["init", "--ci", service, "--yes"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        shown = [line.removeprefix("next: ") for line in lines if line.startswith("next: ")]
+        assert shown[:-2] == commands  # the last two are commands of idlc
+    settings = yaml.safe_load((project / ".pre-commit-config.yaml").read_text())
+    commit = git("rev-parse", "HEAD", cwd="../idlc").decode().strip()
+    assert settings["repos"][0]["rev"] == commit
+    git("commit", "-q", "--allow-empty", "-m", "two", cwd="../idlc")
+    assert main(["init", "--ci", "pre-commit", "--yes"]) == 0
+    assert "nothing to do" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("service", ["github", "gitlab", "pre-commit"])

@@ -122,6 +122,27 @@ def test_with_a_revision(name, here, capsys):
     assert (status, gate.last in last) == (gate.status, True), last
 
 
+@pytest.mark.parametrize("settings", ["", "[tool.idlc]\npaths = ['src']\n"])
+def test_in_a_repository_without_a_version_to_compare_with(settings, here, capsys):
+    """The last commit is compared with, of the remote repository if there is one."""
+    write_all({**SAME, "pyproject.toml": settings})
+    git("init", "-q", "-b", "main")
+    assert main(["breaking"]) == 2
+    assert "missing option `--against`" in capsys.readouterr().err
+    git("add", ".")
+    git("commit", "-qm", "one")
+    write_all(NEW)
+    assert main(["breaking"]) == 1
+    shown = capsys.readouterr()
+    assert WIRE in shown.out
+    assert shown.err == "note: idlc compares with `git:HEAD`\n"
+    git("update-ref", "refs/remotes/origin/HEAD", "HEAD")
+    git("add", ".")
+    git("commit", "-qm", "two")
+    assert main(["breaking"]) == 1
+    assert "git:origin/HEAD" in capsys.readouterr().err
+
+
 def test_in_a_clone_without_the_history(here, capsys):
     git("init", "-q", "-b", "main", "up", cwd=here)
     for files in (OLD, NEW):

@@ -15,6 +15,8 @@ from idlc.diagnostics.formats import notice
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.project.find import is_address
+from idlc.project.git import commit
+from idlc.project.root import Root
 from idlc.project.settings import Config, scope, settings_here
 from idlc.recordings.find import recordings_of
 from idlc.tasks.breaking.files import BreakingOptions, Verdict, breaking
@@ -114,7 +116,7 @@ def run(
 ) -> int:
     """Run the command and return the exit status."""
     settings, report = settings_here()
-    against = against or packages.against(settings, report)
+    against = against or packages.against(settings, report) or _committed(settings.root, report)
     levels = packages.levels(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
@@ -137,6 +139,15 @@ def run(
             verdict = _compare_files(comparison, paths, settings, levels, report)
     _show(verdict, style, levels, report)
     return output.status(report)
+
+
+def _committed(root: Root, report: Report) -> str | None:
+    """Return what the files of a repository are compared with if nothing is named."""
+    for name in ("origin/HEAD", "HEAD"):
+        if not report.had_errors and commit(name, root.base):
+            sys.stderr.write(f"note: idlc compares with `git:{name}`\n")
+            return f"git:{name}"
+    return None
 
 
 def _comparison(

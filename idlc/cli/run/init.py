@@ -24,6 +24,7 @@ from idlc.scaffold.init import (
     Preparation,
     continuous,
     generate,
+    obtaining,
     prepare,
     recommendation,
     siblings,
@@ -36,9 +37,6 @@ if TYPE_CHECKING:
 
 
 TEST = "The test runs the package's own build."
-
-
-CI_NOTE = "next: see docs/ci.md in idlc's repository, for how the job gets idlc\n"
 
 
 CONSENT = f"Write these changes, compile and test? {TEST}"
@@ -58,24 +56,24 @@ def run(path: str, service: str | None, yes: bool) -> int:
         sys.stderr.write("nothing was written\n")
         return output.status(report)
     planned, status = _plans(layout, root, report)
-    extras = []
+    extras: list[tuple[Draft, list[str]]] = []
     if service:
         others = Report()
         checks = continuous(service, layout, others)
         if checks:
-            extras.append((checks, CI_NOTE))
+            extras.append((checks, obtaining(checks)))
         output.show(others, "text", sys.stderr)
         status = max(status, output.status(others))
     if planned:
-        extras.append((recommendation(root, report), ""))
+        extras.append((recommendation(root, report), []))
     drafts = [(each.draft, each.out) for each in planned] + [(draft, "") for draft, _ in extras]
     for draft, out in drafts:
         _show(draft, out, root)
     is_changed = any(draft.reasons for draft, _ in drafts)
     if is_changed and not yes and not _consents(path):
         return max(status, 1)
-    for draft, note in extras:
-        status = max(status, _write(draft, note))
+    for draft, commands in extras:
+        status = max(status, _write(draft, commands))
     for preparation in planned:
         status = max(status, _finish(preparation, root, again=yes))
     if not is_changed and not status:
@@ -140,7 +138,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
             sys.stderr.write(f"{within}nothing was written\n")
         else:
             planned.append(preparation)
-            sys.stdout.write(f"note: {one_line(preparation.note)}\n" if preparation.note else "")
+            sys.stdout.writelines(f"note: {one_line(note)}\n" for note in preparation.notes)
         status = max(status, output.status(report), int(preparation is None))
     return planned, status
 
@@ -158,14 +156,20 @@ def _show(draft: Draft, out: str, root: Root) -> None:
     sys.stdout.flush()
 
 
-def _write(draft: Draft, note: str) -> int:
-    """Write a file that belongs to no package, and return the exit status."""
+def _write(draft: Draft, next_commands: Sequence[str]) -> int:
+    """Write a file that belongs to no package, and return the exit status.
+
+    The next commands belong into the file's repository.
+    """
     report = Report()
     if not draft.reasons:
         return 0
     is_written = draft.write(report) is not None
     output.show(report, "text", sys.stderr)
-    sys.stdout.write(note if is_written else "")
+    if is_written and next_commands:
+        folder = Root.here().shown(draft.path)
+        start = [] if draft.path == Path.cwd() else [f"cd {shlex.quote(folder)}"]
+        sys.stdout.writelines(f"next: {line}\n" for line in (*start, *next_commands))
     return output.status(report)
 
 

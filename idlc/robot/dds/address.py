@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from idlc.diagnostics.text import one_line
-from idlc.robot.dds.shared import Address
+from idlc.robot.dds.formats import Address
 from idlc.robot.errors import RobotError
 
 #: An address: the domain, and a peer.

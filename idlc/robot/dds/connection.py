@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 
 from idlc.robot.dds import address, formats, wire
+from idlc.robot.dds.formats import Outgoing
 from idlc.robot.dds.participant import Participant
-from idlc.robot.dds.shared import Outgoing
 from idlc.robot.dds.writer import Writer
 
 #: The longest sleep of the thread, in which another thread may make something due.

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.shared import Address, Received
+from idlc.robot.dds.formats import Address, Received, is_cyclone
 from idlc.robot.qos import (
     INFINITE,
     MOST_DEPTH,
@@ -41,6 +41,8 @@ _RELATED = (0x83, 0x800F)
 #: Announcer and detector of participants, publications and subscriptions.
 _BUILTINS = 0x3F
 PARTICIPANT_ID = b"\x00\x00\x01\xc1"
+#: Of a request in the form of Cyclone DDS: the encapsulation, and where its fields begin.
+_HEAD, _START = 4, 20
 #: Seconds until a participant that sends nothing is gone: our own, and bounds of others.
 LEASE = 20.0
 _LEASES = (1.0, 600.0)
@@ -227,6 +229,39 @@ def related(parameters: wire.Parameters) -> tuple[bytes, int] | None:
             high, low = struct.unpack_from("<iI", value, wire.GUID)
             return value[: wire.GUID], high << 32 | low
     return None
+
+
+# requests and replies of rmw_cyclonedds begin with 8 bytes that the client chose, and a number
+
+
+def _order(payload: bytes) -> str:
+    return "<" if payload[1] & 1 else ">"
+
+
+def wrap(payload: bytes, inline: bytes) -> bytes:
+    """Return a request or reply for Cyclone DDS; `inline` names the request."""
+    named = related(wire.parse_parameters(inline, 0, "<")[0])
+    if named is None:
+        return payload
+    client, number = named
+    (client_id,) = struct.unpack_from("<8xQ", client)
+    head = struct.pack(_order(payload) + "Qq", client_id, number)
+    return payload[:_HEAD] + head + payload[_HEAD:]
+
+
+def unwrap(received: Received, start: bytes) -> tuple[bytes, tuple[bytes, int] | None]:
+    """Return the payload of a request or reply, and the client and number that it names.
+
+    Of a client of Cyclone DDS, the name is 8 bytes, which follow `start`.
+    """
+    payload = received.payload
+    if not is_cyclone(received.writer):
+        return payload, related(received.parameters)
+    if len(payload) < _START:
+        return payload, None
+    client_id, number = struct.unpack_from(_order(payload) + "Qq", payload, _HEAD)
+    name = start + struct.pack("<Q", client_id)
+    return payload[:_HEAD] + payload[_START:], (name, number)
 
 
 # what idlc announces

@@ -1,9 +1,14 @@
-"""The bytes of packets and of their parts, always little-endian."""
+"""The packets to send: their bytes, always little-endian, and what the ends of a participant share.
+
+The ends share the time, the packets to send, and the room for samples.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, TypeAlias
 
 from idlc.robot.dds import wire
 
@@ -11,6 +16,13 @@ from idlc.robot.dds import wire
 _HEAD = b"RTPS\x02\x03" + wire.VENDOR
 #: The encapsulation of a list of parameters.
 LIST = b"\x00\x03\x00\x00"
+#: The IP address and the port of a socket.
+Address: TypeAlias = tuple[str, int]
+#: Bytes of all samples that cannot be delivered yet.
+MOST_WAITING = 512 << 20
+#: Bytes that the questions of a participant draw at once, and in a second; those that a packet
+#: costs besides; and the participants for which that is remembered.
+_MOST_DRAWN, _DRAWN, _PACKET, _MOST_KNOWN = 4 << 20, 64 << 20, 1024, 4096
 
 
 def format_packet(prefix: bytes, parts: Iterable[bytes]) -> bytes:
@@ -108,3 +120,93 @@ def parameter(name: int, value: bytes) -> bytes:
 def parameter_list(parameters: Iterator[tuple[int, bytes]]) -> bytes:
     """Return parameters and their end."""
     return b"".join((*(parameter(*each) for each in parameters), parameter(wire.SENTINEL, b"")))
+
+
+def is_cyclone(guid: bytes) -> bool:
+    """Return whether an end is of Cyclone DDS, with which GUIDs there begin."""
+    return guid.startswith(b"\x01\x10")
+
+
+class Outgoing(NamedTuple):
+    """Parts of a packet for a participant at an address."""
+
+    address: Address
+    prefix: bytes
+    parts: tuple[bytes, ...]
+
+
+class Remote:
+    """The other end of a connection."""
+
+    def __init__(self, guid: bytes, address: Address, reliable: bool) -> None:
+        self.guid = guid
+        self.prefix, self.id = guid[: wire.PREFIX], guid[wire.PREFIX :]
+        self.address = address
+        self.reliable = reliable
+
+
+class Shared:
+    """What the ends of a participant share: the time, packets to send, and room for samples.
+
+    `fragment` returns the most bytes of a fragment for a host. Of the room, a participant gets at
+    most as much as is left for the others.
+    """
+
+    def __init__(self, fragment: Callable[[str], int]) -> None:
+        self.fragment = fragment
+        self.now = 0.0
+        #: What the ends have to do, and when.
+        self.due: dict[Callable[[], None], float] = {}
+        self._packets: list[Outgoing] = []
+        self._used: Counter[bytes] = Counter()
+        #: The bytes that participants may draw, and when that was so.
+        self._drawn: dict[bytes, tuple[int, float]] = {}
+
+    def send(self, end: Remote, *parts: bytes) -> None:
+        """Send parts of a packet to an end."""
+        self._packets.append(Outgoing(end.address, end.prefix, parts))
+
+    def tick(self) -> None:
+        """Do what is due."""
+        for action in [action for action, time in self.due.items() if time <= self.now]:
+            del self.due[action]
+            action()
+
+    def collect(self) -> list[Outgoing]:
+        """Return the packets to send, once."""
+        packets, self._packets = self._packets, []
+        return packets
+
+    def may_draw(self, prefix: bytes, size: int) -> bool:
+        """Return whether a participant that asks for it gets a sample of this size now."""
+        room, at = self._drawn.pop(prefix, (_MOST_DRAWN, self.now))
+        room = min(_MOST_DRAWN, room + int((self.now - at) * _DRAWN))
+        is_free = room > 0
+        self._drawn[prefix] = room - (size + _PACKET if is_free else 0), self.now
+        if len(self._drawn) > _MOST_KNOWN:
+            del self._drawn[next(iter(self._drawn))]
+        return is_free
+
+    def take(self, prefix: bytes, size: int) -> bool:
+        """Take bytes for samples of a participant; return whether there was room."""
+        if self._used[prefix] + size > MOST_WAITING - self._used.total():
+            return False
+        self._used[prefix] += size
+        return True
+
+    def free(self, prefix: bytes, size: int) -> None:
+        """Give bytes back."""
+        self._used[prefix] -= size
+        if not self._used[prefix]:
+            del self._used[prefix]
+
+
+class Received(NamedTuple):
+    """A sample as a reader's callback gets it; without a payload, an instance ended."""
+
+    writer: bytes
+    number: int
+    parameters: wire.Parameters
+    payload: bytes
+    is_key: bool
+    time: int

@@ -1,20 +1,31 @@
-"""The names of ROS 2 on DDS: topics and types of its entities, and entities of what others tell.
+"""The graph of ROS 2 on DDS: topics and types of its entities, and entities of what others tell.
 
-A topic `/a` is `rt/a`; a service `/a` is two topics, `rq/aRequest` and `rr/aReply`.
+A topic `/a` is `rt/a`; a service `/a` is two topics, `rq/aRequest` and `rr/aReply`. The topic
+`ros_discovery_info` says which node has which endpoints.
 """
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from idlc.robot.dds import info, wire
+from idlc.robot.dds import wire
 from idlc.robot.dds.discovery import Endpoint
-from idlc.robot.dds.shared import Received
+from idlc.robot.dds.formats import Received
+from idlc.robot.dds.wire import GUID, WireError
 from idlc.robot.keys import Entity, Kind
-from idlc.robot.names import ros_type
+from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
 
+#: The topic about nodes, its type, and what one message of it may contain.
+INFO_TOPIC = "ros_discovery_info"
+INFO_TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+_MOST_NODES = 1024
+_MOST_ENDS = 4096
+_MOST_NAME = 512
+#: Bytes of a message.
+_MOST = 2**20
 #: The last byte of the id of a writer and of a reader.
 WRITER, READER = b"\x03", b"\x04"
 #: The ends of the names and types of a service's topics.
@@ -23,6 +34,8 @@ HALVES = {"rq": ("Request", "Request_"), "rr": ("Reply", "Response_")}
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 #: Endpoints whose entities are not made again after each change.
 _MOST_CACHED = 2**14
+#: Nodes and their endpoints, of all participants.
+_MOST_OF_ALL = 2**16
 #: The kinds of endpoints; a service and a client are shown as their readers.
 _KINDS = {
     ("rt", True): Kind.PUBLISHER,
@@ -32,12 +45,102 @@ _KINDS = {
 }
 
 
+class NodeInfo(NamedTuple):
+    """A node, and the GUIDs of its endpoints."""
+
+    namespace: str
+    name: str
+    readers: tuple[bytes, ...]
+    writers: tuple[bytes, ...]
+
+
+class _Cursor:
+    """Reads CDR; raises WireError where it ends early or is too large."""
+
+    def __init__(self, payload: bytes) -> None:
+        self.order = "<" if payload[1:2] == b"\x01" else ">"
+        self.data = payload[4:]
+        self.at = 0
+
+    def take(self, size: int) -> bytes:
+        """Return bytes."""
+        if size > len(self.data) - self.at:
+            raise WireError("cut off")
+        self.at += size
+        return self.data[self.at - size : self.at]
+
+    def count(self, most: int) -> int:
+        """Return a length."""
+        self.at += -self.at % 4
+        (number,) = struct.unpack(self.order + "I", self.take(4))
+        if number > most:
+            raise WireError("too many")
+        return int(number)
+
+    def text(self) -> str:
+        """Return a string."""
+        data = self.take(self.count(_MOST_NAME))
+        try:
+            return data.rstrip(b"\0").decode("ascii")
+        except UnicodeDecodeError:
+            raise WireError("a name that is not ASCII") from None
+
+    def gids(self, size: int) -> tuple[bytes, ...]:
+        """Return GUIDs."""
+        return tuple(self.take(size)[:GUID] for _ in range(self.count(_MOST_ENDS)))
+
+
+def parse_info(payload: bytes) -> tuple[bytes, tuple[NodeInfo, ...]]:
+    """Return the GUID of a participant and its nodes; raise WireError.
+
+    The ids have 24 bytes on Humble and 16 since; only one of the two fits the payload.
+    """
+    if len(payload) > _MOST:
+        raise WireError("too large")
+    try:
+        return _parse(payload, GUID)
+    except WireError:
+        return _parse(payload, 24)
+
+
+def _parse(payload: bytes, size: int) -> tuple[bytes, tuple[NodeInfo, ...]]:
+    cursor = _Cursor(payload)
+    guid = cursor.take(size)[:GUID]
+    nodes = tuple(
+        NodeInfo(cursor.text(), cursor.text(), cursor.gids(size), cursor.gids(size))
+        for _ in range(cursor.count(_MOST_NODES))
+    )
+    if len(cursor.data) - cursor.at > 3:  # more than the padding
+        raise WireError("a rest")
+    return guid, nodes
+
+
+def format_info(prefix: bytes, nodes: Iterable[NodeInfo]) -> bytes:
+    """Return the message about the own participant."""
+    data = bytearray(prefix + b"\x00\x00\x01\xc1")
+
+    def add_count(number: int) -> None:
+        data.extend(bytes(-len(data) % 4) + struct.pack("<I", number))
+
+    nodes = [*nodes]
+    add_count(len(nodes))
+    for node in nodes:
+        for text in (node.namespace, node.name):
+            name = text.encode() + b"\0"
+            add_count(len(name))
+            data.extend(name)
+        for guids in (node.readers, node.writers):
+            add_count(len(guids))
+            data.extend(b"".join(guids))
+    return b"\x00\x01\x00\x00" + bytes(data)
+
+
 def guid_of(prefix: bytes, number: int, kind: bytes) -> bytes:
     """Return the GUID of an own endpoint."""
     return prefix + (number & 0xFFFFFF).to_bytes(3, "big") + kind
 
 
-def own_nodes(prefix: bytes, entities: Iterable[Entity]) -> Iterator[info.NodeInfo]:
+def own_nodes(prefix: bytes, entities: Iterable[Entity]) -> Iterator[NodeInfo]:
     """Yield the own nodes with their endpoints."""
     nodes: dict[tuple[str, str], tuple[list[bytes], list[bytes]]] = {}
     for entity in entities:
@@ -47,7 +150,7 @@ def own_nodes(prefix: bytes, entities: Iterable[Entity]) -> Iterator[info.NodeIn
         if entity.kind in (Kind.PUBLISHER, Kind.SERVICE, Kind.CLIENT):
             writers.append(guid_of(prefix, entity.id + 1, WRITER))
     for names, (readers, writers) in nodes.items():
-        yield info.NodeInfo(*names, tuple(readers), tuple(writers))
+        yield NodeInfo(*names, tuple(readers), tuple(writers))
 
 
 class RemoteNodes:
@@ -55,18 +158,20 @@ class RemoteNodes:
 
     def __init__(self, domain: int) -> None:
         self._domain = domain
-        self._nodes: dict[bytes, tuple[info.NodeInfo, ...]] = {}
+        self._nodes: dict[bytes, tuple[NodeInfo, ...]] = {}
 
     def learn(self, received: Received) -> bool:
         """Take a message of `ros_discovery_info`; return whether it is valid."""
         try:
-            guid, nodes = info.parse_info(received.payload)
-        except wire.WireError:
+            guid, nodes = parse_info(received.payload)
+        except WireError:
             return False
+        prefix = guid[: wire.PREFIX]
+        others = sum(_size(each) for name, each in self._nodes.items() if name != prefix)
         # nobody speaks for another participant
-        if guid[: wire.PREFIX] != received.writer[: wire.PREFIX]:
+        if prefix != received.writer[: wire.PREFIX] or others + _size(nodes) > _MOST_OF_ALL:
             return False
-        self._nodes[guid[: wire.PREFIX]] = nodes
+        self._nodes[prefix] = nodes
         return True
 
     def entities(
@@ -91,6 +196,10 @@ class RemoteNodes:
         for end in endpoints:
             if entity := _endpoint(end, owners.get(end.guid, unknown), hashes.get(_names(end), "")):
                 yield entity
+
+
+def _size(nodes: tuple[NodeInfo, ...]) -> int:
+    return sum(1 + len(node.readers) + len(node.writers) for node in nodes)
 
 
 class _Owner(NamedTuple):
@@ -130,7 +239,10 @@ def _endpoint(end: Endpoint, owner: _Owner, service: str) -> Entity | None:
 
 
 def _entity(prefix: bytes, owner: _Owner, number: int, kind: Kind, **more: Any) -> Entity | None:
-    """Return an entity of another participant; `None` if its type has no valid name."""
+    """Return an entity of another participant; `None` if a name or its type is not valid."""
+    is_valid = is_namespace(owner.namespace) and is_node_name(owner.name)
+    if not is_valid or (kind is not Kind.NODE and not is_absolute(more["name"])):
+        return None
     try:
         return Entity(
             domain=owner.domain,

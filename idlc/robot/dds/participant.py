@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.discovery import Endpoint, Peer, fits
+from idlc.robot.dds.formats import Address, Outgoing, Received, Remote, Shared
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import Address, Outgoing, Received, Remote, Shared
 from idlc.robot.dds.writer import Writer
 
 #: Participants, the announcements that a stranger gets, and the endpoints of one and of all.

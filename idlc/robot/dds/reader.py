@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
+from math import inf
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
+from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 
 #: Bytes of a sample.
@@ -17,7 +18,7 @@ _OVERHEAD = 256
 _AHEAD = 256
 _MOST_PARTIAL = 8
 _MOST_REMEMBERED = 256
-#: Seconds until a writer is told that nothing is missing.
+#: Seconds until a writer is told that nothing is missing, and between two answers.
 _ANSWER = 0.01
 
 
@@ -67,8 +68,8 @@ class RemoteWriter(Remote):
         self.partial: OrderedDict[int, _Partial] = OrderedDict()
         self.bytes = 0
         self.count = 0
-        #: True if it waits to be told that nothing is missing.
-        self.waits = False
+        #: When it was answered, and whether it waits for an answer.
+        self.answered, self.waits = -inf, False
 
 
 class Reader:
@@ -250,9 +251,9 @@ class Reader:
             self._skip(writer, part.first)
         self._drain(writer)
         missing = self._missing(writer, writer.next)
-        if missing:
+        if missing and self._shared.now >= writer.answered + _ANSWER:
             self._answer(writer, missing)
-        elif not part.is_final:
+        elif missing or not part.is_final:
             writer.waits = True
             self._shared.due.setdefault(self.tick, self._shared.now + _ANSWER)
 
@@ -269,7 +270,7 @@ class Reader:
 
     def _answer(self, writer: RemoteWriter, missing: list[int]) -> None:
         """Ask a writer for what is missing, and tell it that all before has arrived."""
-        writer.waits = False
+        writer.waits, writer.answered = False, self._shared.now
         writer.count += 1
         ids = self.id, writer.id
         parts = []

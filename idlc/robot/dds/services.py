@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.robot.dds import cyclone, discovery, wire
+from idlc.robot.dds import discovery, wire
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.formats import Received, is_cyclone
 from idlc.robot.dds.graph import HALVES, READER, WRITER, guid_of
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import Received, is_cyclone
 from idlc.robot.dds.writer import Writer
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import dds_type
@@ -26,8 +26,8 @@ from idlc.robot.transport import OnReply, Request, Sample
 _DEPTH = 1000
 #: Seconds that a request waits for a service to appear, and a reply for its client.
 _APPEARING = 5.0
-#: Requests and replies that wait.
-_MOST_WAITING = 10_000
+#: What waits when another request is refused, and another reply, which anybody can cause.
+_MOST_WAITING, _MOST_REPLIES = 10_000, 1000
 
 
 class Pair(NamedTuple):
@@ -60,7 +60,7 @@ class _Client:
     def receive(self, received: Received) -> None:
         """Take a reply; those to other clients arrive, too."""
         start = self.pair.reader.guid[:8]
-        payload, named = cyclone.unwrap(received, start)
+        payload, named = discovery.unwrap(received, start)
         if named is None or named[0] not in {each.guid for each in self.pair}:
             return
         if (call := self.calls.pop(named[1], None)) is not None:
@@ -91,7 +91,7 @@ class _Request:
     def __init__(self, services: Services, writer: Writer, received: Received) -> None:
         self._services = services
         self._writer = writer
-        self.payload, named = cyclone.unwrap(received, bytes(8))
+        self.payload, named = discovery.unwrap(received, bytes(8))
         # Fast DDS names the reader of the reply
         self._target = named[0] if named else received.writer
         self._number = named[1] if named and is_cyclone(received.writer) else received.number
@@ -117,6 +117,7 @@ class Services:
         #: By the id of an announced client, and the name and type of a service.
         self._clients: dict[object, _Client] = {}
         self._waiting: list[_Waiting] = []
+        self._settled_at = 0.0
 
     def _pair(self, entity: Entity, deliver: Callable[[Received], None]) -> Pair:
         """Declare the two ends of a service or a client."""
@@ -173,7 +174,7 @@ class Services:
             self._connection.write(writer, payload, discovery.format_related(reader.guid, number))
 
         end = time.monotonic() + min(limit, _APPEARING)
-        self._send(_Waiting(client.is_matched, send, lambda: callback(None), end))
+        self._send(_Waiting(client.is_matched, send, lambda: callback(None), end), _MOST_WAITING)
 
     def reply(self, writer: Writer, client: bytes, named: bytes, payload: bytes) -> None:
         """Send the reply to a request of a participant, now or when its reader is matched."""
@@ -187,17 +188,21 @@ class Services:
 
         with self._connection.lock:
             end = time.monotonic() + _APPEARING
-            self._send(_Waiting(is_matched, send, lambda: None, end))
+            self._send(_Waiting(is_matched, send, lambda: None, end), _MOST_REPLIES)
 
-    def _send(self, message: _Waiting) -> None:
-        """Send what can be sent, in the order of its arrival."""
-        if len(self._waiting) < _MOST_WAITING:
+    def _send(self, message: _Waiting, most: int) -> None:
+        """Send what can be sent, after what waited for the same end."""
+        if self._connection.changed_at >= self._settled_at:
+            self._settle(time.monotonic())
+        if message.is_matched():
+            message.send()
+        elif len(self._waiting) < most:
             self._waiting.append(message)
         else:
             message.give_up()
-        self._settle(time.monotonic())
 
     def _settle(self, now: float) -> None:
+        self._settled_at = now
         waiting, self._waiting = self._waiting, []
         for each in waiting:
             if each.is_matched():

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
-from idlc.robot.dds import info
+from idlc.robot.dds import graph
 from idlc.robot.dds.address import Place
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.formats import Received
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
 from idlc.robot.dds.services import Services
-from idlc.robot.dds.shared import Received
 from idlc.robot.dds.writer import Writer, unpadded
 from idlc.robot.keys import Entity, Kind, pack_attachment
 from idlc.robot.names import dds_type
@@ -69,7 +69,7 @@ class DdsTransport:
         self._remote = RemoteNodes(place.domain)
         self._watchers: list[Callable[[str, bool], None]] = []
         self._shown: dict[str, None] = {}
-        self._refreshed = 0.0
+        self._refreshed = self._refresh_at = 0.0
         self._is_stale = True
         #: Whether the others have to be told about the own nodes, and when that is due.
         self._is_news, self._news_at = False, 0.0
@@ -78,7 +78,7 @@ class DdsTransport:
         self._started = time.monotonic()
         self.id = self._connection.prefix.hex()
         writer, reader = (
-            Endpoint(self._guid(_INFO_ID, kind), info.TOPIC, info.TYPE, _INFO_QOS)
+            Endpoint(self._guid(_INFO_ID, kind), graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS)
             for kind in (WRITER, READER)
         )
         with self._connection.acting() as participant:
@@ -143,7 +143,8 @@ class DdsTransport:
         self._services.tick(now)
         if self._is_news and now >= self._news_at:
             self._publish(now)
-        if self._is_stale or self._connection.changed_at > self._refreshed:
+        is_changed = self._is_stale or self._connection.changed_at > self._refreshed
+        if is_changed and now >= self._refresh_at:
             self._refresh()
 
     # the graph
@@ -173,7 +174,7 @@ class DdsTransport:
     def _publish(self, now: float) -> None:
         """Send the own nodes and their endpoints."""
         prefix = self._connection.prefix
-        payload = info.format_info(prefix, own_nodes(prefix, self._own.values()))
+        payload = graph.format_info(prefix, own_nodes(prefix, self._own.values()))
         self._connection.write(self._info, payload)
         self._is_news, self._news_at = False, now + _PERIOD
 
@@ -197,6 +198,9 @@ class DdsTransport:
             for token in self._shown:
                 if token not in shown:
                     watcher(token, True)
+        # a graph that takes long, as somebody makes it large, takes a part of the time
+        now = time.monotonic()
+        self._refresh_at = now + 4 * (now - self._refreshed)
 
     def watch(
         self,

@@ -6,17 +6,15 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from idlc.robot.dds import cyclone, formats, wire
+from idlc.robot.dds import discovery, formats, wire
+from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
-from idlc.robot.dds.shared import Address, Received, Remote, Shared, is_cyclone
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 #: Seconds between heartbeats for readers that lack something.
 HEARTBEAT = 0.1
 #: Bytes of a history; the newest sample is kept, however large it is.
 MOST_HISTORY = 256 << 20
-#: Bytes that the questions of a reader draw at once, and in a second.
-_MOST_RESENT, _RESENT = 4 << 20, 64 << 20
 
 
 class RemoteReader(Remote):
@@ -29,16 +27,6 @@ class RemoteReader(Remote):
         self.count = -1
         #: True after it has said which number it wants, as it then has a heartbeat.
         self.is_told = False
-        #: The bytes that it may draw, and when that was so.
-        self._room, self._at = 0.0, 0.0
-
-    def may_draw(self, size: int, now: float) -> bool:
-        """Return whether it gets so many bytes again now."""
-        self._room = min(_MOST_RESENT, self._room + (now - self._at) * _RESENT)
-        self._at = now
-        is_free = self._room > 0
-        self._room -= size if is_free else 0
-        return is_free
 
 
 class Sample(NamedTuple):
@@ -91,8 +79,9 @@ class Writer:
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
         elif is_late:  # such a reader never asks
-            for number in self.history:
-                self._send(reader, number)
+            for number, sample in self.history.items():
+                if self._shared.may_draw(reader.prefix, len(sample.payload)):
+                    self._send(reader, number)
 
     def match_local(self, reader: Reader) -> None:
         """Deliver to a reader of the same participant."""
@@ -152,7 +141,7 @@ class Writer:
         """
         payload, inline, time = self.history[number]
         if inline and payload and is_cyclone(reader.guid):
-            payload, inline = cyclone.wrap(payload, inline), b""
+            payload, inline = discovery.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
         if len(payload) <= size:
             self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
@@ -183,11 +172,12 @@ class Writer:
             sample = self.history.get(number) if number >= reader.start else None
             if sample is None:
                 gone += [number] if number <= self.last else []
-            elif reader.may_draw(len(sample.payload), self._shared.now):
+            elif self._shared.may_draw(reader.prefix, len(sample.payload)):
                 self._send(reader, number)
-        if gone:
+        if gone and self._shared.may_draw(reader.prefix, 0):
             self._shared.send(reader, formats.format_gap(reader.id, self.id, gone))
-        if part.missing or part.base == 0:
+        is_asking = part.missing or part.base == 0
+        if is_asking and self._shared.may_draw(reader.prefix, 0):
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
 
@@ -196,8 +186,8 @@ class Writer:
         reader = self.readers.get(guid)
         if reader is None or not reader.reliable or part.number not in self.history:
             return
-        now = self._shared.now
-        chosen = [each for each in part.missing if reader.may_draw(reader.size, now)]
+        may_draw = self._shared.may_draw
+        chosen = [each for each in part.missing if may_draw(reader.prefix, reader.size)]
         if chosen:
             self._send(reader, part.number, self._heartbeat(reader), chosen=chosen)
 

@@ -6,10 +6,12 @@ import threading
 from contextlib import suppress
 
 import rclpy
+from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionClient, ActionServer
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
@@ -44,12 +46,15 @@ for number in range(5):
     latched.publish(String(data=str(number)))
 node.create_service(SetBool, "theirs", serve)
 server = ActionServer(node, Fibonacci, "count", execute)
+cycle = LifecycleNode("their_cycle")
 
 client = node.create_client(SetBool, "ours")
 parameters = {
     kind: node.create_client(kind, f"ours/{name}_parameters")
     for name, kind in (("get", GetParameters), ("set", SetParameters))
 }
+change = node.create_client(ChangeState, "our_cycle/change_state")
+state = node.create_client(GetState, "our_cycle/get_state")
 types = node.create_client(GetTypeDescription, "ours/get_type_description")
 action = ActionClient(node, Fibonacci, "our_count")
 
@@ -80,6 +85,10 @@ def work():
     described = ask(types, GetTypeDescription.Request(type_name="std_msgs/msg/String"))
     fields = described.type_description.type_description.fields
     report("types", [described.successful, [field.name for field in fields]])
+    request = ChangeState.Request()
+    request.transition.id = 1
+    is_changed = ask(change, request).success
+    report("lifecycle", [is_changed, ask(state, GetState.Request()).current_state.label])
     assert action.wait_for_server(LIMIT)
     steps = []
     goal = done(
@@ -98,5 +107,8 @@ def work():
 
 threading.Thread(target=work, daemon=True).start()
 threading.Thread(target=lambda: (sys.stdin.read(), rclpy.try_shutdown()), daemon=True).start()
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+executor.add_node(cycle)
 with suppress(ExternalShutdownException):
-    rclpy.spin(node)
+    executor.spin()
