@@ -33,7 +33,7 @@ setup(
     zip_safe=False,
     maintainer='The idlc authors',
     maintainer_email='maintainer@example.com',
-    description='The ROS 2 tutorial, complete: topics, a service and two actions.',
+    description='The package my_robot_controller.',
     license='Apache-2.0',
     extras_require={'test': ['pytest']},
     entry_points={

@@ -243,8 +243,10 @@ class Selection:
         self.compare_lengths(batch, kind)
 
         def judge(unread: Any) -> None:
-            if (unread > MOST_PADDING).any():
-                self._judge(self._structure(kind), unread, batch.first_views(SAMPLE))
+            longer = np.flatnonzero(unread > MOST_PADDING)[:SAMPLE].tolist()
+            if longer and not self._differs:
+                views = batch.views()
+                self._judge(self._structure(kind), unread, [views[index] for index in longer])
 
         return judge
 

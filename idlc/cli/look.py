@@ -56,7 +56,6 @@ def doctor_command(**arguments: Any) -> None:
 
 @click.command("explain", epilog=options.example("idlc explain wide-string"))
 @click.argument("code", metavar="[CODE]", required=False, shell_complete=completion.codes)
-@click.option("--all", "everything", is_flag=True, help="Print all rules as one Markdown document.")
 def explain_command(**arguments: Any) -> int:
     """Explain what a rule reports and why, with a bad and a good example.
 

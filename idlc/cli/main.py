@@ -1,6 +1,8 @@
 """The entry point: commands of hooks at once, all others through click."""
 
+import contextlib
 import gc
+import os
 import sys
 from collections.abc import Sequence
 
@@ -14,6 +16,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     status = _run(sys.argv[1:])
     # the program ends: another garbage collection would take longer than checking a file
     gc.freeze()
+    if "zenoh" in sys.modules:
+        # threads of Zenoh that wait for Python, which has ended by then, take up to ten seconds
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(status)
     return status
 
 

@@ -72,7 +72,7 @@ def common(function: Command) -> Command:
 
 
 PACKAGE_EPILOG = options.example(
-    "idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com",
+    "idlc scaffold package my_robot --maintainer 'Ada <ada@example.com>'",
     "idlc scaffold package --interfaces my_msgs Drive srv/Ask",
     title="Examples",
 )
@@ -84,9 +84,12 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.command("package", epilog=PACKAGE_EPILOG)
 @click.argument("name", metavar="NAME")
 @click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
-@click.option("--description", default="", help="Description of the package, in one sentence.")
-@click.option("--maintainer", help="Name of the maintainer.  [default: git's user.name]")
-@click.option("--email", help="Email address of the maintainer.  [default: git's user.email]")
+@click.option(
+    "--maintainer",
+    metavar="'NAME <EMAIL>'",
+    default="",
+    help="Maintainer of the package.  [default: git's user.name and user.email]",
+)
 @click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
 @click.option(
     "--interfaces",

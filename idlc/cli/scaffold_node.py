@@ -82,7 +82,6 @@ def _role_options(function: Any) -> Any:
     is_flag=True,
     help="Handle signals while starting, replaced and cancelled goals, servers that do not answer.",
 )
-@click.option("--launch/--no-launch", default=True, help="Add the node to the launch file.")
 @common
 def command(**arguments: Any) -> int:
     """Create a node in the package that contains the working folder.

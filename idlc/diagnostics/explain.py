@@ -47,7 +47,7 @@ _HEADINGS = {
 _HEAD = f"""\
 # Rules
 
-This page explains every rule of idlc, with examples. `idlc explain --all` prints this page.
+This page lists every rule of idlc.
 
 An error marks a file that ROS 2 rejects. You cannot disable errors, but you can select warnings:
 

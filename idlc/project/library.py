@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -27,6 +27,8 @@ from idlc.project.settings import Scope
 #: The texts of interfaces by name.
 InterfaceTexts: TypeAlias = Mapping[ir.TypeName, Source]
 
+#: Folders by package.
+Folders: TypeAlias = Mapping[str, Sequence[Path]]
 #: Such files are written by ROS 2, and by people who do without interface files.
 IDL = ".idl"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -103,7 +105,8 @@ class Library:
     """Interfaces of all packages that can be found from a root, as `link.Library`.
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
-    a single file finds its neighbours, unless they are excluded. `texts` take precedence over
+    a single file finds its neighbours, unless they are excluded, or returns them when they are
+    needed. `texts` take precedence over
     files. Files that cannot be read are reported. `distro` is the distribution that files are read
     for. With `idl`, an .idl file that people wrote for ROS 2 defines what no interface file does.
     """
@@ -114,7 +117,7 @@ class Library:
         root: Root,
         report: Report,
         *,
-        own: Mapping[str, Sequence[Path]] | None = None,
+        own: Folders | Callable[[], Folders] | None = None,
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
         texts: InterfaceTexts = MappingProxyType({}),
@@ -128,7 +131,7 @@ class Library:
             Folder(path, root, idl=idl) for path in folders
         ]
         self._places += [InstallPrefix(path, distro) for path in prefixes.ament_prefixes()]
-        self._own = own or {}
+        self._find_own = own if callable(own) else lambda: own or {}
         self._exclude = exclude
         self._root = root
         self._known: dict[str, list[Path]] = {}
@@ -136,6 +139,11 @@ class Library:
         self._packages: list[str] | None = None
         self._listed: dict[str, list[tuple[ir.Kind, str]]] = {}
         self.report_to(report)
+
+    @cached_property
+    def _own(self) -> Folders:
+        """The folders of the packages being compiled."""
+        return self._find_own()
 
     def report_to(self, report: Report) -> None:
         """Report problems to another report from now on, also for interfaces read before."""

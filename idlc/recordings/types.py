@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -21,7 +22,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
-from idlc.project.library import InterfaceTexts, Library
+from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
@@ -229,18 +230,22 @@ class LocalTypes:
         self, scope: Scope, report: Report, texts: InterfaceTexts = MappingProxyType({})
     ) -> None:
         self.scope = scope
-        self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
             scope.include,
             scope.root,
             report,
-            own=self.near,
+            own=lambda: self.near,
             distro=scope.distro,
             texts=texts,
             idl=True,
         )
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
+
+    @cached_property
+    def near(self) -> Folders:
+        """The packages around here, which complete recordings do not need."""
+        return inputs.nearby_packages(self.scope.root)
 
     def model(self, package: str, names: Iterable[ir.TypeName]) -> Model:
         """Return the model of the interfaces of a package that are known and sound."""
@@ -305,9 +310,15 @@ class RecordedTypes:
                 path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
                 texts[name] = Source(path, "", topic.recording)
         self.texts = texts
-        scope, own, texts = local.scope, local.near, {**local.library.texts, **texts}
+        scope, texts = local.scope, {**local.library.texts, **texts}
         self.library = Library(
-            scope.include, scope.root, Report(), own=own, distro=scope.distro, texts=texts, idl=True
+            scope.include,
+            scope.root,
+            Report(),
+            own=lambda: local.near,
+            distro=scope.distro,
+            texts=texts,
+            idl=True,
         )
         self.topics = tuple(self._typed(version, report))
         compiler = Compiler(self.library)

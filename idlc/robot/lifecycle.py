@@ -96,7 +96,7 @@ class TransitionCallbackReturn(Enum):
 class ManagedEntity:
     """Something that follows the states of its node; callbacks get the state before."""
 
-    def _succeed(self, _state: LifecycleState) -> TransitionCallbackReturn:
+    def _succeed(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
         return TransitionCallbackReturn.SUCCESS
 
     on_configure = on_cleanup = on_shutdown = on_activate = on_deactivate = on_error = _succeed
@@ -107,12 +107,12 @@ class SimpleManagedEntity(ManagedEntity):
 
     _enabled = False
 
-    def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
         """Enable the entity."""
         self._enabled = True
         return TransitionCallbackReturn.SUCCESS
 
-    def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
         """Disable the entity."""
         self._enabled = False
         return TransitionCallbackReturn.SUCCESS

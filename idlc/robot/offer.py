@@ -22,6 +22,7 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.action.server": "ActionServer CancelResponse GoalResponse ServerGoalHandle",
     "rclpy.callback_groups": "CallbackGroup MutuallyExclusiveCallbackGroup ReentrantCallbackGroup",
     "rclpy.clock": "Clock ClockType",
+    "rclpy.clock_type": "ClockType",
     "rclpy.event_handler": (
         "PublisherEventCallbacks QoSLivelinessChangedInfo QoSMessageLostInfo"
         " QoSOfferedDeadlineMissedInfo QoSOfferedIncompatibleQoSInfo QoSPublisherMatchedInfo"
@@ -48,6 +49,7 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.qos": (
         "DurabilityPolicy HistoryPolicy LivelinessPolicy QoSDurabilityPolicy QoSHistoryPolicy"
         " QoSLivelinessPolicy QoSPolicyKind QoSProfile QoSReliabilityPolicy ReliabilityPolicy"
+        " qos_profile_action_status_default qos_profile_parameter_events qos_profile_parameters"
         " qos_profile_sensor_data qos_profile_services_default qos_profile_system_default"
     ),
     "rclpy.qos_overriding_options": (
@@ -82,7 +84,7 @@ _ALIASES = {
 }
 
 
-def _attribute(module: str, name: str) -> Any:
+def attribute(module: str, name: str) -> Any:
     """Return a name in a module of rclpy; raise AttributeError if idlc does not offer it."""
     full_name = f"{module}.{name}"
     if full_name in OFFERED:
@@ -113,7 +115,7 @@ class Importer(MetaPathFinder, Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Offer the names of a module."""
         names = OFFERED[module.__name__].split()
-        vars(module).update(__all__=names, __getattr__=partial(_attribute, module.__name__))
+        vars(module).update(__all__=names, __getattr__=partial(attribute, module.__name__))
 
 
 def not_offered(name: str) -> str:

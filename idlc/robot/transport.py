@@ -7,9 +7,10 @@ a queue, return at once, and never close anything. All `close` methods may be ca
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from idlc.robot.keys import Entity
+from idlc.runtime.typeinfo import structure_of
 
 
 class Sample(NamedTuple):
@@ -17,6 +18,24 @@ class Sample(NamedTuple):
 
     payload: bytes
     attachment: bytes
+
+
+#: Middlewares pad messages to a multiple of four bytes.
+MOST_PADDING = 3
+
+
+def unread_bytes(payload: bytes, message: Any) -> int:
+    """Return how many bytes of a payload its message does not have, 0 if it may be padding."""
+    try:
+        unread = len(payload) - len(message.serialize())
+    except (TypeError, ValueError):  # what others sent need not be valid
+        return 0
+    if unread <= MOST_PADDING:
+        return 0
+    from idlc.recordings.lengths import estimated_size
+
+    estimated = estimated_size(structure_of(type(message)), payload)
+    return 0 if 0 <= len(payload) - estimated <= MOST_PADDING else unread
 
 
 #: Receives each reply, and at the end once `None`.

@@ -40,7 +40,6 @@ class Settings(NamedTuple):
     dry_run: bool = False
     force: bool = False
     include: tuple[str, ...] = ()
-    launch: bool = True
 
 
 class Result(NamedTuple):

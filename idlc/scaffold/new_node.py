@@ -66,7 +66,6 @@ def node_entry(
     planned: Plan,
     texts: Mapping[str, str],
     *,
-    launch: bool = True,
     keys: Iterable[str] = (),
     folders: Mapping[str, bool] = MappingProxyType({}),
     home: str = "",
@@ -85,7 +84,7 @@ def node_entry(
         text = described[SETUP]
         described[SETUP] = interface.add_interfaces(text, node.package, own, folders)
     path, outcome = entry_points.add_console_script(described, script)
-    launch = launch and not planned.once
+    launch = not planned.once
     manifest = dependencies.add_dependencies(
         texts.get(MANIFEST, ""),
         depends=planned.packages,
@@ -185,9 +184,7 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
         wanted = paths(own, project.names("launch"), home)
         texts = {path: content for path in wanted if (content := project.text(path)) is not None}
         keys, present = project.keys(), folders(project.path)
-        entry = node_entry(
-            planned, texts, launch=settings.launch, keys=keys, folders=present, home=home
-        )
+        entry = node_entry(planned, texts, keys=keys, folders=present, home=home)
         entry = entry._replace(added={**files, **entry.added})
     edited = project.accepted(entry.edits)
     result = None if edited is None else project.write(entry.added, edited)

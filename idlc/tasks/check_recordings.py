@@ -59,6 +59,6 @@ def _check_lengths(path: str, scope: Scope, report: Report) -> None:
         if isinstance(message, OtherDefinitionWarning) and "bytes" in str(message):
             report.add(codes.RECORDED_HASH_DIFFERS.of(path, str(message)))
         if isinstance(message, MissingDefinitionWarning) and message.distro:
-            fitting = f"they fit that of ROS 2 {message.distro.title}"
+            fitting = f"they fit the type of ROS 2 {message.distro.title}"
             what = f"messages of `{message.topic}` do not fit the local type, but {fitting}"
             report.notes.append(f"{what}: check with `--distro {message.distro.name}`")

@@ -22,6 +22,8 @@ INTERVALS = 256
 NAME_WIDTH, NUMBER_WIDTH, HEIGHT = 32, 11, 8
 HEADING = "numbers over time"
 BLOCKS = " ▁▂▃▄▅▆▇█"
+#: Up to here, two integers are different numbers.
+EXACT = 1 << 53
 
 
 class Numbers:
@@ -48,6 +50,12 @@ class Numbers:
         self.count = total
         for sums, weights in zip(self.sums, (values, None), strict=True):
             sums += np.bincount(intervals, weights, INTERVALS)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether there are several numbers, and all of them are the same one."""
+        same = self.least == self.greatest and abs(self.least) < EXACT
+        return same and self.count > 1 and not self.others
 
     def double(self) -> None:
         """Make one interval of each two."""
@@ -144,7 +152,12 @@ class Preview:
         for name, texts in self.firsts.items():
             row = ", ".join(text[:width] for text in texts) + more
             yield f"{_fitted(name, names)}  {_fitted(row, max(1, width - names - 2))}".rstrip()
-        charted = {name: numbers for name, numbers in self.numbers.items() if numbers.count}
+        constants = {name: each.least for name, each in self.numbers.items() if each.is_constant}
+        if constants:
+            pairs = (f"{one_line(name)}={value:.15g}" for name, value in constants.items())
+            yield f"\nconstant: {', '.join(pairs)}"
+        counted = {name: numbers for name, numbers in self.numbers.items() if numbers.count}
+        charted = {name: counted[name] for name in counted if name not in constants}
         if not charted:
             return
         intervals = (self.end - self.origin) // self.interval + 1

@@ -46,7 +46,7 @@ def build(out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
-        for name in ("package.json", "package-lock.json", ".npmrc", "page.mjs"):
+        for name in ("package.json", "package-lock.json", ".npmrc", "page.mjs", "compile.mjs"):
             shutil.copy(HERE / name, work)
         _run("npm", "ci", cwd=work)
         words = ["page.mjs", "--bundle", "--minify", "--format=esm", f"--outfile={out / 'page.js'}"]
@@ -60,6 +60,8 @@ def build(out: Path) -> None:
         words += ["--require-hashes", *_PLATFORM, "--dest", "wheels", "--requirement", str(wheels)]
         _run(sys.executable, *words, cwd=work)
         _archive(out / "packages.zip", work / "wheels")
+        # the Python of the playground would take longer to compile modules than to import them
+        _run("node", "compile.mjs", str(out / "packages.zip"), cwd=work)
     names = sorted(path.name for path in out.iterdir() if path.name != "sw.mjs")
     digest = hashlib.sha256()
     for name in names:

@@ -6,13 +6,28 @@ import { lintGutter, setDiagnostics } from "@codemirror/lint";
 import { StateEffect, StateField } from "@codemirror/state";
 import { Decoration, EditorView, hoverTooltip, keymap, lineNumbers } from "@codemirror/view";
 
-const START = {
-  kind: "msg",
-  name: "Drive",
-  text: '# How to drive.\nstd_msgs/Header header\nfloat64 speed 0.5  # forward [m/s]\nstring<=16 frame "base"\nuint8[] gears [1, 2]\n',
+const DRIVE = '# How to drive.\nfloat64 speed 0.5  # forward [m/s]\nstring<=16 frame "base"\nuint8[] gears [1, 2]\n';
+// What a reader can choose; those with a task are tutorials of a minute.
+const EXAMPLES = {
+  "A message": { kind: "msg", name: "Drive", text: DRIVE.replace("float64", "std_msgs/Header header\nfloat64") },
+  "A service": { kind: "srv", name: "AddTwoInts", text: "int64 a\nint64 b\n---\nint64 sum\n" },
+  "An action": { kind: "action", name: "Countdown", text: "int32 start 10\n---\nbool done\n---\nint32 current\n" },
+  "Tutorial: mend a mistake": {
+    kind: "msg", name: "Scan", text: "# One turn of the scanner.\n\nfloat64 stamp\nflot64[<=3] ranges  # [m]\nfloat32 angle  # [deg]\n",
+    task: "Point at the marked word, and write float64. Then read what idlc says about [deg], and write [rad].",
+  },
+  "Tutorial: see the bytes": {
+    kind: "msg", name: "Drive", text: DRIVE, tab: "bytes",
+    task: "Change the value of speed on the right, and watch its eight bytes. Then write float32 on the left: four bytes are left.",
+  },
+  "Tutorial: break a message": {
+    kind: "msg", name: "Drive", text: DRIVE, tab: "breaking",
+    task: "Rename speed to velocity: old and new nodes can no longer talk. Undo it, and add a field at the end.",
+  },
 };
+const START = EXAMPLES["A message"];
 const TABS = {
-  python: "Python class", bytes: "Bytes", hash: "Type hash", schema: "JSON Schema", breaking: "What breaks",
+  bytes: "Bytes", python: "Python class", hash: "Type hash", schema: "JSON Schema", breaking: "What breaks",
 };
 const COLOURS = 6;
 const LONGEST_LINK = 100_000;
@@ -57,7 +72,7 @@ const ready = new Promise((resolve, reject) => {
   };
 });
 
-const state = { tab: "python", values: {}, ...linked() };
+const state = { tab: "bytes", values: {}, ...linked() };
 const offset = (doc, { line, character }) => Math.min(doc.line(Math.min(line + 1, doc.lines)).from + character, doc.length);
 const position = (doc, at) => {
   const line = doc.lineAt(at);
@@ -132,6 +147,7 @@ const view = new EditorView({
 const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 
 let isOpen = false;
+let isReady = false;
 async function changed() {
   if (!isOpen) return;
   const text = view.state.doc.toString();
@@ -172,6 +188,7 @@ function refresh() {
 }
 
 async function draw() {
+  if (!isOpen) return;
   const { tab } = state;
   const answer = await ask(tab, tab === "bytes" ? { values: state.values } : {});
   if (tab !== state.tab) return;
@@ -250,6 +267,20 @@ $("tabs").onkeydown = (event) => {
   document.querySelector("[role=tab][aria-selected=true]").focus();
 };
 
+$("example").append(element("option", { textContent: "Choose…", value: "" }), ...Object.keys(EXAMPLES).map((textContent) => element("option", { textContent })));
+$("example").onchange = () => {
+  const example = EXAMPLES[$("example").value];
+  if (!example) return;
+  Object.assign(state, { kind: example.kind, values: {} });
+  $("kind").value = example.kind;
+  $("name").value = state.name = example.name;
+  $("task").textContent = example.task ?? "";
+  select(example.tab ?? state.tab);
+  isOpen = false; // the text is of the document that opens next
+  view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: example.text } });
+  if (isReady) open(example.text);
+  else state.before = example.text;
+};
 $("kind").value = state.kind;
 $("name").value = state.name;
 $("kind").onchange = $("name").onchange = () => {
@@ -275,5 +306,6 @@ const times = await ready.catch((error) => {
   throw error;
 });
 document.body.dataset.bare = times.bare;
+isReady = true;
 await open(state.before);
 document.body.dataset.first = performance.now();

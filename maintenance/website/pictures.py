@@ -1,6 +1,7 @@
 """Pictures of a terminal: what commands really print, as SVG for dark and light screens.
 
-The commands of a scene appear one after the other, except for readers who asked for less motion.
+The commands of a scene appear one after the other, except on phones and for readers who asked for
+less motion.
 
 `IDLC_REFRESH=docs/pictures pytest tests/website` makes those in docs/pictures anew.
 """
@@ -10,10 +11,12 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from contextlib import ExitStack, suppress
 from html import escape
 from pathlib import Path
 from typing import NamedTuple
@@ -22,6 +25,13 @@ _ROOT = Path(__file__).parents[2]
 _SIZE, _WIDTH, _HEIGHT, _EDGE = 14, 8.43, 20, 18
 #: Seconds between two commands.
 _PAUSE = 1.6
+#: The nodes of a scene meet each other, on this machine, and nobody else.
+_OWN_DOMAIN = {"ROS_DOMAIN_ID": "229", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+#: `python -m idlc.robot` refuses to take the place of an rclpy that is installed.
+_WITHOUT_ROS = """import importlib.util as util
+find = util.find_spec
+util.find_spec = lambda name, package=None: None if name == "rclpy" else find(name, package)
+"""
 #: What the codes of a terminal mean, in the style sheet of a picture.
 _CLASSES = {
     "1": "b",
@@ -62,26 +72,57 @@ def style(font: str, more: str = "") -> str:
 
 _MOTION = """
 @keyframes appear { from { opacity: 0 } }
-@media (prefers-reduced-motion: no-preference) { g { animation: appear .3s backwards } }"""
+@media (prefers-reduced-motion: no-preference) and (min-width: 560px) {
+g { animation: appear .3s backwards } }"""
 _CODE = re.compile(r"\x1b\[([\d;]*)m")
 
 
 class Scene(NamedTuple):
-    """Files in an empty folder, and commands that are typed there."""
+    """Files in an empty folder, and commands that are typed there.
+
+    A command that ends with `&` runs until the end. Its first line is shown if it is `answering`.
+    """
 
     files: Mapping[str, str]
     commands: tuple[str, ...]
+    answering: tuple[str, ...] = ()
 
 
+_DRIVE = {"interfaces/msg/Drive.msg": "float64 speed 0.5  # forward [m/s]\n"}
+_NODE = """import rclpy
+from my_robot.msg import Drive
+
+rclpy.init()
+node = rclpy.create_node("{0}")
+{1}
+rclpy.spin(node)
+"""
+_TALKER = """publisher = node.create_publisher(Drive, "drive", 10)
+timer = node.create_timer(0.5, lambda: publisher.publish(Drive(speed=1.5)))"""
+_LISTENER = 'node.create_subscription(Drive, "drive", lambda drive: print(drive, flush=True), 10)'
 SCENES = {
     "first": Scene(
-        {"interfaces/msg/Drive.msg": "flot64 speed 0.5  # forward [m/s]\n"},
+        _DRIVE,
         (
-            "idlc check interfaces",
-            "sed -i s/flot64/float64/ interfaces/msg/Drive.msg",
+            "cat interfaces/msg/Drive.msg",
             "idlc gen interfaces -o my_robot",
+            "python -c 'from my_robot.msg import Drive; print(Drive(speed=1.5))'",
             "python -c 'from my_robot.msg import Drive; print(Drive().serialize().hex())'",
         ),
+    ),
+    "robot": Scene(
+        {
+            **_DRIVE,
+            "talker.py": _NODE.format("talker", _TALKER),
+            "listener.py": _NODE.format("listener", _LISTENER),
+        },
+        (
+            "idlc gen interfaces -o my_robot",
+            "python -m idlc.robot talker.py &",
+            "python -m idlc.robot listener.py &",
+            "idlc echo dds /drive --count 1",
+        ),
+        ("python -m idlc.robot listener.py &",),
     ),
     "check": Scene(
         {
@@ -112,31 +153,45 @@ SCENES = {
 def picture(scene: Scene) -> str:
     """Return a scene as SVG."""
     steps = []
-    with tempfile.TemporaryDirectory() as folder:
-        for path, text in scene.files.items():
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as running:
+        for path, text in {**scene.files, ".start/sitecustomize.py": _WITHOUT_ROS}.items():
             (Path(folder) / path).parent.mkdir(parents=True, exist_ok=True)
             (Path(folder) / path).write_text(text, encoding="utf-8")
         for command in scene.commands:
-            lines = [f"\x1b[2m$\x1b[0m \x1b[1m{command}\x1b[0m", *_printed(command, folder)]
-            steps.append(lines)
+            process = _started(command.removesuffix("&"), folder)
+            running.callback(_ended, process)
+            assert process.stdout is not None
+            if not command.endswith("&"):
+                printed = process.stdout.read()
+            else:
+                printed = process.stdout.readline() if command in scene.answering else ""
+            lines = printed.rstrip("\n").splitlines()
+            steps.append([f"\x1b[2m$\x1b[0m \x1b[1m{command}\x1b[0m", *lines])
     return _svg(steps)
 
 
-def _printed(command: str, folder: str) -> list[str]:
+def _started(command: str, folder: str) -> subprocess.Popen[str]:
     python = shlex.quote(sys.executable)
     programs = f'idlc() {{ {python} -m idlc "$@"; }}; python() {{ {python} "$@"; }}\n'
-    environment = {**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "", "PYTHONPATH": str(_ROOT)}
-    done = subprocess.run(
+    paths = f"{folder}/.start{os.pathsep}{_ROOT}"
+    environment = {**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "", "PYTHONPATH": paths}
+    return subprocess.Popen(
         ["/bin/sh", "-c", programs + command],
         cwd=folder,
-        env=environment,
+        env={**environment, **_OWN_DOMAIN},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         encoding="utf-8",
-        check=False,
+        start_new_session=True,
     )
-    return done.stdout.rstrip("\n").splitlines()
+
+
+def _ended(process: subprocess.Popen[str]) -> None:
+    """End a command, and what its shell started."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def _svg(steps: list[list[str]]) -> str:

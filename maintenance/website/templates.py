@@ -49,7 +49,7 @@ _FILES = {
 }
 #: Lines of further outputs of one template that are shown.
 _MOST_LINES = 120
-_PERSON = ("--maintainer", "Ada", "--email", "ada@example.com")
+_PERSON = ("--maintainer", "Ada <ada@example.com>")
 #: Commands and the folder that each runs in. A template shows what it wrote in the first of them.
 _COMMANDS = [
     (".", ("gen", "demo", "-o", "out/demo")),

@@ -184,3 +184,34 @@ def test_upgrades_refuse_messages_of_another_version(name, tmp_path, monkeypatch
         assert main(["upgrade", path, "--to", "new/demo_msgs", "-o", "out"]) == 1
         assert "does not read" in capsys.readouterr().err
         assert not (tmp_path / "out").exists()
+
+
+#: A definition, a message of it, and the size that `serialize_message` of Fast DDS gives to it.
+ESTIMATED = {
+    "empty sequences": ("float64[] a\nfloat64[] b\n", cdr("<II", 0, 0), 20),
+    "wstring": ("wstring w\nuint8 b\n", cdr("<IIB", 1, 65, 2), 17),
+    "nested": ("Inner[2] i\n", cdr("<IIII", 0, 5, 0, 6), 24),
+    "drift": ("int64[] a\nint32 b\nfloat64 c\n", cdr("<Iid", 0, 1, 2.5), 28),
+}
+INNER = f"{'=' * 80}\nMSG: demo_msgs/Inner\nuint64[] n\nint32 m\n"
+
+
+@pytest.mark.parametrize("case", ESTIMATED)
+def test_bytes_that_a_serializer_has_estimated_prove_nothing(case, tmp_path, capsys):
+    text, message, size = ESTIMATED[case]
+    text += INNER if case == "nested" else ""
+    for number, extra in enumerate((size - len(message), size - len(message) + 4)):
+        tail = b"\xa5" * extra
+        channels = [(("demo_msgs/msg/W", text), at, message + tail) for at in range(3)]
+        path = write(tmp_path / f"{number}.mcap", channels)
+        for command in (["check"], ["columns", "--format", "csv"]):
+            assert main([*command, str(path)]) == 0
+            assert ("IDL654" in "".join(capsys.readouterr())) == bool(number)
+        with warnings.catch_warnings(record=True) as caught, idlc.Recording(path) as recording:
+            warnings.simplefilter("always")
+            assert len(list(recording["/t"])) == 3
+        assert len(caught) == number
+        (tmp_path / "new" / f"{number}").mkdir(parents=True)
+        words = ["upgrade", str(path), "-o", str(tmp_path / "new" / f"{number}")]
+        assert main(words) == number
+        capsys.readouterr()

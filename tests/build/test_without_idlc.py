@@ -11,7 +11,7 @@ from idlc.cli.main import main
 from tests.support.files import write_all
 from tests.support.programs import clean_environment, ended
 
-SCAFFOLD = ["scaffold", "package", "demo", "--maintainer", "A", "--email", "a@example.com"]
+SCAFFOLD = ["scaffold", "package", "demo", "--maintainer", "A <a@example.com>"]
 FILES = {
     "msg/Drive.msg": "float64 speed\n",
     "msg/Stop.msg": "bool now\n",

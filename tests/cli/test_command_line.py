@@ -1,5 +1,6 @@
 """The command line as people and programs meet it: in its own process, from outside."""
 
+import gc
 import json
 import os
 import re
@@ -47,6 +48,20 @@ def idlc(*words: str, **options) -> subprocess.CompletedProcess:
 
 def stamps(folder: str) -> dict[str, int]:
     return {str(path): path.stat().st_mtime_ns for path in Path(folder).rglob("*.py")}
+
+
+def test_no_thread_of_zenoh_delays_the_end(monkeypatch, capsys):
+    statuses = []
+    monkeypatch.setattr(sys, "argv", ["idlc", "--version"])
+    monkeypatch.setattr("os._exit", statuses.append)
+    monkeypatch.delitem(sys.modules, "zenoh", raising=False)
+    for loaded in (False, True):
+        if loaded:
+            monkeypatch.setitem(sys.modules, "zenoh", sys)
+        assert main() == 0
+        gc.unfreeze()
+        assert statuses == [0] * loaded
+    assert capsys.readouterr().out == f"idlc {__version__}\n" * 2
 
 
 @pytest.mark.parametrize("option", ["--version", "-V"])

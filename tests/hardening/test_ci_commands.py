@@ -99,7 +99,7 @@ ROWS = {
         ["scaffold", "node", ALL, "--role", "publish"],
     ],
     "doctor": [["doctor"]],
-    "explain": [["explain", ALL], ["explain", "--all"]],
+    "explain": [["explain", ALL]],
 }
 
 

@@ -320,7 +320,7 @@ def test_a_real_edit_is_still_noticed(here, capsys):
 
 
 def test_scaffolding_again_after_a_checkout_changes_nothing(here, capsys):
-    words = ["scaffold", "package", "demo", "--description", "x", "--license", "Apache-2.0"]
+    words = ["scaffold", "package", "demo", "--maintainer", "x", "--license", "Apache-2.0"]
     assert main(words) == 0
     for path in Path("demo").rglob("*"):
         if path.is_file():

@@ -9,6 +9,7 @@ from mcap.writer import Writer
 
 import idlc
 from idlc.cli.main import main
+from idlc.project import inputs
 from idlc.recordings.containers.source import RecordingError
 
 BODY = b"\0\1\0\0" + struct.pack("<iI", 7, 8)
@@ -105,3 +106,17 @@ def test_a_package_of_idl_files_defines_recorded_types(inside, include, tmp_path
     assert main(["upgrade", str(path), "-I", folder, "-o", str(tmp_path / "up")]) == 0
     with idlc.Recording(tmp_path / "up" / "a.mcap") as opened:
         assert opened["/x"].to_arrow()["a"].to_pylist() == [7]
+
+
+def test_complete_recordings_need_no_packages_around_here(tmp_path, monkeypatch):
+    calls = []
+    monkeypatch.setattr(inputs, "nearby_packages", lambda root: calls.append(root) or {})
+    with idlc.Recording(recording(tmp_path / "a.mcap", "int32 a\nuint32 b\n")) as opened:
+        assert opened["/x"].to_columns()["b"].tolist() == [8]
+    assert calls == []
+    with (
+        idlc.Recording(recording(tmp_path / "a.db3", None)) as opened,
+        pytest.raises(RecordingError, match="does not define `demo_msgs/msg/X`"),
+    ):
+        opened["/x"].to_columns()
+    assert calls

@@ -70,7 +70,10 @@ def test_definitions_with_another_hash_are_refused(address, capsys):
     with running(address) as robot:
         robot.describe_types(lie)
         robot.publisher("/drive", "demo_msgs/msg/Drive")
-        assert main(["gen", address, "-o", "out"]) == 0
+        robot.publisher("/words", "std_msgs/msg/String")
+        # the others are there all the same
+        assert main(["gen", address, "-o", "out"]) == 1
+    assert Path("out/std_msgs").exists()
     assert not Path("out/demo_msgs").exists()
     err = capsys.readouterr().err
     assert "idlc does not read `/drive`: the robot does not define `demo_msgs/msg/Drive`" in err
@@ -150,6 +153,18 @@ def test_messages_are_printed_and_malformed_ones_counted(robot, address, capsys,
     }
     assert out == expected[style]
     assert "1 malformed messages" in err
+
+
+@pytest.mark.parametrize("unread", [3, 4, 12])
+def test_messages_that_are_longer_than_their_type_are_noted_once(robot, address, capsys, unread):
+    string = standard("std_msgs/msg/String")
+    publish = robot.publisher("/words", "std_msgs/msg/String", LATCHED)
+    for word in ("one", "two"):
+        publish(string(data=word).serialize() + bytes(unread))
+    assert main(["echo", address, "words", "--count", "2"]) == 0
+    out, err = capsys.readouterr()
+    assert out == "{data: one}\n---\n{data: two}\n---\n"
+    assert err.count(f"has {unread} bytes that std_msgs/msg/String does not read") == (unread > 3)
 
 
 def test_fields_are_printed_without_the_rest(robot, address, capsys):

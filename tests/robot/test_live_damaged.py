@@ -5,6 +5,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 
 from idlc.api.recording import Recording
 from idlc.cli.main import main
@@ -144,6 +145,39 @@ def test_no_silent_node_costs_a_message_or_a_second(router, capsys, monkeypatch)
         assert sum(1 for _ in recording["/words"].messages()) == 2000
     for robot in (quiet, babbling, fast):
         robot.close()
+
+
+def test_the_time_without_a_robot_is_in_the_file(router, capsys, monkeypatch):
+    """A robot that goes away and comes back, as behind a router that restarts."""
+    robots = [Robot(router)]
+    publish = robots[0].publisher("/words", "std_msgs/msg/String", LATCHED)
+    publish(standard("std_msgs/msg/String")(data="before"))
+    run, note, steps = Recorder.run, Recorder._note_gap, iter(range(1000))
+
+    def went_away(recorder, is_there):
+        note(recorder, is_there)
+        if not is_there and len(robots) == 1:
+            robots.append(Robot(router))
+            robots[1].publisher("/words", "std_msgs/msg/String", LATCHED)
+        elif is_there and len(robots) == 2:
+            robots.append(None)  # the gap is over
+
+    def is_over():
+        if next(steps) == 20:
+            robots[0].close()
+        return robots[-1] is None
+
+    monkeypatch.setattr("idlc.robot.live.recorder.LOOK", 0.05)
+    monkeypatch.setattr("idlc.robot.live.recorder.TICK", 0.05)
+    monkeypatch.setattr(Recorder, "_note_gap", went_away)
+    monkeypatch.setattr(Recorder, "run", lambda recorder, _: run(recorder, is_over))
+    assert main(["record", router, "-o", "a.mcap"]) == 0
+    assert "note: the robot was not there for " in capsys.readouterr().err
+    with Path("a.mcap").open("rb") as file:
+        (gap,) = make_reader(file).iter_metadata()
+    begin, end = int(gap.metadata["from"]), int(gap.metadata["to"])
+    assert (gap.name, begin < end) == ("idlc gap", True)
+    robots[1].close()
 
 
 def test_an_empty_recording_fails_and_names_the_domain_with_nodes(router, capsys):

@@ -84,8 +84,21 @@ def test_mutated_messages_requests_and_responses_are_ignored(node, capsys, monke
     assert client.ignored > 1000
     assert all(len(each.replies) + each.dropped == 1 for each in requests)
     assert service._open == set()
-    # one warning for all that could not be decoded
-    assert capsys.readouterr().err.count("[WARN]") == 1
+    # one warning for all that could not be decoded, and one of a first message that is too long
+    said = capsys.readouterr().err
+    assert said.count("idlc ignores data") == 1
+    assert said.count("[WARN]") == 1 + said.count("bytes that std_srvs/srv/SetBool")
+
+
+def test_a_message_that_is_longer_than_its_type_is_reported_once(node, capsys):
+    received = []
+    subscription = node.create_subscription(String, "/longer", received.append, 10)
+    attachment = pack_attachment(1, 2, GID)
+    for _ in range(2):
+        payload = String(data="x").serialize() + bytes(8)
+        subscription._receive(Sample(payload, attachment))
+    spin_until(lambda: len(received) == 2, node)
+    assert capsys.readouterr().err.count("has 8 bytes that std_msgs/msg/String does not") == 1
 
 
 def test_a_flood_is_bounded(node):

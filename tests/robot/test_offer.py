@@ -18,7 +18,7 @@ from idlc.robot.offer import OFFERED
 from tests.robot.conftest import environ_of
 from tests.robot.nodes import LONG, node_at
 from tests.support.paths import EXAMPLE, GOLDEN, ROOT
-from tests.support.waiting import wait_for
+from tests.support.waiting import WORK, wait_for
 
 #: The installed packages that idlc uses here; the environment may have ROS 2's as well.
 USED = "_yaml click jinja2 lark markupsafe msgspec numpy typing_extensions xxhash yaml zenoh"
@@ -106,7 +106,7 @@ def file(name):
 def test_the_demo(start):
     """`make demo ROS=no` but for its environment."""
     demo = start(ROOT / "examples/demo.py")
-    assert demo.ends() == 0, demo.output
+    assert demo.process.wait(WORK) == 0, demo.output
     assert demo.output.splitlines()[-1].startswith("All of it agreed"), demo.output
     assert "Traceback" not in demo.output
 
@@ -179,6 +179,82 @@ def test_parameters_of_the_command_line(start, tmp_path):
     program = start("tuned.py", "--ros-args", "-p", "gain:=2.5", cwd=tmp_path)
     assert program.ends() == 0, program.output
     assert program.output == "gain 2.5 tuned\n"
+
+
+#: A node of each kind that ROS 2's examples have, in one program; it prints what rclpy lets it.
+KINDS = """\
+import time
+
+import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.event_handler import (
+    PublisherEventCallbacks, QoSPublisherMatchedInfo, SubscriptionEventCallbacks
+)
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.impl.logging_severity import LoggingSeverity
+from rclpy.lifecycle import Node, Publisher, State, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos_overriding_options import QosCallbackResult, QoSOverridingOptions
+from std_msgs.msg import String
+
+
+class Managed(Node):
+    def on_configure(self, state: State) -> TransitionCallbackReturn:
+        print("configuring from", state.label)
+        accept = lambda qos: QosCallbackResult(successful=qos.depth == 7)
+        self.words: Publisher = self.create_lifecycle_publisher(
+            String, "words", 10, event_callbacks=PublisherEventCallbacks(matched=self.match),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(callback=accept),
+        )
+        return super().on_configure(state)
+
+    def match(self, info: QoSPublisherMatchedInfo):
+        print("matched", info.current_count)
+
+
+rclpy.init()
+node = Managed("managed", enable_logger_service=True)
+heard, raw = [], []
+executor = MultiThreadedExecutor()
+executor.add_node(node)
+node.trigger_configure()
+node.words.publish(String(data="nobody hears this"))
+group = MutuallyExclusiveCallbackGroup()
+node.create_subscription(String, "words", heard.append, 10, callback_group=group,
+                         event_callbacks=SubscriptionEventCallbacks(message_lost=print))
+node.create_subscription(String, "words", raw.append, 10, raw=True)
+while node.words.get_subscription_count() < 2:
+    executor.spin_once(0.05)
+node.trigger_activate()
+node.declare_parameter("gain", 1)
+node.add_pre_set_parameters_callback(lambda known: [*known, Parameter("gain", value=3)])
+node.add_post_set_parameters_callback(lambda known: print("set", [each.value for each in known]))
+node.set_parameters([Parameter("gain", value=2)])
+condition = node.create_guard_condition(lambda: print("triggered"))
+condition.trigger()
+node.words.publish(String(data="hello"))
+node.get_logger().set_level(LoggingSeverity.ERROR)
+end = time.monotonic() + 30
+while not (heard and raw) and time.monotonic() < end:
+    executor.spin_once(0.05)
+for _ in range(20):
+    executor.spin_once(0.01)
+print(heard[0].data, raw[0][-6:], node.trigger_shutdown().name)
+executor.shutdown()
+rclpy.shutdown()
+"""
+
+
+def test_nodes_of_each_kind_of_the_examples(start, tmp_path):
+    (tmp_path / "kinds.py").write_text(KINDS, encoding="utf-8")
+    override = "qos_overrides./words.publisher.depth:=7"
+    program = start("kinds.py", "--ros-args", "-p", override, cwd=tmp_path)
+    assert program.ends() == 0, program.output
+    # threads print the callbacks of one group in order, but not those of several
+    lines = program.output.splitlines()
+    assert lines[0] == "configuring from unconfigured"
+    assert {"matched 2", "set [2, 3]", "triggered"} <= {*lines}
+    assert lines[-1] == r"hello b'hello\x00' SUCCESS"
 
 
 @pytest.mark.parametrize(

@@ -247,7 +247,7 @@ def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
     assert main(["scaffold", "package", "demo"]) == 0
     (maintainer,) = parse_package(tmp_path / "demo").maintainers
     assert (maintainer.name, maintainer.email) == ("Ada <L> & 'co'", "ada@example.com")
-    assert main(["scaffold", "package", "other", "--maintainer", "Bo", "--email", "b@c.de"]) == 0
+    assert main(["scaffold", "package", "other", "--maintainer", "Bo <b@c.de>"]) == 0
     assert "Bo" in (tmp_path / "other/setup.py").read_text()
 
 
@@ -300,7 +300,6 @@ def test_the_launch_file_is_for_nodes_that_stay(package):
     launch = package / "launch" / "demo_launch.py"
     before = launch.read_text()
     assert main(["scaffold", "node", "once", "--client", "std_srvs/Empty:reset"]) == 0
-    assert main([*NODE, "--no-launch"]) == 0
     assert launch.read_text() == before
     assert main(["scaffold", "node", "keeper", "--lifecycle", "--timer", "1"]) == 0
     after = launch.read_text()
@@ -334,8 +333,7 @@ def test_the_next_command_is_one_that_works(package, capsys, monkeypatch, tmp_pa
 
 CHOICES = {
     "--maintainer": ("Lena & K", "maintainer="),
-    "--email": ("lena@example.com", "maintainer_email="),
-    "--description": ("Sorts 'parcels' & <letters>", "description="),
+    "--maintainer ": ("<lena@example.com>", "maintainer_email="),
     "--license": ("MIT", "license="),
 }
 
@@ -348,7 +346,7 @@ def test_what_an_existing_package_says_otherwise_is_reported(option, tmp_path, m
     before = tree(tmp_path)
     capsys.readouterr()
     value, argument = CHOICES[option]
-    assert main([*words, option, value]) == 1
+    assert main([*words, option.strip(), value]) == 1
     assert tree(tmp_path) == before
     said = capsys.readouterr().err
     assert "nothing was written" in said
@@ -361,7 +359,7 @@ def test_what_an_existing_package_says_otherwise_is_reported(option, tmp_path, m
         (tmp_path / "demo" / file).write_text("\n".join(lines) + "\n")
     if option == "--license":
         (tmp_path / "demo/LICENSE").unlink()
-    assert main([*words, option, value]) == 0
+    assert main([*words, option.strip(), value]) == 0
     parse_package(tmp_path / "demo").validate()
 
 

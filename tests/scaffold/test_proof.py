@@ -53,6 +53,31 @@ def test_code_of_the_package_that_does_not_run_here_is_no_failure(init, is_obsta
     assert bool(proof.failure) != is_obstacle
 
 
+@pytest.mark.parametrize(
+    ("script", "is_refused"),
+    [("a = odd:main.py", False), ("a = odd.main", True), ("a = odd", True)],
+)
+def test_a_wrong_command_of_the_package_is_no_failure(script, is_refused, tmp_path, monkeypatch):
+    """pip refuses to install a package with such an entry point, and builds it."""
+    wheel = tmp_path / "odd-1-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("odd/__init__.py", "class A: pass\n")
+        archive.writestr(
+            "odd-1.dist-info/METADATA", "Metadata-Version: 2.1\nName: odd\nVersion: 1\n"
+        )
+        archive.writestr("odd-1.dist-info/entry_points.txt", f"[console_scripts]\n{script}\n")
+        archive.writestr(
+            "odd-1.dist-info/WHEEL",
+            "Wheel-Version: 1.0\nGenerator: x\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        )
+        archive.writestr("odd-1.dist-info/RECORD", "")
+    monkeypatch.setattr("idlc.scaffold.proof._built", lambda *_: ("", wheel))
+    monkeypatch.setattr("idlc.scaffold.proof.missing_tool", lambda _: "")
+    proof = prove(tmp_path, "setuptools.build_meta", ("odd.A",), tmp_path)
+    assert proof.failure == ""
+    assert ("entry point of the package" in proof.obstacle) == is_refused
+
+
 def test_a_build_that_installs_fewer_files_fails(tmp_path, monkeypatch):
     wheel = tmp_path / "odd.whl"
     with zipfile.ZipFile(wheel, "w") as archive:

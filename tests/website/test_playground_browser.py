@@ -141,6 +141,23 @@ def test_tabs(playground):
     playground.until("#view code", "00 01 00 00 00 00 00 00 00 00 00 40")
 
 
+def test_examples_and_tutorials(playground):
+    choose = (
+        "(name) => {const list = document.querySelector('#example'); list.value = name;"
+        " list.dispatchEvent(new Event('change'))}"
+    )
+    playground.open()
+    for name, problem, view in (
+        ("A service", "No problems", "a"),
+        ("Tutorial: mend a mistake", "1 error", "The text has errors"),
+        ("Tutorial: break a message", "No problems", "No breaking changes yet"),
+    ):
+        playground.page.run(f"({choose})({name!r})")
+        playground.until("#status", problem)
+        playground.until("#view", view)
+    playground.until("#task", "Rename speed")
+
+
 def test_a_link_shares_the_text(playground):
     playground.open()
     playground.at_end()
@@ -170,7 +187,7 @@ def test_it_works_offline_after_the_first_visit(playground):
     playground.server.socket.close()
     playground.open()
     playground.until("#status", "No problems")
-    playground.until("#view", "class Drive")
+    playground.until("#view", "header.stamp.sec")
 
 
 def test_hostile_text_stays_text(playground):

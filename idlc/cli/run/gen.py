@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from idlc.cli import options, output
+from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Paint, counted, summary
 from idlc.diagnostics.text import one_line
-from idlc.project.find import Stamp, is_path, list_files, snapshot, stamps
+from idlc.project.find import Stamp, is_address, is_path, list_files, snapshot, stamps
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope, settings_here
 from idlc.recordings.find import files, split_recordings
@@ -43,7 +44,16 @@ def once(request: GenOptions, style: str) -> int:
             sys.stdout.writelines([_line(package, request.check, paint) for package in packages])
     else:
         _document(report, style, packages, check=request.check)
-    return output.status(report)
+    return max(output.status(report), _lacks_types(report))
+
+
+def _lacks_types(report: Report) -> bool:
+    """Return whether nodes of a robot did not send the definitions of some topics."""
+    return any(
+        problem.code == codes.MISSING_DEFINITION.id and "does not define" in problem.message
+        for problem in report
+        if is_address(problem.where[0])
+    )
 
 
 def _document(

@@ -226,7 +226,7 @@ def _compile(preparation: Preparation, within: str, report: Report) -> tuple[Gen
 def _untested(proof: Proof, layout: Layout, missing: Sequence[str] | None) -> Iterator[str]:
     """Yield what was not tested, and why; `missing` are packages that the classes import."""
     if proof.obstacle:
-        yield f"the import, because {proof.obstacle}"
+        yield proof.obstacle
     if missing is not None:
         names = ", ".join(f"`{name}`" for name in missing) or "a package"
         verb = "are" if len(missing) > 1 else "is"

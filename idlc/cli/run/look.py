@@ -13,7 +13,7 @@ import click
 
 from idlc.cli import output
 from idlc.cli.streams import colours
-from idlc.diagnostics.explain import close_name, document, overview, page
+from idlc.diagnostics.explain import close_name, overview, page
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Paint, counted
 from idlc.diagnostics.text import one_line
@@ -87,11 +87,8 @@ def doctor(style: str, scope: Scope, report: Report) -> None:  # noqa: ARG001 - 
 WIDTH = 88
 
 
-def explain(code: str | None, everything: bool) -> int:
+def explain(code: str | None) -> int:
     """Show a page, all pages, or the list of the codes; return the exit status."""
-    if everything:
-        sys.stdout.write(document())
-        return 0
     if code is None:
         paint = output.painter(sys.stdout)
         *lines, advice = overview()

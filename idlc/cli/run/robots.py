@@ -102,7 +102,7 @@ def echo(
         sys.stderr.write(f"note: {one_line(reason)}\n")
         sys.stderr.flush()
 
-    arrived = arriving(session, ends, read, count, report, complain)
+    arrived = arriving(session, ends, read, count, report, complain, kind)
     with suppress(KeyboardInterrupt):
         for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):
             output.lines(text, style, sys.stdout)

@@ -65,6 +65,8 @@ def new_package(
         raise click.UsageError(str(error)) from error
     report, root = Report(), Root.here()
     build_type = "ament_cmake" if interfaces_only else "ament_python"
+    maintainer, _, email = arguments["maintainer"].partition("<")
+    arguments |= {"maintainer": maintainer.strip(), "email": email.strip(" >")}
     requested = _requested(name, arguments, build_type, root)
     shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
@@ -78,7 +80,7 @@ def _requested(name: str, arguments: dict[str, Any], build_type: str, root: Root
     """Return the package with the defaults for what was not set."""
     return Package(
         name,
-        arguments["description"] or f"The package {name}.",
+        f"The package {name}.",
         arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
         arguments["email"] or setting("user.email", root.base) or "you@example.com",
         arguments["licence"] or LICENSES[0],
@@ -188,7 +190,7 @@ def interactive() -> bool:
 
 def new_node(name: str, owners: Sequence[tuple[str, int]], **arguments: Any) -> int:
     """Create a node and return the exit status; `owners` are the roles of the --qos options."""
-    shared = ("dry_run", "force", "include", "launch")
+    shared = ("dry_run", "force", "include")
     settings = Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle", "robust")
     try:

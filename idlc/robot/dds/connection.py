@@ -72,9 +72,8 @@ class Connection:
 
     def _run(self) -> None:
         while self._is_open:
-            wait = self._due() - time.monotonic()
             begin = time.monotonic()
-            ready = self._selector.select(max(wait, 0))
+            ready = self._selector.select(max(self._due() - begin, 0))
             # to look for another packet would let other threads run first
             most = 1 if time.monotonic() - begin > _NAP else _AT_ONCE
             for key, _ in ready:

@@ -20,6 +20,7 @@ from idlc.robot.live.connect import TICK, Inbox, find_endpoints, own_endpoint
 from idlc.robot.live.types import definitions
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 from idlc.robot.session import Session
+from idlc.robot.transport import unread_bytes
 
 #: Reasons that are printed while messages arrive.
 MOST_REASONS = 10
@@ -82,6 +83,15 @@ def find_version(
             report.notes += [str(warning.message) for warning in caught]
 
 
+def _check_length(
+    kind: Any, end: Entity, payload: bytes, complain: Callable[[str], object]
+) -> None:
+    """Complain if a message is longer than its type."""
+    if unread := unread_bytes(payload, kind.deserialize(payload)):
+        what = f"a message of `{end.name}` has {unread:,} bytes that {end.type} does not read"
+        complain(f"{what}: the publisher has another version of the type")
+
+
 def messages(
     session: Session,
     ends: Sequence[Entity],
@@ -89,11 +99,12 @@ def messages(
     count: int | None,
     report: Report,
     complain: Callable[[str], object] = lambda _: None,
+    kind: Any = None,
 ) -> Iterator[Any]:
     """Yield what is read of the messages of a topic as they arrive, until there are `count`.
 
     Malformed ones count. They and lost ones are noted; `complain` is called at once with each new
-    reason why messages are malformed.
+    reason why messages are malformed, and if the first one is longer than its `kind`.
     """
     inbox, done, malformed = Inbox(), 0, 0
     reasons = set[str]()
@@ -116,6 +127,9 @@ def messages(
                         reasons.add(reason)
                         complain(reason)
                     continue
+                is_first = done - malformed == 1
+                if kind is not None and is_first:
+                    _check_length(kind, ends[0], payload, complain)
                 yield message
         finally:
             for number, adjective in ((malformed, "malformed"), (inbox.lost, "lost")):

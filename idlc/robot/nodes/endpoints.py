@@ -19,7 +19,7 @@ from idlc.robot.nodes.events import EventCallbacks, Events
 from idlc.robot.nodes.executor import Ready
 from idlc.robot.nodes.interfaces import M, interface_of
 from idlc.robot.qos import HistoryPolicy, QoSProfile, qos_profile
-from idlc.robot.transport import Closeable, Sample
+from idlc.robot.transport import Closeable, Sample, unread_bytes
 from idlc.runtime.names import DecodeError
 from idlc.runtime.typeinfo import is_copy
 
@@ -41,6 +41,7 @@ class Endpoint(Ready):
     kind: ClassVar[Kind]
     deadline: Timer | None = None
     events: Events | None = None
+    _is_measured = False
 
     def __init__(
         self, node: Any, name: str, kind: Any, qos: QoSProfile | int, group: Any, call: Any = None
@@ -98,14 +99,24 @@ class Endpoint(Ready):
         return payload
 
     def decode(self, kind: Any, payload: bytes) -> Any:
-        """Return a message; warn once in a while and return `None` if it is not one."""
+        """Return a message; warn once in a while and return `None` if it is not one.
+
+        Warns if the first message has bytes that its type does not read.
+        """
         try:
-            return kind.deserialize(payload)
+            message = kind.deserialize(payload)
         except DecodeError as error:
             self.ignored += 1
             text = f"`{self.topic_name}`: idlc ignores data that is not {self.interface.name}: "
             self.node.get_logger().warning(text + one_line(str(error)), throttle_duration_sec=10.0)
             return None
+        if not self._is_measured:
+            self._is_measured = True
+            if unread := unread_bytes(payload, message):
+                text = f"`{self.topic_name}`: a message has {unread:,} bytes that "
+                text += f"{self.interface.name} does not read: the sender has another version of it"
+                self.node.get_logger().warning(text)
+        return message
 
 
 class Bounded(Generic[T]):

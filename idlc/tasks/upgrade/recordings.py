@@ -31,7 +31,7 @@ from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import definition_text, interface_of
 from idlc.recordings.find import is_recording
-from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
+from idlc.recordings.lengths import SAMPLE, check_lengths, first_longer
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
     DefinedTopic,
@@ -454,8 +454,8 @@ def converted(
     A message that is longer than its type is an error.
     """
     unread = unread_bytes(structure, payloads)
-    if unread is not None and (unread > MOST_PADDING).any():
-        number = int((unread > MOST_PADDING).argmax())
+    number = None if unread is None else first_longer(structure, unread, payloads)
+    if number is not None:
         what = f"{unread[number]:,} bytes that the definition of {structure.name} does not read"
         raise RecordingError(f"`{topic}` at {times[number]} ns has {what}")
     return way.many(payloads, lambda number: f"`{topic}` at {times[number]} ns")

@@ -33,7 +33,7 @@ setup(
     zip_safe=False,
     maintainer="Ada's team",
     maintainer_email='ada@example.com',
-    description='Drives & more',
+    description='The package demo.',
     license='Apache-2.0',
     extras_require={'test': ['pytest']},
     entry_points={
