@@ -7,9 +7,9 @@ from idlc.version import __version__
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from idlc.api.arrays import to_numpy
-    from idlc.api.load import load
     from idlc.api.reader import patch, reader
     from idlc.api.recording import Recording
+    from idlc.api.sources import load
     from idlc.api.upgrade import upgrade
     from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
 
@@ -32,7 +32,7 @@ _MODULES = {
     "Batch": "recordings.batches",
     "Recording": "api.recording",
     "delimited": "recordings.batches",
-    "load": "api.load",
+    "load": "api.sources",
     "patch": "api.reader",
     "reader": "api.reader",
     "split_delimited": "recordings.batches",

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from idlc.diagnostics.report import Report
 from idlc.project.find import is_address
 from idlc.project.root import Root
+from idlc.recordings.load import LoadedPackages, loaded
 from idlc.recordings.types import RecordingTopics, read_topics
 
 
@@ -18,3 +21,14 @@ def read_source(
 
     robot = read_robot(path, report)
     return None if robot is None else RecordingTopics(robot)
+
+
+def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> LoadedPackages:
+    """Compile interfaces, and return their classes.
+
+    `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
+    package that is known here. `include` are folders in which other packages are looked for first.
+    The classes can be pickled, and read wherever idlc is installed; type checkers do not know them,
+    so programs are better off with `idlc gen`.
+    """
+    return loaded(what, include=include, distro=distro, read=read_source)

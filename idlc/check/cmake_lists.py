@@ -19,7 +19,7 @@ from idlc.check.manifest import (
 )
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Label
-from idlc.diagnostics.source import Span
+from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import closest
 from idlc.model import catalog
 from idlc.model.distros import Distro
@@ -76,36 +76,17 @@ def _named_files(facts: Facts, model: Model, script: Script) -> Iterator[Diagnos
         return
     named = {posixpath.normpath(item.text): item for item in script.files if not item.is_pattern}
     patterns = {item.text for item in script.files if item.is_pattern}
-    sources = {f"{own.name.kind}/{own.name.name}.{own.name.kind}": own.source for own in model.own}
-    missing = {
+    unnamed = {
         key: source
-        for key, source in sources.items()
-        if facts.files.get(key) == key
-        and _PLAIN.fullmatch(key)
-        and key not in named
-        and not any(_fits(key, pattern) for pattern in patterns)
+        for key, source in _files_at_their_keys(facts, model).items()
+        if key not in named and not any(_fits(key, pattern) for pattern in patterns)
     }
-    existing = facts.interfaces | {*facts.files.values()}
-    absent = {
-        path: item
-        for path, item in named.items()
-        if item.certain and path.endswith(_FILES) and path not in existing
-    }
-    for path, item in {} if script.writes else absent.items():
-        if path.startswith(("/", "..")) or ":" in path:
-            continue
-        near = _nearest(path, missing) if len(absent) * len(missing) < _COMPARED else None
-        hint, edits = "remove it, or create the file", _removal(item.place)
-        if near and item.text in item.place.text:
-            del missing[near]
-            hint = f"did you mean `{near}`?"
-            edits = (Edit(item.place, item.place.text.replace(item.text, near)),)
-        message = f"no such file: `{path}`"
-        yield codes.MISSING_INTERFACE_FILE.at(item.place, message, hint=hint, edits=edits)
+    if not script.writes:
+        yield from _absent_files(facts, named, unnamed)
     call = script.generating[-1].span
     name = Span(call.source, call.start, call.start + len(GENERATE))
     last_files = _last_files(script.files)
-    for key, source in missing.items():
+    for key, source in unnamed.items():
         if source is not None:
             yield codes.INTERFACE_NOT_GENERATED.at(
                 Span(source, 0, 0),
@@ -114,6 +95,42 @@ def _named_files(facts: Facts, model: Model, script: Script) -> Iterator[Diagnos
                 labels=(Label(name, "generates others"),),
                 edits=_addition(key, last_files),
             )
+
+
+def _files_at_their_keys(facts: Facts, model: Model) -> dict[str, Source | None]:
+    """Return the interface files in folders such as msg/, with names that need no quotes."""
+    sources = {f"{own.name.kind}/{own.name.name}.{own.name.kind}": own.source for own in model.own}
+    return {
+        key: source
+        for key, source in sources.items()
+        if facts.files.get(key) == key and _PLAIN.fullmatch(key)
+    }
+
+
+def _absent_files(
+    facts: Facts, named: Mapping[str, Item], unnamed: dict[str, Source | None]
+) -> Iterator[Diagnostic]:
+    """Yield a problem for each named file that does not exist.
+
+    Takes a file out of `unnamed` if the fix of a problem names it.
+    """
+    existing = facts.interfaces | {*facts.files.values()}
+    absent = {
+        path: item
+        for path, item in named.items()
+        if item.certain and path.endswith(_FILES) and path not in existing
+    }
+    for path, item in absent.items():
+        if path.startswith(("/", "..")) or ":" in path:
+            continue
+        near = _nearest(path, unnamed) if len(absent) * len(unnamed) < _COMPARED else None
+        hint, edits = "remove it, or create the file", _removal(item.place)
+        if near and item.text in item.place.text:
+            del unnamed[near]
+            hint = f"did you mean `{near}`?"
+            edits = (Edit(item.place, item.place.text.replace(item.text, near)),)
+        message = f"no such file: `{path}`"
+        yield codes.MISSING_INTERFACE_FILE.at(item.place, message, hint=hint, edits=edits)
 
 
 def _nearest(path: str, keys: Iterable[str]) -> str | None:
@@ -216,8 +233,7 @@ def _found_with(names: Iterable[str], distro: Distro) -> set[str]:
 
 def _unused(facts: Facts, model: Model, script: Script) -> dict[str, list[Span]]:
     """Return the packages that a package of interfaces alone names in vain, and where."""
-    is_idl = any(path.endswith(".idl") for path in facts.interfaces)
-    if facts.modules or facts.native or is_idl or not facts.whole or has_gaps(model):
+    if not _is_of_interfaces_alone(facts) or has_gaps(model):
         return {}
     used = {name.package for name in model.interfaces} | IMPLICIT
     mentions = Counter(word for call in script.commands for word in call.words)
@@ -231,6 +247,12 @@ def _unused(facts: Facts, model: Model, script: Script) -> dict[str, list[Span]]
         if catalog.is_standard(package) and not is_named:
             unused[package] = places
     return unused
+
+
+def _is_of_interfaces_alone(facts: Facts) -> bool:
+    """Return whether a package has no code, and idlc reads all of its interfaces."""
+    has_idl = any(path.endswith(".idl") for path in facts.interfaces)
+    return facts.whole and not (facts.modules or facts.native or has_idl)
 
 
 def _exported_runtime(script: Script) -> Iterator[Diagnostic]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -47,14 +47,15 @@ class _Context(click.Context):
 class LazyGroup(click.Group):
     """Commands in groups, each with its line in the overview.
 
-    The module of a command is `modules` with its name; `synonyms` are words of other tools with
-    the commands that are suggested for them.
+    The module of a command is `modules` with its name, or with a name in `homes` if it has several
+    `MEMBERS`; `synonyms` are words of other tools with the commands that are suggested for them.
     """
 
     context_class = _Context
     groups: Mapping[str, Mapping[str, str]]
     overview: Mapping[str, str]
     modules: str
+    homes: Mapping[str, str]
     synonyms: Mapping[str, str]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
@@ -65,7 +66,10 @@ class LazyGroup(click.Group):
         """Return a command by name; this imports it."""
         if cmd_name not in self.overview:
             return None
-        command: click.Command = import_module(f"{self.modules}{cmd_name}").command
+        home = self.homes.get(cmd_name)
+        module = import_module(f"{self.modules}{home or cmd_name}")
+        commands: Sequence[click.Command] = module.MEMBERS if home else (module.command,)
+        command = next(command for command in commands if command.name == cmd_name)
         command.context_class = _Context
         return command
 
@@ -92,7 +96,7 @@ class LazyGroup(click.Group):
                 formatter.write_dl([(name.ljust(width), text) for name, text in commands.items()])
 
 
-#: Each command with its line in the overview, in groups; its module is `idlc.cli.<name>`.
+#: Each command with its line in the overview, in groups.
 GROUPS = {
     "Start": {
         "init": "Set up a package, library or workspace.",
@@ -126,7 +130,12 @@ GROUPS = {
     },
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
-
+#: Commands whose module contains several.
+HOMES = {
+    **dict.fromkeys(("check", "fmt", "lsp"), "check"),
+    **dict.fromkeys(("list", "docs", "doctor", "explain"), "look"),
+    **dict.fromkeys(("echo", "call", "record", "router"), "robots"),
+}
 
 #: Words of other tools, with the names of the commands here.
 SYNONYMS = {
@@ -154,6 +163,7 @@ class App(LazyGroup):
     groups = GROUPS
     overview = COMMANDS
     modules = "idlc.cli."
+    homes = HOMES
     synonyms = SYNONYMS
 
     def invoke(self, ctx: click.Context) -> object:

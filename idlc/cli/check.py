@@ -1,4 +1,4 @@
-"""`idlc check`."""
+"""Commands that hooks and editors start: `check`, `fmt` and `lsp`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from idlc.cli import completion, options
 @options.packages
 @options.distros
 @options.report_style
-def command(paths: tuple[str, ...], **arguments: Any) -> int:
+def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
     """Check interface files and the packages that contain them.
 
     PATH is a file or folder. If PATH is a package.xml, CMakeLists.txt, setup.py, setup.cfg or
@@ -48,7 +48,7 @@ def command(paths: tuple[str, ...], **arguments: Any) -> int:
     all rules.
     """
     from idlc.check.select import is_selector, similar_selector
-    from idlc.cli.direct import check_paths
+    from idlc.cli.run.check import check_paths
 
     for word in f"{arguments['select'] or ''},{arguments['ignore'] or ''}".split(","):
         if word and not is_selector(word):
@@ -58,3 +58,50 @@ def command(paths: tuple[str, ...], **arguments: Any) -> int:
     if arguments["diff"] and arguments["style"] != "text":
         raise click.UsageError("--diff writes text; omit --format")
     return check_paths(paths, **arguments)
+
+
+@click.command(
+    "fmt",
+    epilog=options.example(
+        "mkdir -p demo/msg",
+        "echo 'float64   speed 0.5# [m/s]' > demo/msg/Drive.msg",
+        "idlc fmt demo",
+    ),
+)
+@click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
+@click.option("--check", is_flag=True, help="Write nothing; fail if a file would change.")
+@click.option(
+    "--diff", is_flag=True, help="Write nothing; show the changes and fail if there are any."
+)
+@options.exclude
+def fmt_command(**arguments: Any) -> int:
+    """Normalize whitespace and keep deliberate alignment.
+
+    idlc keeps single spaces between words, and two spaces before a comment. It keeps wider gaps if
+    they align words of the same kind, or if all lines of a block have them. Otherwise, it aligns
+    the word with the lines above and below, or moves it next to the previous word. It puts spaces
+    on both sides of `=` or on neither side, and keeps at most two consecutive empty lines. If idlc
+    changes a file, it also removes trailing whitespace and adds a missing final newline.
+
+    Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
+    as in `idlc check`.
+    """
+    from idlc.cli.run.fmt import run
+
+    return run(**arguments)
+
+
+@click.command("lsp", epilog=options.example("idlc lsp --check"))
+@click.option("--check", is_flag=True, help="Print the server's capabilities as JSON, and exit.")
+def lsp_command(check: bool) -> int:
+    """Run the language server on standard input and output. Your editor starts it.
+
+    The server implements the Language Server Protocol 3.17. It reads [tool.idlc] and the editor's
+    settings. The language id of .msg, .srv and .action files is `rosmsg`.
+    """
+    from idlc.cli.run.check import serve_editor, show_capabilities
+
+    return show_capabilities() if check else serve_editor()
+
+
+MEMBERS = (check_command, fmt_command, lsp_command)

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from idlc.cli import completion, options
-
-if TYPE_CHECKING:
-    from idlc.recordings.aligned.table import Summary
-    from idlc.tasks.columns import Work
 
 
 @click.command(
@@ -122,88 +115,13 @@ if TYPE_CHECKING:
 @options.include
 @options.distro
 @click.option("--force", is_flag=True, help="Replace existing files.")
-def command(
-    subject: str,
-    fields: str | None,
-    conditions: tuple[str, ...],
-    grid: str | None,
-    how: tuple[str, ...],
-    tolerance: tuple[str, ...],
-    clock: tuple[str, ...],
-    **arguments: Any,
-) -> int:
+def command(**arguments: Any) -> int:
     """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.
 
     REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc reads
     several recordings as one recording. Without TOPIC, it reads all topics. In the table of a
     topic, each row is a message. The columns are the recording time and the fields.
     """
-    from idlc.api.conditions import Condition
-    from idlc.cli import output
-    from idlc.cli.streams import written_as
-    from idlc.diagnostics.ci import Form
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-    from idlc.recordings.find import expand, in_order, split_recordings
-    from idlc.tasks.columns import ColumnsOptions, columns
+    from idlc.cli.run.columns import run
 
-    work = None
-    if grid is not None:
-        has_others = fields is not None or conditions or arguments["nested"]
-        work = _table_of(grid, (how, tolerance, clock), bool(has_others), arguments)
-    elif how or tolerance or clock:
-        raise click.UsageError("--how, --tolerance and --clock need --grid")
-    report = Report()
-    names = None if fields is None else tuple(name.strip() for name in fields.split(","))
-    try:
-        arguments["conditions"] = tuple(map(Condition.parse, conditions))
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
-    recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
-    paths = tuple(in_order([*expand(subject), *recordings]))
-    request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
-    form = Form.EXACT if request.style == "csv" else Form.TEXT
-    with output.progress_bar(sys.stderr) as update, written_as(form, sys.stdout):
-        written = columns(request, report, update, work)
-    width = shutil.get_terminal_size((100, 24)).columns
-    previews = [file.preview.text(width) for file in written if file.preview]
-    output.texts(("".join(f"{line}\n" for line in lines) for lines in previews), "text", sys.stdout)
-    for file in written:
-        if not file.preview:
-            rows = "messages" if grid is None else "rows"
-            sys.stderr.write(f"{file.topic}: {file.rows:,} {rows} → {file.path}\n")
-    output.show(report, "text", sys.stderr)
-    output.notes(report, sys.stderr)
-    return output.status(report)
-
-
-def _table_of(
-    grid: str, ways: tuple[tuple[str, ...], ...], has_others: bool, arguments: dict[str, Any]
-) -> Work:
-    """Return what writes the table of --grid, or report options that it does not have."""
-    from idlc.tasks.aligned import Grid, write_aligned
-
-    if has_others or not arguments["datetimes"]:
-        hint = "select fields after a colon: `/imu:orientation`"
-        raise click.UsageError(f"--grid has no --fields, --where, --nested, --no-datetimes; {hint}")
-    to_stdout = arguments["style"] == "text" or (arguments["out"] == "-" and sys.stdout.isatty())
-    return partial(write_aligned, Grid(grid, *ways), partial(_show_fit, to_stdout))
-
-
-def _show_fit(is_output: bool, summaries: list[Summary]) -> None:
-    """Show how well topics fit the clock of a table."""
-    from idlc.diagnostics.text import one_line
-
-    head = ("rate", "longest gap", "mean age", "max age", "no value", "unordered")
-    width = max([5, *(len(one_line(fit.topic)) for fit in summaries)])
-    lines = [f"{'topic':{width}}  messages  {'  '.join(title.rjust(11) for title in head)}\n"]
-    for fit in summaries:
-        numbers = (
-            f"{fit.rate:.4g} Hz",
-            *(f"{seconds * 1000:.4g} ms" for seconds in fit[3:6]),
-            f"{fit.missing:,} rows",
-            f"{fit.unordered:,}",
-        )
-        cells = "  ".join(number.rjust(11) for number in numbers)
-        lines.append(f"{one_line(fit.topic):{width}}  {fit.messages:8,}  {cells}\n")
-    (sys.stdout if is_output else sys.stderr).write("".join(lines))
+    return run(**arguments)

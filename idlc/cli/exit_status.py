@@ -36,10 +36,7 @@ def _status_of(command: Callable[[], object]) -> int:
     except OSError as error:  # its path may be too long
         reason = f"cannot be opened: {(error.strerror or str(error)).lower()}"
         reason = "is gone" if isinstance(error, FileNotFoundError) else reason
-        from idlc.cli.output import usage_error
-
-        usage_error(f"the working folder {reason}", "change to another folder with `cd`")
-        return 2
+        return _usage_error(f"the working folder {reason}", "change to another folder with `cd`")
     try:
         status = command()
         sys.stdout.flush()
@@ -50,25 +47,24 @@ def _status_of(command: Callable[[], object]) -> int:
         _discard_output()
         return PIPE_CLOSED
     except SpeakingError:
-        from idlc.cli.output import usage_error
-
         message = "the output contains a line that a CI system would obey as a command"
-        usage_error(message, "write the output to a file, for example with `> FILE`")
-        return 2
+        return _usage_error(message, "write the output to a file, for example with `> FILE`")
     except OSError as error:
         if error.errno not in _FULL or error.filename:
             return _internal(error)
         _discard_output()
-        from idlc.cli.output import usage_error
-
-        reason = os.strerror(error.errno).lower()
-        usage_error(
-            f"cannot write the output: {reason}", "free space on the disk, and run it again"
-        )
-        return 2
+        message = f"cannot write the output: {os.strerror(error.errno).lower()}"
+        return _usage_error(message, "free space on the disk, and run it again")
     except Exception as error:
         return _internal(error)
     return status if isinstance(status, int) else 0
+
+
+def _usage_error(message: str, hint: str) -> int:
+    from idlc.cli.output import usage_error
+
+    usage_error(message, hint)
+    return 2
 
 
 def _discard_output() -> None:
@@ -79,16 +75,11 @@ def _discard_output() -> None:
 
 def _internal(error: Exception) -> int:
     """Show an unexpected exception as IDL901."""
-    from idlc.cli import output
-    from idlc.compiler.compiler import internal_error
-    from idlc.diagnostics.report import Report
+    from idlc.cli.output import show_internal_error
 
     if os.environ.get("IDLC_DEBUG") == "1":
         import traceback
 
         traceback.print_exception(type(error), error, error.__traceback__)
-    report = Report()
-    hint = "this is a bug in idlc, please report it; IDLC_DEBUG=1 shows where it happened"
-    report.add(internal_error(error, "", hint))
-    output.show(report, "text", sys.stderr)
+    show_internal_error(error)
     return INTERNAL

@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from idlc.cli import options
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-    from idlc.scaffold.init import Draft, Preparation
-    from idlc.scaffold.layouts import Layout
-
-TEST = "The test runs the package's own build."
-CONSENT = f"Write these changes, compile and test? {TEST}"
 
 
 @click.command(
@@ -34,7 +21,7 @@ CONSENT = f"Write these changes, compile and test? {TEST}"
     help="Also write the configuration with which this service checks the interfaces.",
 )
 @click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
-def command(path: str, service: str | None, yes: bool) -> int:
+def command(**arguments: Any) -> int:
     """Set up ROS 2 interfaces in a package, library or workspace.
 
     PATH is a ROS 2 package (ament_python or ament_cmake), a Python library with any build backend,
@@ -46,195 +33,6 @@ def command(path: str, service: str | None, yes: bool) -> int:
     temporary folder, and imports the classes from that folder. The installation runs the package's
     own build. A second run changes nothing, and tests again.
     """
-    from idlc.cli import output
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-    from idlc.scaffold.init import continuous, obtaining, recommendation
-    from idlc.scaffold.layouts import layout_of
+    from idlc.cli.run.init import run
 
-    try:
-        root = Root.at(Path(path))
-    except (OSError, ValueError) as error:
-        raise click.UsageError(f"no such folder: {path!r}") from error
-    path = f"./{path}" if path.startswith("-") else path  # for the commands to paste
-    report = Report()
-    layout = layout_of(root, report)
-    if layout is None:
-        output.show(report, "text", sys.stderr)
-        sys.stderr.write("nothing was written\n")
-        return output.status(report)
-    planned, status = _plans(layout, root, report)
-    checks = continuous(service, layout, others := Report()) if service else None
-    if service:
-        output.show(others, "text", sys.stderr)
-        status = max(status, output.status(others))
-    extras = [*filter(None, (checks, recommendation(root, report) if planned else None))]
-    drafts = [(each.draft, each.out) for each in planned] + [(draft, "") for draft in extras]
-    changed = [draft for draft, _ in drafts if draft.reasons]
-    for draft, out in drafts:
-        _show(draft, out, root)
-    if changed and not yes:
-        if not (sys.stdin.isatty() and sys.stdout.isatty()):
-            words = ["init", *[path] * (path != "."), *options.typed("path"), "--yes"]
-            note = f"note: --yes writes these changes, compiles and tests. {TEST}\n"
-            sys.stdout.write(f"{note}nothing was written; next: {_pasted(words)}\n")
-            return max(status, 1)
-        if not click.confirm(CONSENT, default=False):
-            return max(status, 1)
-    for draft in extras:
-        status = max(status, _write(draft, obtaining(draft) if draft is checks else []))
-    for preparation in planned:
-        status = max(status, _finish(preparation, root, again=yes))
-    if not changed and not status:
-        sys.stdout.write("nothing to do\n")
-    if planned and not status:
-        start = [] if path == "." else [f"cd {shlex.quote(path)}"]
-        is_one = not layout.packages
-        words = ["check", *["gen"] * is_one, *["breaking"] * (is_one and planned[0].compares())]
-        commands = [*start, *(_pasted([word]) for word in words)]
-        sys.stdout.writelines(f"next: {line}\n" for line in commands)
-    return status
-
-
-def _pasted(words: list[str]) -> str:
-    """Return a command of idlc for a shell."""
-    from idlc.cli import output
-
-    return shlex.join([*output.program().split(), *words])
-
-
-def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation], int]:
-    """Say what stands in a folder, plan its packages, and return the plans and the exit status."""
-    from idlc.cli import output
-    from idlc.diagnostics.report import Report
-    from idlc.diagnostics.terminal import counted
-    from idlc.diagnostics.text import one_line
-    from idlc.project.find import list_files
-    from idlc.project.root import Root
-    from idlc.project.settings import load_settings, scope
-    from idlc.scaffold.changes import Settings
-    from idlc.scaffold.init import prepare, siblings
-    from idlc.scaffold.layouts import layout_of
-
-    planned, status = [], 0
-    if layout.packages:
-        sys.stdout.write(f"{layout.sentence('')}\n")
-    for folder in layout.packages or (layout.folder,):
-        report, own = Report() if layout.packages else report, Root.at(folder)
-        exclude = scope(load_settings(own, Report())).exclude
-        number = len(list_files((".",), own, Report(), exclude).files)
-        within = one_line(f"{root.shown(folder)}: ") if layout.packages else ""
-        if not own.base.is_relative_to(root.base):  # by a link, which may be somebody else's
-            sys.stdout.write(f"{within}skipped, because it is outside this folder\n")
-            continue
-        if layout.packages and not number:
-            sys.stdout.write(f"{within}skipped, because it has no interfaces\n")
-            continue
-        inner = layout_of(own, report) if layout.packages else layout
-        if inner:
-            interfaces = counted(number, "interface") if number else "no interfaces yet"
-            sys.stdout.write(f"{within}{one_line(inner.sentence(interfaces))}\n")
-        preparation = prepare(inner, Settings(own), report, siblings(inner)) if inner else None
-        sys.stdout.flush()
-        output.show(report, "text", sys.stderr)
-        if preparation is None:
-            sys.stderr.write(f"{within}nothing was written\n")
-        else:
-            planned.append(preparation)
-            sys.stdout.writelines(f"note: {one_line(note)}\n" for note in preparation.notes)
-        status = max(status, output.status(report), int(preparation is None))
-    return planned, status
-
-
-def _show(draft: Draft, out: str, root: Root) -> None:
-    """Show the changes to a package, with the reason for each, and as a diff."""
-    from idlc.diagnostics.report import Report
-    from idlc.diagnostics.text import one_line, printable
-
-    if not draft.reasons:
-        return
-    within = "" if draft.path == root.base else f"{one_line(root.shown(draft.path))}/"
-    reasons = [f"{path}: {reason}" for path, reason in draft.reasons.items()]
-    reasons += [f"{out}/: the output of `idlc gen`"] * bool(out)
-    sys.stdout.writelines(["\n", *(f"{within}{one_line(reason)}\n" for reason in reasons), "\n"])
-    result = draft.write(Report(), dry_run=True)
-    sys.stdout.writelines(printable(line) for line in (result.diff if result else ()))
-    sys.stdout.flush()
-
-
-def _write(draft: Draft, next_commands: Sequence[str]) -> int:
-    """Write a file that belongs to no package, and return the exit status.
-
-    The next commands belong into the file's repository.
-    """
-    from idlc.cli import output
-    from idlc.diagnostics.report import Report
-    from idlc.project.root import Root
-
-    report = Report()
-    if not draft.reasons:
-        return 0
-    is_written = draft.write(report) is not None
-    output.show(report, "text", sys.stderr)
-    if is_written and next_commands:
-        folder = Root.here().shown(draft.path)
-        start = [] if draft.path == Path.cwd() else [f"cd {shlex.quote(folder)}"]
-        sys.stdout.writelines(f"next: {line}\n" for line in (*start, *next_commands))
-    return output.status(report)
-
-
-def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
-    """Write and compile a package, prove it, and return the exit status.
-
-    A package that did not change is proved `again`, because an earlier proof may have failed.
-    """
-    from idlc.cli import output
-    from idlc.diagnostics import codes
-    from idlc.diagnostics.report import Report
-    from idlc.diagnostics.terminal import counted
-    from idlc.diagnostics.text import one_line
-    from idlc.scaffold.init import generate
-    from idlc.scaffold.layouts import SETUP
-    from idlc.scaffold.proof import installed_files, prove
-
-    report = Report()
-    folder = preparation.layout.folder
-    within = "" if folder == root.base else f"{one_line(root.shown(folder))}: "
-    draft, backend = preparation.draft, preparation.layout.backend
-    is_edited = SETUP in draft.reasons and draft.project.has(SETUP)
-    before = installed_files(folder, backend) if is_edited and backend else frozenset()
-    is_written = draft.write(report) is not None
-    done = generate(preparation, report) if is_written else ()
-    output.show(report, "text", sys.stderr)
-    if not done:
-        sys.stderr.write(f"{within}idlc did not generate the classes\n")
-        return output.status(report) or 1
-    for package in done:
-        if package.written or package.removed:
-            count = counted(package.interfaces, "interface")
-            sys.stdout.write(f"{within}compiled {count} into {one_line(package.out)}\n")
-    if not (draft.reasons or again):
-        return 0
-    if not preparation.is_packed:
-        sys.stdout.write(f"{within}not tested, because the build omits the classes (see above)\n")
-        return 1
-    sys.stdout.flush()
-    source = preparation.source()
-    unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
-    is_complete = not done[0].needs and all(problem.code != unimportable for problem in report)
-    classes = preparation.classes if is_complete else ()
-    proof = prove(folder, backend, classes, source, before)
-    if proof.tried:
-        result = "test failed: " if proof.failure else "test passed: "
-        sys.stdout.write(f"{within}{result}{proof.tried}\n")
-    sys.stdout.writelines(f"  {line}\n" for line in proof.failure.splitlines())
-    if proof.obstacle:
-        sys.stdout.write(f"{within}not tested: {proof.obstacle}\n")
-    if not is_complete:
-        names = ", ".join(f"`{name}`" for name in done[0].needs) or "a package"
-        verb = "are" if len(done[0].needs) > 1 else "is"
-        why = f"because the classes import {names}, which {verb} not installed"
-        sys.stdout.write(f"{within}not tested: the import, {why}\n")
-    if preparation.layout.kind == "ament_cmake":
-        sys.stdout.write(f"{within}not tested: the CMake build (`colcon build`)\n")
-    return int(bool(proof.failure))
+    return run(**arguments)

@@ -40,13 +40,13 @@ def _dispatch(words: list[str]) -> int:
         return status_of(lambda: print(f"idlc {__version__}"))
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
         # hooks call this for each commit, and importing click takes longer than checking a file
-        from idlc.cli.direct import check_paths
+        from idlc.cli.run.check import check_paths
 
         return status_of(lambda: check_paths(tuple(words[1:])))
     if words[:1] == ["lsp"]:
         words = [word for word in words if not _is_added_by_editor(word)]
     if words == ["lsp"]:
-        from idlc.cli.direct import serve_editor
+        from idlc.cli.run.check import serve_editor
 
         return status_of(serve_editor)
     from idlc.cli.app import run

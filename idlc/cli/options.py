@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import partial, wraps
 from typing import Any, TypeVar
 
 import click
@@ -135,18 +134,10 @@ def scoped(
             distro: str | None = None,
             **arguments: Any,
         ) -> int:
-            from idlc.cli import output
-            from idlc.project.settings import scope, settings_here
+            from idlc.cli.run.look import in_scope
 
-            settings, report = settings_here()
-            text = None
-            if despite_errors or not report.had_errors:
-                where = scope(settings, package, include, exclude, distro)
-                text = command(**arguments, scope=where, report=report)
-            output.show(report, "text", sys.stderr)
-            output.notes(report, sys.stderr)
-            sys.stdout.write(text or "")
-            return output.status(report)
+            scoping = (package, include, exclude, distro)
+            return in_scope(partial(command, **arguments), scoping, despite_errors=despite_errors)
 
         for option in reversed(options):
             option(run)
@@ -164,17 +155,8 @@ def on_robot(command: Callable[..., bool | None]) -> Callable[..., int]:
 
     @wraps(command)
     def run(address: str, include: tuple[str, ...], **arguments: Any) -> int:
-        from idlc.cli import output
-        from idlc.project.settings import settings_here
-        from idlc.robot.live.connect import connected
+        from idlc.cli.run.robots import with_session
 
-        settings, report = settings_here()
-        folders, failed = (*include, *settings.include), False
-        with connected(address, report) as session:
-            if session and not report.had_errors:
-                failed = bool(command(session=session, report=report, include=folders, **arguments))
-        output.show(report, "text", sys.stderr)
-        output.notes(report, sys.stderr)
-        return output.status(report) or int(failed)
+        return with_session(partial(command, **arguments), address, include)
 
     return click.argument("address", metavar="ADDRESS")(include(run))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
@@ -14,7 +14,7 @@ from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.ci import Form
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Paint
-from idlc.diagnostics.text import one_line, visible
+from idlc.diagnostics.text import display_width, one_line, visible
 from idlc.version import __version__
 
 #: The text in our console scripts.
@@ -34,6 +34,23 @@ def program() -> str:
 
 
 WIDTH = 30
+#: Characters of a type hash that people compare.
+SHORT = len("RIHS01_") + 8
+#: How text says whether the type of this machine is that of the recording or robot.
+INSTALLED = {"same": "same", "differs": "different", "unknown": "-"}
+#: The titles of columns that are aligned at the right.
+NUMBERS = frozenset({"messages", "rate", "size"})
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield the lines of a table; its titles are a row, too."""
+    widths = [max(map(display_width, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = []
+        for title, text, width in zip(head, row, widths, strict=True):
+            space = " " * (width - display_width(text))
+            cells.append(space + text if title in NUMBERS else text + space)
+        yield "  ".join(cells).rstrip() + "\n"
 
 
 @contextmanager
@@ -71,6 +88,16 @@ def show(report: Report, style: str, stream: TextIO, *, fixable: bool = False) -
     else:
         blocks = terminal.text(report, colour=colours(stream), fixable=fixable)
         stream.writelines([f"{block}\n" for block in blocks])
+
+
+def show_internal_error(error: Exception) -> None:
+    """Write an unexpected exception as IDL901."""
+    from idlc.compiler.compiler import internal_error
+
+    report = Report()
+    hint = "this is a bug in idlc, please report it; IDLC_DEBUG=1 shows where it happened"
+    report.add(internal_error(error, "", hint))
+    show(report, "text", sys.stderr)
 
 
 def usage_error(message: str, hint: str) -> None:

@@ -87,24 +87,13 @@ class InterfaceItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fail with the errors that idlc reports for the file."""
-        from idlc.check import select
-        from idlc.diagnostics.report import Severity
-        from idlc.diagnostics.terminal import text
-        from idlc.project.settings import scope, settings_here
-        from idlc.tasks.check import CheckOptions, check
+        from idlc.cli.run.check import check_file
 
-        settings, report = settings_here()
-        selection = select.selection(settings, report)
-        if not report.had_errors:
-            check(CheckOptions((str(self.path),), scope(settings), selection), report)
-        strict = self.config.getoption("--idlc-strict")
-        errors = [problem for problem in report if strict or problem.severity is Severity.ERROR]
-        for problem in report:
-            if problem not in errors:
-                place = f"{problem.where[0]}: {problem.code}: {problem.message}"
-                warnings.warn(place, InterfaceWarning, stacklevel=1)
+        errors, others = check_file(str(self.path), strict=self.config.getoption("--idlc-strict"))
+        for problem in others:
+            warnings.warn(problem, InterfaceWarning, stacklevel=1)
         if errors:
-            raise InterfaceError("\n".join(text(errors)))
+            raise InterfaceError("\n".join(errors))
 
     def repr_failure(
         self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None

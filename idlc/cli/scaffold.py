@@ -1,9 +1,7 @@
-"""`idlc scaffold`: the group of its commands."""
+"""`idlc scaffold` and its commands `package` and `interface`."""
 
 from __future__ import annotations
 
-import shlex
-import sys
 from typing import Any
 
 import click
@@ -28,12 +26,16 @@ SYNONYMS = {
 }
 
 
+HOMES = {"package": "scaffold", "interface": "scaffold", "node": "scaffold_node"}
+
+
 class Scaffold(LazyGroup):
     """The group of these commands."""
 
     groups = {"Commands": COMMANDS}  # noqa: RUF012 - a constant
     overview = COMMANDS
-    modules = "idlc.cli.scaffold_"
+    modules = "idlc.cli."
+    homes = HOMES
     synonyms = SYNONYMS
 
 
@@ -69,26 +71,71 @@ def common(function: Command) -> Command:
     return options.include(writing(function))
 
 
-def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
-    """Show the outcome of a command and return the exit status; `hints` are the next commands."""
-    from idlc.cli import output
-    from idlc.diagnostics.terminal import summary
+PACKAGE_EPILOG = options.example(
+    "idlc scaffold package my_robot --maintainer 'Ada <ada@example.com>'",
+    "idlc scaffold package --interfaces my_msgs Drive srv/Ask",
+    title="Examples",
+)
 
-    output.show(report, "text", sys.stderr)
-    if result is None:
-        sys.stderr.write(f"{summary(report)}; nothing was written\n")
-        return output.status(report)
-    if result.diff:
-        sys.stdout.writelines(result.diff)
-        return output.status(report)
-    folder = "" if result.folder in ("", ".") else f"{result.folder}/"
-    changes = [done for done in result.done if done.what != "unchanged"]
-    sys.stdout.writelines(f"{done.what} {folder}{done.path}\n" for done in changes)
-    if not changes:
-        sys.stdout.write("nothing to do\n")
-    sys.stdout.writelines(f"note: {note}\n" for note in result.notes)
-    if changes:
-        if result.following:
-            hints = (shlex.join([*output.program().split(), *result.following]), *hints)
-        sys.stdout.writelines(f"next: {hint}\n" for hint in hints)
-    return output.status(report)
+
+LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
+
+
+@click.command("package", epilog=PACKAGE_EPILOG)
+@click.argument("name", metavar="NAME")
+@click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
+@click.option(
+    "--maintainer",
+    metavar="'NAME <EMAIL>'",
+    default="",
+    help="Maintainer of the package.  [default: git's user.name and user.email]",
+)
+@click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
+@click.option(
+    "--interfaces",
+    "--interfaces-only",
+    "interfaces_only",
+    is_flag=True,
+    help="Create a package that contains only interfaces. CMake builds it for nodes in any "
+    "language, and pip builds it for Python. INTERFACE is an interface to create, such as "
+    "`Drive` or `srv/Ask`.",
+)
+@common
+def package_command(**arguments: Any) -> int:
+    """Create a package that you can build with colcon and install with pip.
+
+    Each build of the package compiles the interfaces in its msg/, srv/ and action/ folders.
+    `idlc init` creates the same package in an empty folder, with an example, and compiles it.
+    """
+    from idlc.cli.run.scaffold import new_package
+
+    return new_package(**arguments)
+
+
+INTERFACE_EPILOG = options.example(
+    "idlc scaffold interface msg RobotCommand \\",
+    "    'string command_type' 'float32 linear_velocity_x  # [m/s]'",
+    "idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'",
+    title="Example, within a package",
+)
+
+
+@click.command(
+    "interface", epilog=INTERFACE_EPILOG, context_settings={"ignore_unknown_options": True}
+)
+@click.argument("kind", type=click.Choice(["msg", "srv", "action"]))
+@click.argument("name", metavar="NAME")
+@click.argument("fields", metavar="FIELD...", nargs=-1, type=click.UNPROCESSED)
+@common
+def interface_command(**arguments: Any) -> int:
+    """Create an interface in the package that contains the working folder.
+
+    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]', a constant or a comment.
+    `---` separates the sections of services and actions.
+    """
+    from idlc.cli.run.scaffold import new_interface
+
+    return new_interface(**arguments)
+
+
+MEMBERS = (package_command, interface_command)

@@ -14,7 +14,7 @@ from idlc.packaging.cmake import GENERATE, calls
 from idlc.packaging.neighbours import Neighbours
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import BUILD_STEP, FILE, Runtime, load_lock
+from idlc.project.lock import BUILD_STEP, FILE, Lock, Runtime, load_lock
 from idlc.project.package_xml import Statement, statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
@@ -122,22 +122,10 @@ def facts(
         return None
     folder = path.parent
     files = list(_files(folder))
-    records = {file: load_lock(file.parent, "", Report()) for file in files if file.name == FILE}
-    locks = {file: record for file, record in records.items() if record}
-    interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
-    checked = {root.absolute(entry.file.path) for entry in package.files}
-    if others := {file.resolve() for file in interfaces if file not in checked}:
-        others -= {file.resolve() for file in checked}
+    locks = _locks(files)
     generated = {at.parent / path for at, record in locks.items() for path in record.outputs}
     cmake = _optional(folder / "CMakeLists.txt", root)
-    commands = calls(cmake) if cmake else ()
-    generating = [command for command in commands if command.name == GENERATE]
-    modules = {}  # nodes may be in the folder of generated classes
-    for file in files:
-        parts = file.relative_to(folder).parts
-        is_code = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if is_code and file not in generated and (module := _optional(file, root)):
-            modules[".".join((*parts[:-1], file.stem))] = module
+    modules = _modules(folder, [file for file in files if file not in generated], root)
     available = frozenset(ros_packages() if modules else ())
     present = folders(folder, files)
     return Facts(
@@ -151,20 +139,15 @@ def facts(
         pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
         index=_optional(folder / "resource/rosidl_interfaces" / package.package, root),
-        # other interfaces are for tests of the package's own
-        generates=any("SKIP_INSTALL" not in command.words for command in generating),
+        generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=bool(checked) and not others,
+        whole=_is_whole(package, files, scope),
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
             GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
             for at, record in locks.items()
         ),
-        files={
-            entry.file.key: place.relative_to(folder).as_posix()
-            for entry in package.files
-            if (place := root.absolute(entry.file.path)).is_relative_to(folder)
-        },
+        files=_files_by_key(package, folder, root),
         interfaces=frozenset(
             file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
         ),
@@ -175,6 +158,50 @@ def facts(
         contained=_contained(files, present),
         dependents=neighbours.dependents(package.package) if modules else frozenset(),
     )
+
+
+def _locks(files: Iterable[Path]) -> dict[Path, Lock]:
+    records = {file: load_lock(file.parent, "", Report()) for file in files if file.name == FILE}
+    return {file: record for file, record in records.items() if record}
+
+
+def _files_by_key(package: Inputs, folder: Path, root: Root) -> dict[str, str]:
+    """Return the paths of the inputs in a package's folder by their names within the package."""
+    places = {entry.file.key: root.absolute(entry.file.path) for entry in package.files}
+    return {
+        key: place.relative_to(folder).as_posix()
+        for key, place in places.items()
+        if place.is_relative_to(folder)
+    }
+
+
+def _modules(folder: Path, files: Iterable[Path], root: Root) -> dict[str, Source]:
+    """Return the package's modules by dotted name; its tests, documents and scripts are none."""
+    modules = {}  # nodes may be in the folder of generated classes
+    for file in files:
+        parts = file.relative_to(folder).parts
+        if file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES:
+            module = _optional(file, root)
+            if module:
+                modules[".".join((*parts[:-1], file.stem))] = module
+    return modules
+
+
+def _generates(cmake: Source) -> bool:
+    """Return whether a CMakeLists.txt generates interfaces that other packages can use."""
+    generating = [command for command in calls(cmake) if command.name == GENERATE]
+    # other interfaces are for tests of the package's own
+    return any("SKIP_INSTALL" not in command.words for command in generating)
+
+
+def _is_whole(package: Inputs, files: Iterable[Path], scope: Scope) -> bool:
+    """Return whether the inputs are all interface files of a package."""
+    inputs = {scope.root.absolute(entry.file.path) for entry in package.files}
+    interfaces = [file for file in files if file.suffix in KINDS and not scope.exclude.has(file)]
+    others = {file.resolve() for file in interfaces if file not in inputs}
+    if others:  # the same file may have two paths
+        others -= {file.resolve() for file in inputs}
+    return bool(inputs) and not others
 
 
 def folders(folder: Path, files: Iterable[Path] | None = None) -> dict[str, bool]:

@@ -110,28 +110,40 @@ def layout(
 
     `folders` are the existing ones, by dotted name.
     """
-    files = (_of_setup(setup), _of_cfg(cfg), _of_toml(pyproject))
-    configs = [config for config in files if config]
-    if len(configs) < len(files) or setup.call is None:
+    of_setup, of_cfg, of_toml = _of_setup(setup), _of_cfg(cfg), _of_toml(pyproject)
+    if of_setup is None or of_cfg is None or of_toml is None or setup.call is None:
         return None
-    roots = next((config.roots for config in configs if config.roots is not None), None)
-    if not all(map(_is_within, (roots or {}).values())) or len(roots or ()) > _MOST_ROOTS:
+    configs = (of_setup, of_cfg, of_toml)
+    roots = next((config.roots for config in configs if config.roots is not None), {})
+    if not all(map(_is_within, roots.values())) or len(roots) > _MOST_ROOTS:
         return None
-    installed = [config.packages for config in configs if config.packages]
     if "packages" in setup.arguments:  # older setuptools do not read pyproject.toml
-        return Layout(roots or {}, None if configs[2].packages else configs[0].packages)
+        return Layout(roots, None if of_toml.packages else of_setup.packages)
     if not setup.whole or _HOOKS & setup.arguments.keys():
-        return Layout(roots or {}, None)
+        return Layout(roots, None)
+    installed = [config.packages for config in configs if config.packages]
     if installed:
-        wheres = [finder.where for finder in installed[0].finders if _is_within(finder.where)]
-        roots = roots or ({"": wheres[0]} if wheres and normpath(wheres[0]) != "." else {})
-        return Layout(roots, installed[0] if len(installed) == 1 else None)
-    place = setup.place("packages")
+        is_certain = len(installed) == 1
+        return Layout(roots or _searched(installed[0]), installed[0] if is_certain else None)
+    return _of_default_search(setup.place("packages"), roots, folders)
+
+
+def _searched(installed: Installed) -> dict[str, str]:
+    """Return the folder in which setuptools searches, as a value of `package_dir`."""
+    wheres = [finder.where for finder in installed.finders if _is_within(finder.where)]
+    return {"": wheres[0]} if wheres and normpath(wheres[0]) != "." else {}
+
+
+def _of_default_search(
+    place: Span, roots: Mapping[str, str], folders: Mapping[str, bool]
+) -> Layout:
+    """Return the layout of a package that lists its packages nowhere."""
     if "src" in folders:
         return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
     tops = {name for name in folders if "." not in name} - _NOT_FOUND
-    is_nothing = len(tops) > 1 and not roots
-    return Layout(roots or {}, Installed(place, is_nothing=True) if is_nothing else None)
+    if len(tops) > 1 and not roots:
+        return Layout(roots, Installed(place, is_nothing=True))
+    return Layout(roots, None)
 
 
 #: The backend of a package that names none.

@@ -69,7 +69,11 @@ def append_elements(source: Source, node: Brackets, elements: Sequence[str]) -> 
     if tail is None:
         hangs = any(_begins_line(source, start) for start, _ in ranges)
         between = f",\n{margin}" if hangs else ", "
-        before, behind = (between[1:], ",") if comma else (between, "") if ranges else ("", ", ")
+        before, behind = between, ""
+        if comma:
+            before, behind = between[1:], ","
+        elif not ranges:
+            before, behind = "", ", "
         return (insertion(source, last, before + between.join(new) + behind),)
     step = step_of(source)
     lines = "".join(f"\n{_broken(margin, step, element)}," for element in new)

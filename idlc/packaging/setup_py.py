@@ -190,12 +190,9 @@ class Setup:
     @cached_property
     def _shared(self) -> set[str]:
         """The names of lists and dictionaries that other code may change."""
-        return {
-            node.id
-            for node in self.nodes
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
-            if not self._is_harmless(node)
-        }
+        names = (node for node in self.nodes if isinstance(node, ast.Name))
+        reads = (name for name in names if isinstance(name.ctx, ast.Load))
+        return {name.id for name in reads if not self._is_harmless(name)}
 
     def _is_harmless(self, node: ast.Name) -> bool:
         """Return whether a use of a name only reads it, or adds to it in a known way."""

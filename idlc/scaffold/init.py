@@ -220,26 +220,72 @@ def prepare(
     config = load_settings(draft.root(), report)
     if report.had_errors:
         return None
-    is_own = config.folder == layout.folder
-    has_table = is_own and "[tool.idlc]" in (draft.text(SETTINGS_FILE) or "")
-    is_set = is_own and bool(config.paths and config.out)
-    is_set |= has_table and layout.kind == "ament_python"
-    out = config.out if is_own and config.out else layout.home
-    if layout.kind == "library" and not (is_own and config.out):
-        out = f"{out}/{_free(layout.folder / out)}"
-    real = Path(os.path.realpath(layout.folder / out))
-    if ".." in PurePosixPath(out).parts or not real.is_relative_to(os.path.realpath(layout.folder)):
+    # settings of a folder around this one are for other packages
+    chosen = _Chosen()
+    if config.folder == layout.folder:
+        chosen = _Chosen(config.paths, config.out, is_present=True)
+    out = _output_folder(layout, chosen)
+    if not _is_below(layout.folder, out):
         message = f"the folder for the classes is outside this folder: `{out}`"
         hint = "set `out` in [tool.idlc] to a folder below it, then run `idlc init` again"
         report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
         return None
-    chosen = config.paths if is_own else ()
-    paths = [path for path in chosen if is_folder(layout.folder / path)] or ["."]
-    places = _places(draft, layout, paths, chosen, report)
+    paths = [path for path in chosen.paths if is_folder(layout.folder / path)] or ["."]
+    places = _places(draft, layout, paths, chosen.paths, report)
     if places:
         included = [] if config.include else _included(settings.root, paths, around)
-        _settings(draft, layout, {} if is_set else {"paths": places, "out": out}, included)
-    root = draft.root()
+        plain = {} if _is_set(draft, layout, chosen) else {"paths": places, "out": out}
+        _settings(draft, layout, plain, included)
+    compiled = _compiled(draft.root(), layout, paths, report)
+    if compiled is None:
+        return None
+    inputs, model = compiled
+    notes = _built(draft, layout, inputs, model, out, report)
+    _ignored(draft, layout, out)
+    draft.write(report, dry_run=True)  # which reports links and others that are in the way
+    _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
+    module = module_of(out) if layout.kind == "library" else layout.name
+    classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
+    is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
+    plan = Preparation(layout, draft, out, classes, notes, is_packed)
+    return None if report.had_errors else plan
+
+
+class _Chosen(NamedTuple):
+    """The paths of interfaces and the folder of classes in the package's own settings."""
+
+    paths: tuple[str, ...] = ()
+    out: str = ""
+    is_present: bool = False
+
+
+def _is_set(draft: Draft, layout: Layout, chosen: _Chosen) -> bool:
+    """Return whether `idlc gen` needs no more settings than there are."""
+    if chosen.paths and chosen.out:
+        return True
+    has_table = chosen.is_present and "[tool.idlc]" in (draft.text(SETTINGS_FILE) or "")
+    return has_table and layout.kind == "ament_python"
+
+
+def _output_folder(layout: Layout, chosen: _Chosen) -> str:
+    """Return the folder for the classes; a library gets a new one in its package."""
+    if chosen.out:
+        return chosen.out
+    if layout.kind == "library":
+        return f"{layout.home}/{_free(layout.folder / layout.home)}"
+    return layout.home
+
+
+def _is_below(folder: Path, path: str) -> bool:
+    """Return whether a path stays in a folder, also where links lead."""
+    real = Path(os.path.realpath(folder / path))
+    return ".." not in PurePosixPath(path).parts and real.is_relative_to(os.path.realpath(folder))
+
+
+def _compiled(
+    root: Root, layout: Layout, paths: Sequence[str], report: Report
+) -> tuple[Inputs, Model] | None:
+    """Return the package with its model; `None` after errors or without interfaces."""
     where = scope(load_settings(root, report))
     found = list_files(paths, root, report, where.exclude)
     read = () if report.had_errors else packages(found.files, where, report)
@@ -250,20 +296,12 @@ def prepare(
         hint = f"move it next to this one, or write `exclude = {json.dumps([place])}` in "
         hint += "[tool.idlc], then run `idlc init` again"
         report.add(codes.CANNOT_EDIT.of(place, message, hint=hint))
-    compiled = [*models_of(read, where, problems := Report())] if read else []
-    report.extend(problems.errors if read else ())  # `idlc check` shows the others
+    problems = Report()
+    compiled = [*models_of(read, where, problems)] if read else []
+    report.extend(problems.errors)  # `idlc check` shows the others
     if report.had_errors or not compiled:
         return None
-    inputs, model = next((each for each in compiled if each[0].package == layout.name), compiled[0])
-    notes = _built(draft, layout, inputs, model, out, report)
-    _ignored(draft, layout, out)
-    draft.write(report, dry_run=True)  # which reports links and others that are in the way
-    _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
-    module = module_of(out) if layout.kind == "library" else layout.name
-    classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
-    is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
-    plan = Preparation(layout, draft, out, classes, notes, is_packed)
-    return None if report.had_errors else plan
+    return next((each for each in compiled if each[0].package == layout.name), compiled[0])
 
 
 def _built(
@@ -443,19 +481,12 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
             break
         text = new
     setup = Setup(Source(SETUP, text))
-    outcome: Outcome = Edited(text)
-    passed = {keyword.arg for call in setup.calls for keyword in call.keywords}
-    if not {KEYWORD} & {*setup.arguments, *passed}:
-        outcome = Refused("there are no calls of setup()", whole.rstrip(), "to its end")
-        if setup.calls:
-            why = f"there are {len(setup.calls)} calls of setup()"
-            outcome = Refused(why, f"{KEYWORD}=True,", "to the arguments of each")
-        if setup.call is not None:
-            edits = append_element(setup.source, setup.call, f"{KEYWORD}=True")
-            edited = Source(SETUP, apply(text, edits)[0])
-            again = check_setup(edited, name, files, existing, others)
-            steps = (edit for problem in again for edit in problem.edits)
-            outcome = Edited(apply(edited.text, steps)[0])
+    outcome = _with_keyword(setup, whole)
+    if isinstance(outcome, Edited) and outcome.text != text:
+        edited = Source(SETUP, outcome.text)
+        again = check_setup(edited, name, files, existing, others)
+        steps = (edit for problem in again for edit in problem.edits)
+        outcome = Edited(apply(edited.text, steps)[0])
     draft.put(SETUP, outcome, "builds compile the interfaces and install their classes")
     report.extend(problem for problem in problems if not problem.edits)
     view = layout(setup, *others, existing)
@@ -467,6 +498,20 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
         f"`packages=find_packages(exclude=['test', 'test.*'])`, or add `{name}` and its subpackages"
     )
     return note
+
+
+def _with_keyword(setup: Setup, whole: str) -> Outcome:
+    """Return a setup.py whose call has the keyword; `whole` is the text of one without a call."""
+    passed = {keyword.arg for call in setup.calls for keyword in call.keywords}
+    if KEYWORD in setup.arguments or KEYWORD in passed:
+        return Edited(setup.source.text)
+    if setup.call is not None:
+        edits = append_element(setup.source, setup.call, f"{KEYWORD}=True")
+        return Edited(apply(setup.source.text, edits)[0])
+    if setup.calls:
+        why = f"there are {len(setup.calls)} calls of setup()"
+        return Refused(why, f"{KEYWORD}=True,", "to the arguments of each")
+    return Refused("there are no calls of setup()", whole.rstrip(), "to its end")
 
 
 def _ament_cmake(draft: Draft, inputs: Inputs, report: Report) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.terminal import counted
 from idlc.model.names import is_module_name, why_not_package
@@ -73,13 +73,7 @@ def layout_of(root: Root, report: Report) -> Layout | None:
     folder = root.base
     if is_file(folder / MANIFEST):
         return _of_manifest(root, report)
-    document: dict[str, Any] = {}
-    if is_file(folder / SETTINGS_FILE):
-        source = root.read_source(SETTINGS_FILE, SETTINGS_FILE, report)
-        try:
-            document = toml(source.text) if source else {}
-        except ValueError as error:
-            report.add(broken_toml(source or Source(SETTINGS_FILE, ""), str(error)))
+    document = _document(root, report)
     if report.had_errors:
         return None
     tool = document.get("tool", {})
@@ -100,6 +94,18 @@ def layout_of(root: Root, report: Report) -> Layout | None:
     if is_file(folder / SETUP):
         return _library(root, {}, report)
     return _empty(root, report)
+
+
+def _document(root: Root, report: Report) -> dict[str, Any]:
+    """Return the content of pyproject.toml, empty without the file or after a report."""
+    source = None
+    if is_file(root.base / SETTINGS_FILE):
+        source = root.read_source(SETTINGS_FILE, SETTINGS_FILE, report)
+    try:
+        return toml(source.text) if source else {}
+    except ValueError as error:
+        report.add(broken_toml(source or Source(SETTINGS_FILE, ""), str(error)))
+        return {}
 
 
 def _is_in(file: Path, packages: Iterable[Path]) -> bool:
@@ -170,24 +176,29 @@ def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | N
         name = name or own or PurePosixPath(out).parent.name  # without an __init__.py
         home = str(PurePosixPath(out).parent) if out else f"{base}{name}"
         return Layout("library", folder, name, home, backend)
+    place = SETTINGS_FILE if document else SETUP
+    report.add(_unclear_library(root, place, base, names))
+    return None
+
+
+def _unclear_library(root: Root, place: str, base: str, names: Sequence[str]) -> Diagnostic:
+    """Return the problem with a project of several Python packages, or of none."""
     where = f"`{base or '.'}`"
-    if name:
-        listed = first_few((f"`{each}`" for each in names), 4)
-        message = (
-            f"{where} contains several Python packages ({listed}), but none with the project's name"
-        )
-        hint = "add these lines to pyproject.toml, and set `out` to the package for the classes"
-        files = list_files((".",), root, Report()).files
-        places = sorted({root.shown(file.root) for file in files}) or ["interfaces"]
-        detail = f"[tool.idlc]\npaths = {json.dumps(places)}\n"
-        detail += f'package = "{package_of(name)}"\nout = "{base}{name}/ros"\nvendor-deps = true'
-    else:
-        message, detail = f"{where} has no Python package with an `__init__.py`", ""
+    if not names:
+        message = f"{where} has no Python package with an `__init__.py`"
         hint = "write the package first, or set `out` in [tool.idlc] to the folder for the classes"
         hint += ", then run `idlc init` again"
-    place = SETTINGS_FILE if document else SETUP
-    report.add(codes.CANNOT_EDIT.of(place, message, hint=hint, detail=detail))
-    return None
+        return codes.CANNOT_EDIT.of(place, message, hint=hint)
+    name = names[0]
+    listed = first_few((f"`{each}`" for each in names), 4)
+    message = f"{where} contains several Python packages ({listed}), "
+    message += "but none with the project's name"
+    hint = "add these lines to pyproject.toml, and set `out` to the package for the classes"
+    files = list_files((".",), root, Report()).files
+    places = sorted({root.shown(file.root) for file in files}) or ["interfaces"]
+    detail = f"[tool.idlc]\npaths = {json.dumps(places)}\n"
+    detail += f'package = "{package_of(name)}"\nout = "{base}{name}/ros"\nvendor-deps = true'
+    return codes.CANNOT_EDIT.of(place, message, hint=hint, detail=detail)
 
 
 def tool_of(backend: str) -> str:
@@ -215,15 +226,17 @@ def _python_packages(folder: Path) -> list[str]:
     ]
 
 
+def _belongs_to_empty(path: Path) -> bool:
+    """Return whether a folder with such an entry counts as empty."""
+    if _PLAIN.fullmatch(path.name) or path.name in KIND_FOLDERS:
+        return True
+    return any((path / marker).exists() for marker in CLOSING)
+
+
 def _empty(root: Root, report: Report) -> Layout | None:
     """Return the layout of a folder that holds at most interfaces; its name is the package's."""
     folder = root.base
-    others = [
-        path.name
-        for path in entries(folder)
-        if not _PLAIN.fullmatch(path.name) and path.name not in KIND_FOLDERS
-        if not any((path / marker).exists() for marker in CLOSING)
-    ]
+    others = [path.name for path in entries(folder) if not _belongs_to_empty(path)]
     name = _plain(folder.name)
     why = why_not_package(name)
     hint = "run `idlc scaffold package my_robot`, then `cd my_robot`"

@@ -169,18 +169,28 @@ def package(
     growing = () if settings.force else (*GROWING, f"launch/{requested.name}_launch.py")
     kept = [path for path in growing if project.has(path)]
     new = {path: text for path, text in files.items() if path not in kept}
-    chosen = {*chosen, "build_type"}
+    kept_files = files.keys() & {*kept}
+    report.extend(_contradictions(project, requested, kept_files, {*chosen, "build_type"}))
+    return project.write(new)
+
+
+def _contradictions(
+    project: Project, requested: Package, kept: Collection[str], chosen: Collection[str]
+) -> Iterator[Diagnostic]:
+    """Yield a problem for each choice that one of the kept files contradicts."""
     for path, choices in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
-        text = project.text(path) if path in files and path not in new else None
-        source = Source(project.shown(path), text or "")
-        for field, span, values, line in choices(source, requested, chosen) if text else ():
+        text = project.text(path) if path in kept else None
+        if not text:
+            continue
+        for field, span, values, line in choices(
+            Source(project.shown(path), text), requested, chosen
+        ):
             value = getattr(requested, field)
             if field in chosen and value not in values:
                 shown = f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`"
                 hint = "choose another name" if field == "build_type" else f"write `{line}`"
                 message = f"{shown}; the file was not changed"
-                report.add(codes.EXISTING_FILE.at(span, message, hint=hint))
-    return project.write(new)
+                yield codes.EXISTING_FILE.at(span, message, hint=hint)
 
 
 def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnostic]:

@@ -156,8 +156,11 @@ class Preview:
         if constants:
             pairs = (f"{one_line(name)}={value:.15g}" for name, value in constants.items())
             yield f"\nconstant: {', '.join(pairs)}"
-        counted = {name: numbers for name, numbers in self.numbers.items() if numbers.count}
-        charted = {name: counted[name] for name in counted if name not in constants}
+        charted = {
+            name: numbers
+            for name, numbers in self.numbers.items()
+            if numbers.count and not numbers.is_constant
+        }
         if not charted:
             return
         intervals = (self.end - self.origin) // self.interval + 1

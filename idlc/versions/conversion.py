@@ -12,8 +12,7 @@ from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.model.python_names import field as attribute
 from idlc.versions.changes import Pairing, pair, tighter
-from idlc.versions.constants import Renumbering, renumbered
-from idlc.versions.units import factor
+from idlc.versions.meanings import Renumbering, factor, renumbered
 
 #: Returns the class of a type by its full name.
 Find: TypeAlias = Callable[[str], Any]
@@ -325,52 +324,40 @@ class _Planner:
         plan.rules = rules
         before, after = old.message, new.message
         pairing = pair(before.fields, after.fields, lambda field: field.type)
-        kept = {later.name: earlier for earlier, later in pairing.kept}
-        renamed = {later.name: earlier for earlier, later in pairing.renamed}
         replaced = _replaced(before.fields, after.fields, pairing)
-        ruled = {
-            field.name for field in after.fields if rules and attribute(field.name) in rules.fields
-        }
-        fields: list[FieldPlan] = []
         changes = renumbered(before, after)
-        for field in after.fields:
-            earlier = kept.get(field.name)
-            is_moved = field.name in pairing.moved
-            entry = self._field(old, new, field, earlier, is_moved=is_moved)
-            if field.name in changes and entry.step is not None:
-                entry = _renumbered_field(entry, changes[field.name])
-            if earlier is None:
-                entry = self._without_counterpart(
-                    entry, renamed.get(field.name), replaced.get(field.name)
-                )
-            covered = field.name in ruled and (
-                old.key != new.key
-                or _covers_unit(rules, entry)
-                or _covers_constants(rules, field.name, changes)
-            )
-            if rules and covered:
-                reason = f"{entry.finding.reason or 'set'}, by the rule in {rules.path}"
-                finding = entry.finding._replace(fate="rule", reason=reason, proposal="")
-                entry = FieldPlan(field, None, None, finding)
-            fields.append(entry)
-        plan.fields = tuple(fields)
+        fields = self._fields(plan, pairing, replaced, changes)
+        plan.fields = tuple(_with_rule(entry, plan, changes) for entry in fields)
+        ruled = {field.name for field in after.fields if _rule(plan, field)}
         plan.dropped = tuple(
-            Finding(
-                "automatic",
-                field.name,
-                str(before.name),
-                field.name,
-                f"field `{field.name}` was removed: its data is dropped",
-                Span(after.source, 0, 0) if after.source else None,
-                field.name_span,
-            )
+            _dropped(field, plan)
             for field in pairing.removed
-            if not (rules and replaced_by(field, replaced) & ruled)
+            if not replaced_by(field, replaced) & ruled
         )
         plan.in_order = not (pairing.moved or pairing.added or pairing.removed or pairing.renamed)
         listed = {name for change in changes.values() for name in change.constants}
         plan.notes = tuple(note for note in _constants(before, after) if note.field not in listed)
         return plan
+
+    def _fields(
+        self,
+        plan: Plan,
+        pairing: Pairing[ir.Field],
+        replaced: Mapping[str, Sequence[ir.Field]],
+        changes: Mapping[str, Renumbering],
+    ) -> Iterator[FieldPlan]:
+        """Yield the plan of each field of the new version, as it is without rules."""
+        kept = {later.name: earlier for earlier, later in pairing.kept}
+        renamed = {later.name: earlier for earlier, later in pairing.renamed}
+        for field in plan.new.message.fields:
+            name, earlier = field.name, kept.get(field.name)
+            is_moved = name in pairing.moved
+            entry = self._field(plan.old, plan.new, field, earlier, is_moved=is_moved)
+            if earlier is None:
+                entry = self._without_counterpart(entry, renamed.get(name), replaced.get(name))
+            elif name in changes and entry.step is not None:
+                entry = _renumbered_field(entry, changes[name])
+            yield entry
 
     def _field(
         self,
@@ -496,30 +483,80 @@ def _number(before: str, after: str) -> Step | str:
         return Step("number", alike=False)
     if after == "byte" and before in OCTETS:
         return Step("byte", alike=False)
-    old, new = (ir.PRIMITIVES["uint8" if name == "byte" else name] for name in (before, after))
-    changed = Step("number" if before == "byte" else "as is", same=False, alike=False)
     if before == "bool":
-        is_integer = new.low is not None and after != "byte"
-        return changed._replace(element="int") if is_integer else "a bool is not such a number"
+        is_integer = after in _INTEGERS and after != "byte"
+        step = Step("int", same=False, alike=False)
+        return step if is_integer else "a bool is not such a number"
     if after in ("bool", "byte"):
         return "not every number fits"
-    if old.low is None:  # a float
-        is_wider = new.low is None and new.size > old.size
-        return changed if is_wider else "not every number fits"
-    assert old.high is not None
-    if new.low is None:
-        # digits of the mantissa
-        fits = old.high < 1 << (24 if new.size == 4 else 53)
-        element: ElementChange = "byte as float" if before == "byte" else "float"
-        return changed._replace(element=element) if fits else "not every number fits exactly"
-    assert new.high is not None
-    fits = new.low <= old.low and old.high <= new.high
-    return changed if fits else "not every number fits"
+    if not _holds_all(after, before):
+        is_float = before in _INTEGERS and after not in _INTEGERS
+        return "not every number fits exactly" if is_float else "not every number fits"
+    element: ElementChange = "number" if before == "byte" else "as is"
+    if before in _INTEGERS and after not in _INTEGERS:
+        element = "byte as float" if before == "byte" else "float"
+    return Step(element, same=False, alike=False)
+
+
+#: The least and the greatest value of each type of integers.
+_INTEGERS = {
+    name: (info.low, info.high)
+    for name, info in ir.PRIMITIVES.items()
+    if info.low is not None and info.high is not None
+}
+#: The integers that a float holds exactly are as long as its mantissa.
+_EXACT = {"float32": (-(1 << 24), 1 << 24), "float64": (-(1 << 53), 1 << 53)}
+
+
+def _holds_all(new: str, old: str) -> bool:
+    """Return whether every number of the type `old` is one of the type `new`, without rounding."""
+    if old not in _INTEGERS:
+        return new not in _INTEGERS and ir.PRIMITIVES[new].size >= ir.PRIMITIVES[old].size
+    low, high = _INTEGERS[new] if new in _INTEGERS else _EXACT[new]
+    least, greatest = _INTEGERS[old]
+    return low <= least and greatest <= high
 
 
 def _unit_changed(old: ir.Field, new: ir.Field) -> bool:
     units = old.unit, new.unit
     return all(unit and not ir.is_range(unit) for unit in units) and old.unit != new.unit
+
+
+def _rule(plan: Plan, field: ir.Field) -> RuleFile | None:
+    """Return the plan's rules if one of them is for a field."""
+    rules = plan.rules
+    return rules if rules and attribute(field.name) in rules.fields else None
+
+
+def _with_rule(entry: FieldPlan, plan: Plan, changes: Mapping[str, Renumbering]) -> FieldPlan:
+    """Return the plan of a field by its rule, if it has one for what changed."""
+    field, rules = entry.new, _rule(plan, entry.new)
+    if rules is None:
+        return entry
+    is_about_it = (
+        plan.old.key != plan.new.key
+        or _covers_unit(rules, entry)
+        or _covers_constants(rules, field.name, changes)
+    )
+    if not is_about_it:
+        return entry
+    reason = f"{entry.finding.reason or 'set'}, by the rule in {rules.path}"
+    finding = entry.finding._replace(fate="rule", reason=reason, proposal="")
+    return FieldPlan(field, None, None, finding)
+
+
+def _dropped(field: ir.Field, plan: Plan) -> Finding:
+    """Return the finding of a field that only the old version has."""
+    source = plan.new.message.source
+    return Finding(
+        "automatic",
+        field.name,
+        str(plan.old.message.name),
+        field.name,
+        f"field `{field.name}` was removed: its data is dropped",
+        Span(source, 0, 0) if source else None,
+        field.name_span,
+    )
 
 
 def _renumbered_field(entry: FieldPlan, change: Renumbering) -> FieldPlan:
@@ -529,17 +566,15 @@ def _renumbered_field(entry: FieldPlan, change: Renumbering) -> FieldPlan:
     return FieldPlan(entry.new, entry.old, None, finding)
 
 
-def _covers_constants(
-    rules: RuleFile | None, field: str, changes: Mapping[str, Renumbering]
-) -> bool:
+def _covers_constants(rules: RuleFile, field: str, changes: Mapping[str, Renumbering]) -> bool:
     """Return whether rules between versions of one hash are about renumbered constants."""
     pairs = [(change.old, change.new) for change in changes.values()]
-    return rules is not None and rules.constants.get(field) in pairs
+    return rules.constants.get(field) in pairs
 
 
-def _covers_unit(rules: RuleFile | None, entry: FieldPlan) -> bool:
+def _covers_unit(rules: RuleFile, entry: FieldPlan) -> bool:
     """Return whether rules between versions of one hash are about this change of a unit."""
-    if rules is None or entry.old is None or entry.finding.fate != "needs a rule":
+    if entry.old is None or entry.finding.fate != "needs a rule":
         return False
     return rules.units.get(entry.new.name) == (entry.old.unit, entry.new.unit)
 

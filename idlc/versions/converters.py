@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy, deepcopy
 from operator import attrgetter
 from typing import Any, TypeAlias
@@ -197,6 +197,14 @@ def _numeric(type_: ir.FieldType) -> bool:
     return isinstance(element, ir.Primitive) and element.name not in ("bool", "byte")
 
 
+def _numbers(values: Any) -> Iterable[Any]:
+    """Return the numbers of bytes, or of an array of numpy, which may have another type."""
+    if isinstance(values, bytes):
+        return list(values)
+    numbers: Iterable[Any] = values.tolist() if hasattr(values, "dtype") else values
+    return numbers
+
+
 def _listing(type_: ir.FieldType) -> Function:
     """Return the function that makes the value of a list's field, of other values that fit."""
     element = ir.element_of(type_)
@@ -204,12 +212,7 @@ def _listing(type_: ir.FieldType) -> Function:
         return list
     info = element.info
     if isinstance(type_, ir.Sequence):
-        # of an array of numpy, the numbers of another type
-        return lambda values: (
-            array(info.code, values.tolist() if hasattr(values, "dtype") else values)
-            if not isinstance(values, bytes)
-            else array(info.code, list(values))
-        )
+        return lambda values: array(info.code, _numbers(values))
     from numpy import array as numpy_array
 
     return lambda values: numpy_array(

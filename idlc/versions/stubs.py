@@ -18,8 +18,8 @@ from idlc.project import write
 from idlc.project.root import Root
 from idlc.project.templates import Code, RenderedFile, Text, code
 from idlc.recordings.definitions import interface_of
-from idlc.versions.constants import renumbered
 from idlc.versions.conversion import FieldPlan, Key, Plan, Version, is_list
+from idlc.versions.meanings import renumbered
 from idlc.versions.rules import TYPES, Rules, read_rules
 
 _AROUND = Surroundings(runtime="....", others="..", enums="none")
@@ -63,16 +63,9 @@ def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) 
     for (old, new), part in pairs.items():
         name = f"{old.short}_to_{new.short.rpartition('_')[2]}.py".lower()
         existing = Path(root.path(folder)) / name
-        if existing.exists():
-            rules, bad = read_rules([existing], root, report)
-            report.extend(codes.BAD_RULES.at(error.span, str(error)) for error in bad)
-            if rules and (rules[0].old, rules[0].new) != (old, new):
-                message = f"`{rules[0].path}` has rules for other versions"
-                report.add(codes.EXISTING_FILE.of(rules[0].path, message, hint="move it away"))
-            elif rules:
-                files[name] = _completed(rules[0], part)
-        else:
-            files[name] = _file(part)
+        text = _grown(existing, part, root, report) if existing.exists() else _file(part)
+        if text is not None:
+            files[name] = text
     if report.had_errors:
         return []
     others = {file.path: file.text for part in pairs.values() for file in _type_files(part)}
@@ -86,6 +79,19 @@ def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) 
     if report.had_errors or not write.apply(write.WritePlan(out, tuple(kept), {}), shown, report):
         return []
     return [f"{shown}/{change.path}" for change in kept if change.path in files]
+
+
+def _grown(file: Path, plan: Plan, root: Root, report: Report) -> str | None:
+    """Return the text of a file of rules with those of a plan; `None` if it has other rules."""
+    rules, bad = read_rules([file], root, report)
+    report.extend(codes.BAD_RULES.at(error.span, str(error)) for error in bad)
+    if not rules:
+        return None
+    if (rules[0].old, rules[0].new) != (plan.old.key, plan.new.key):
+        message = f"`{rules[0].path}` has rules for other versions"
+        report.add(codes.EXISTING_FILE.of(rules[0].path, message, hint="move it away"))
+        return None
+    return _completed(rules[0], plan)
 
 
 def _open(plan: Plan) -> list[FieldPlan]:

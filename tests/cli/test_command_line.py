@@ -634,7 +634,7 @@ sys.exit(main(sys.argv[2:]))
     ("module", "words"),
     [
         ("idlc.cli.exit_status", ["--version"]),
-        ("idlc.cli.direct", ["check"]),
+        ("idlc.cli.run.check", ["check"]),
         ("idlc.cli.app", ["list"]),
         ("idlc.editor.server", ["lsp"]),
         ("click", ["list"]),

@@ -12,7 +12,7 @@ import pytest
 import idlc
 from idlc.check.registry import advise
 from idlc.cli import completion
-from idlc.cli.check import command as check
+from idlc.cli.check import check_command as check
 from idlc.cli.main import main
 from idlc.compiler.compiler import compile_package, derived_names
 from idlc.diagnostics.report import Report

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.generate import up_to_date
+from idlc.generate import package as generated
 from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.tasks.gen import GenOptions, gen
 
-PACKAGE = Path(up_to_date.__file__).parents[1]
-MAKERS = [path for path in up_to_date._MAKERS if path.is_dir()]
+PACKAGE = Path(generated.__file__).parents[1]
+MAKERS = [path for path in generated._MAKERS if path.is_dir()]
 FOLDERS = [
     folder.relative_to(maker.parent)
     for maker in MAKERS
@@ -25,21 +25,21 @@ FOLDERS = [
 
 
 def test_the_rooms_that_count_exist():
-    assert all((PACKAGE / room).is_dir() for room in up_to_date._ROOMS)
+    assert all((PACKAGE / room).is_dir() for room in generated._ROOMS)
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=str)
 def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
     for maker in MAKERS:
         shutil.copytree(maker, tmp_path / maker.name, dirs_exist_ok=True)
-    monkeypatch.setattr(up_to_date, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
-    up_to_date._newest_maker.cache_clear()
-    before = up_to_date._newest_maker()
+    monkeypatch.setattr(generated, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
+    generated._newest_maker.cache_clear()
+    before = generated._newest_maker()
     file = next(path for path in (tmp_path / folder).iterdir() if path.is_file())
     os.utime(file, ns=(before + 1, before + 1))
-    up_to_date._newest_maker.cache_clear()
-    assert up_to_date._newest_maker() == before + 1
-    up_to_date._newest_maker.cache_clear()
+    generated._newest_maker.cache_clear()
+    assert generated._newest_maker() == before + 1
+    generated._newest_maker.cache_clear()
 
 
 def written(folder: Path, package: str) -> tuple[int, list[str]]:

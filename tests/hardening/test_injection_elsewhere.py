@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from idlc.cli import gen
+from idlc.cli.run import gen
 from tests.hardening.test_injection import FILE_NAMES, PLACES, colourful
 from tests.support.hostile import PAYLOADS, assert_harmless, assert_untouched, on_a_terminal, run
 from tests.support.paths import ROOT

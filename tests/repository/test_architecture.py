@@ -43,6 +43,8 @@ HOUSE_PAGES = ("architecture.md", "contributing/type-support.md", "contributing/
 
 MOST_MODULES = 330
 MOST_IN_A_FOLDER = 15
+#: The share of the imports of idlc's own modules that stands in functions.
+MOST_IN_FUNCTIONS = 0.08
 #: The command line has one module for each command; the runtime is one folder in each package.
 CROWDED = {"idlc/cli", "idlc/runtime"}
 
@@ -106,6 +108,18 @@ def test_each_room_imports_only_rooms_below_it():
 def test_the_core_shares_one_module_with_the_runtime():
     core = (name for module, names in graph().items() if room(module) in CORE for name in names)
     assert {name for name in core if room(name) == "runtime"} == SHARED_WITH_RUNTIME
+
+
+def test_few_imports_are_in_functions():
+    """A reader sees at the top what a module needs; a slow import that few runs need can wait."""
+    own = [
+        each
+        for module in MODULES
+        for each in imports(module)
+        if room(module) != "runtime" and each.module.startswith("idlc.") and not each.for_types
+    ]
+    within = [each for each in own if not each.at_once]
+    assert len(within) / len(own) <= MOST_IN_FUNCTIONS
 
 
 def test_folders_and_the_house_stay_small():

@@ -101,4 +101,4 @@ def test_the_lines_of_tests_and_of_their_programs_are_recorded(tmp_path):
         return {keys[test] for line in lines.executed(file) for test in lines.tests_of(file, line)}
 
     assert tests_of("idlc/model/python_names.py") == {"test_here"}
-    assert tests_of("idlc/cli/explain.py") == {"test_there"}
+    assert tests_of("idlc/cli/look.py") == {"test_there"}

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Timer
 
-from idlc.api.load import load
+from idlc.api.sources import load
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
 from idlc.project.settings import Scope

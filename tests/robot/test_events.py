@@ -14,7 +14,7 @@ from idlc.robot import (
 )
 from idlc.robot.keys import pack_attachment
 from idlc.robot.nodes.events import UnsupportedEventTypeError
-from idlc.robot.nodes.overriding import (
+from idlc.robot.nodes.overrides import (
     InvalidQosOverridesError,
     QosCallbackResult,
     QoSOverridingOptions,

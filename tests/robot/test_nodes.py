@@ -22,8 +22,8 @@ from idlc.robot import (
 )
 from idlc.robot.keys import Kind, parse_attachment
 from idlc.robot.names import InvalidNameError
-from idlc.robot.nodes.descriptions import SERVICE
 from idlc.robot.nodes.interfaces import _HASHES, interface_of, standard
+from idlc.robot.nodes.services import SERVICE
 from idlc.runtime.names import ValidationError
 from idlc.runtime.typeinfo import types_of
 from tests.robot.conftest import start_router

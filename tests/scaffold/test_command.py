@@ -223,7 +223,7 @@ def test_the_wizard_asks_for_the_same(package, monkeypatch):
     answers = ["1", "std_msgs/Strin", "Imu:imu@50", "std_srvs/Empty", "std_msgs/String"]
     answers += ["bad topic", "chatter", "often", "2", "latched", "timer", "soon", "0.5"]
     answers += ["8", "speed", "speed:int=3", "", "n"]
-    monkeypatch.setattr("idlc.cli.scaffold_node.interactive", lambda: True)
+    monkeypatch.setattr("idlc.cli.run.scaffold.interactive", lambda: True)
     result = CliRunner().invoke(command, ["asker"], input="\n".join(answers) + "\n")
     assert result.exception is None or isinstance(result.exception, SystemExit), result.output
     complaints = [line for line in result.output.splitlines() if "Error: " in line]
@@ -398,7 +398,7 @@ def test_interfaces_for_a_package_that_has_others_are_reported(tmp_path, monkeyp
 
 @pytest.mark.parametrize("is_there", [True, False])
 def test_what_comes_next_installs_pytest_if_need_be(is_there, package, capsys, monkeypatch):
-    name = "idlc.cli.scaffold_node.find_spec"
+    name = "idlc.cli.run.scaffold.find_spec"
     monkeypatch.setattr(name, lambda name: object() if is_there or name != "pytest" else None)
     assert main(NODE) == 0
     hints = re.findall("next: .* -m (.*)", capsys.readouterr().out)

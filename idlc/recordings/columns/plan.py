@@ -189,6 +189,17 @@ def _selection(structure: Structure, fields: tuple[str, ...]) -> dict[str, Any]:
     return tree
 
 
+def _numpy_code(kind: str, width: int) -> str:
+    """Return numpy's code of a number, without a byte order, by that of `struct`."""
+    if kind == "c":
+        return "u1"
+    if kind == "?":
+        return "?"
+    if kind in "fd":
+        return f"f{width}"
+    return f"i{width}" if kind.islower() else f"u{width}"
+
+
 class _Builder:
     """Makes one level, step by step.
 
@@ -255,10 +266,7 @@ class _Builder:
         assert field.primitive is not None
         kind, width, key = field.primitive.code, field.primitive.size, next(self.keys)
         segment, offset = self.place(width, width * (1 if size is None else size))
-        # what numpy calls it, without a byte order
-        code = {"c": "u1", "?": "?"}.get(kind) or (
-            f"{'f' if kind in 'fd' else 'i' if kind.islower() else 'u'}{width}"
-        )
+        code = _numpy_code(kind, width)
         if wanted is None:
             segment.leaves.append(Leaf(key, offset, code, () if size is None else ((size, width),)))
         return Numbers(key, code, size)

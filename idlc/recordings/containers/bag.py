@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -45,33 +46,41 @@ def files_of(folder: Path) -> BagFiles:
     except OSError as error:
         raise RecordingError(f"`{folder}` cannot be read: {error.strerror}") from None
     present = {file.name: file for file in files if file.name.endswith(SUFFIXES + COMPRESSED)}
-    notes: list[str] = []
-    damage: list[Damage] = []
-    counted = 0
-    metadata = folder / METADATA
-    if metadata.is_file():
-        try:
-            paths, counted = _contents(metadata)
-        except RecordingError as error:
-            paths = []
-            notes.append(f"{error.message}; idlc reads all files in the folder")
-        named = dict.fromkeys(path if path in present else _own_name(path) for path in paths)
-        missing = [name for name in named if name not in present]
-        others = [name for name in present if name not in named]
-        what = f"is missing, although {METADATA} lists it"
-        damage = [Damage(str(folder / name), f"`{name}` {what}") for name in missing]
-        if any(name in present for name in named):
-            others = [name for name in others if name + ZSTD not in named]
-            notes += [f"idlc skips `{name}`: {METADATA} does not list it" for name in others]
-            present = {name: present[name] for name in named if name in present}
+    named, notes, counted = _listing(folder / METADATA, present)
+    missing = [name for name in named if name not in present]
+    reason = f"is missing, although {METADATA} lists it"
+    damage = [Damage(str(folder / name), f"`{name}` {reason}") for name in missing]
+    if len(missing) < len(named):
+        others = (name for name in present if name not in named and name + ZSTD not in named)
+        notes += [f"idlc skips `{name}`: {METADATA} does not list it" for name in others]
+        present = {name: present[name] for name in named if name in present}
     if not present:
-        inside = min((path.parent for path in folder.glob(f"*/{METADATA}")), default=None)
-        hint = f"pass a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
-        raise RecordingError(f"`{folder}` contains no recording", hint)
+        raise _no_recording(folder)
     # a file may be there twice after it was decompressed
     plain = {file.name: file for file in files if file.name.endswith(SUFFIXES)}
     chosen = [plain.get(name.removesuffix(ZSTD), file) for name, file in present.items()]
     return BagFiles(list(dict.fromkeys(chosen)), notes, damage, counted)
+
+
+def _no_recording(folder: Path) -> RecordingError:
+    inside = min((path.parent for path in folder.glob(f"*/{METADATA}")), default=None)
+    hint = f"pass a bag in it, such as `{inside}`" if inside else "it has no .mcap or .db3 file"
+    return RecordingError(f"`{folder}` contains no recording", hint)
+
+
+def _listing(metadata: Path, present: Container[str]) -> tuple[list[str], list[str], int]:
+    """Return the files that a metadata.yaml lists, notes, and the number of messages.
+
+    The files are those of the bag's folder, of which some are `present`.
+    """
+    if not metadata.is_file():
+        return [], [], 0
+    try:
+        paths, counted = _contents(metadata)
+    except RecordingError as error:
+        return [], [f"{error.message}; idlc reads all files in the folder"], 0
+    names = (path if path in present else _own_name(path) for path in paths)
+    return list(dict.fromkeys(names)), [], counted
 
 
 def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | None:
@@ -190,13 +199,9 @@ def _contents(metadata: Path) -> tuple[list[str], int]:
     information = _values([_root(_read(metadata))], INFORMATION)
     counts = [str(node.value) for node in _values(information, COUNT)]
     is_number = bool(counts) and re.fullmatch(r"\d{1,18}", counts[0], re.ASCII)
-    names = [
-        str(node.value)
-        for paths in _values(information, PATHS)
-        if paths.id == "sequence"
-        for node in paths.value
-        if node.id == "scalar"
-    ]
+    paths = _values(information, PATHS)
+    lists = (path_list.value for path_list in paths if path_list.id == "sequence")
+    names = [str(node.value) for node in chain.from_iterable(lists) if node.id == "scalar"]
     return names, int(counts[0]) if is_number else 0
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import permutations
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -248,14 +249,9 @@ def version_changes(
     *others, last = versions
     sides = [difference for version in others for difference in _all_sides(version, last, models)]
     structures = sorted({str(difference.new.name) for difference, *_ in sides})
-    pairs = [(a, b) for a in versions for b in versions if a is not b and a.sends and b.reads]
+    pairs = [(a, b) for a, b in permutations(versions, 2) if a.sends and b.reads]
     lines = [line for version in versions for line in _version(version, models, problems)]
-    # the effect of each sent version on the readers of another one
-    for sender, reader in pairs:
-        effect = "misread" if _misreads(sender, reader, models) else "read right"
-        if not {sender.key, reader.key} <= models.keys():
-            effect = "might be misread"
-        lines.append(f"{sender.label} → {reader.label}: {effect}, or not delivered")
+    lines += [_effect(sender, reader, models) for sender, reader in pairs]
     if structures and structures != [last.type]:
         lines.append(f"the differences are in {', '.join(f'`{name}`' for name in structures)}")
     misread = any(_misreads(a, b, models) for a, b in pairs)
@@ -274,10 +270,22 @@ def version_changes(
         key = (str(difference.new.name), *difference.hashes)
         if key not in seen:
             seen.add(key)
-            met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
-            misread = any(_misreads(a, b, models) for a, b in met or [(old, new)])
-            for change in with_wire(changes, misread):
+            for change in with_wire(changes, _is_misread(old, new, models)):
                 yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
+
+
+def _effect(sender: Version, reader: Version, models: Models) -> str:
+    """Return the effect of a sent version on the readers of another one, in words."""
+    effect = "misread" if _misreads(sender, reader, models) else "read right"
+    if not {sender.key, reader.key} <= models.keys():
+        effect = "might be misread"
+    return f"{sender.label} → {reader.label}: {effect}, or not delivered"
+
+
+def _is_misread(old: Version, new: Version, models: Models) -> bool:
+    """Return whether programs with one of two versions misread the bytes of the other."""
+    met = [(a, b) for a, b in permutations((old, new)) if a.sends and b.reads]
+    return any(_misreads(a, b, models) for a, b in met or [(old, new)])
 
 
 def _version(version: Version, models: Models, problems: Problems) -> Iterator[str]:

@@ -60,7 +60,9 @@ def connections(entities: Iterable[Entity], local: LocalTypes) -> list[Connectio
     for (noun, name, type_, hash_), sides in sorted(places.items(), key=lambda item: item[0]):
         parsed = type_name(type_)
         mine = local.hash(parsed, interface_of(parsed)) if parsed and hash_ else None
-        here = "unknown" if mine is None else "same" if mine == hash_ else "differs"
+        here = "unknown"
+        if mine is not None:
+            here = "same" if mine == hash_ else "differs"
         shown = str(interface_of(parsed)) if parsed and noun == "action" else type_
         senders, receivers = (tuple(sorted({end.node_name for end in ends})) for ends in sides)
         qos, requested = (tuple(dict.fromkeys(end.qos for end in ends)) for ends in sides)

@@ -15,7 +15,6 @@ from idlc.robot.names import InvalidNameError, expand_namespace, is_node_name
 from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.clock import Clock, ClockType, GuardCondition, Time, Timer
 from idlc.robot.nodes.context import Context, get_default_context
-from idlc.robot.nodes.descriptions import SERVICE, START_SERVICE, describe
 from idlc.robot.nodes.endpoints import (
     Endpoint,
     Publisher,
@@ -27,9 +26,8 @@ from idlc.robot.nodes.events import EventCallbacks
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
 from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
 from idlc.robot.nodes.logger import Logger, answer_levels, set_levels
-from idlc.robot.nodes.overrides import overrides_of
-from idlc.robot.nodes.overriding import QoSOverridingOptions, overridden
-from idlc.robot.nodes.services import Client, DeepService, Service
+from idlc.robot.nodes.overrides import QoSOverridingOptions, overridden, overrides_of
+from idlc.robot.nodes.services import SERVICE, START_SERVICE, Client, DeepService, Service, describe
 from idlc.robot.parameters import HasParameters, Parameter
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 from idlc.robot.session import Session

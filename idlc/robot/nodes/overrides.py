@@ -7,15 +7,19 @@ are strings, `y` is true, `010` is 8, `1e3` is a double.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from enum import IntEnum
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import yaml
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.nodes.arguments import Arguments
-from idlc.robot.parameters import Parameter
+from idlc.robot.nodes.interfaces import standard
+from idlc.robot.parameters import Parameter, ParameterAlreadyDeclaredException
+from idlc.robot.qos import QoSPolicyKind, QoSProfile, qos_profile
 
 _MARK = "ros__parameters"
 _PLAIN = "!plain"
@@ -110,8 +114,81 @@ def _value(node: yaml.Node) -> object:
     if text in _TRUE or text in _FALSE:
         return text in _TRUE
     if (match := _INTEGER.fullmatch(text)) and len(text) < 64:
-        number = int(text, 16 if match[1] else 8 if match[2] else 10)
+        base = 10
+        if match[1]:
+            base = 16
+        elif match[2]:
+            base = 8
+        number = int(text, base)
         return number if -(2**63) <= number < 2**63 else float(number)
     if _DOUBLE.fullmatch(text):
         return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
     return text
+
+
+class InvalidQosOverridesError(Exception):
+    """A callback refused a profile, or an override is not a value of its policy."""
+
+
+class QoSOverridingOptions(NamedTuple):
+    """The policies that parameters override; `callback` checks the profile that they make.
+
+    `entity_id` tells apart endpoints of one topic.
+    """
+
+    policy_kinds: Iterable[QoSPolicyKind]
+    callback: Callable[[QoSProfile], Any] | None = None
+    entity_id: str | None = None
+
+    @classmethod
+    def with_default_policies(
+        cls, *, callback: Callable[[QoSProfile], Any] | None = None, entity_id: str | None = None
+    ) -> QoSOverridingOptions:
+        """Return options for history, depth and reliability."""
+        kinds = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY)
+        return cls(kinds, callback, entity_id)
+
+
+def QosCallbackResult(**values: Any) -> Any:  # noqa: N802 - rclpy's name of a class
+    """Return rcl_interfaces/msg/SetParametersResult."""
+    return standard("rcl_interfaces/msg/SetParametersResult").kind(**values)
+
+
+def overridden(
+    node: Any, kind: str, topic: str, qos: QoSProfile | int, options: QoSOverridingOptions | None
+) -> QoSProfile:
+    """Declare read-only parameters for an endpoint, and return the profile that they make.
+
+    `kind` is `publisher` or `subscription`. Raises InvalidQosOverridesError.
+    """
+    profile = qos_profile(qos)
+    if options is None:
+        return profile
+    absolute = node.resolve_topic_name(topic)
+    place = kind if options.entity_id is None else f"{kind}_{options.entity_id}"
+    subject = f"for {kind} `{absolute}` with id `{options.entity_id}`"
+    for policy in options.policy_kinds:
+        field = policy.name.lower()
+        if kind == "subscription" and policy is QoSPolicyKind.LIFESPAN:
+            continue
+        name, value = f"qos_overrides.{absolute}.{place}.{field}", getattr(profile, field)
+        default = value.name.lower() if isinstance(value, IntEnum) else value
+        descriptor = standard("rcl_interfaces/msg/ParameterDescriptor").kind(
+            description=f"{field} {subject}", read_only=True
+        )
+        try:
+            chosen = node.declare_parameter(name, default, descriptor).value
+        except ParameterAlreadyDeclaredException:
+            chosen = node.get_parameter(name).value
+        try:
+            if isinstance(value, IntEnum):
+                chosen = type(value)[chosen.upper()]
+            setattr(profile, field, chosen)
+        except (KeyError, ValueError) as error:
+            raise InvalidQosOverridesError(f"`{name}` cannot be {chosen!r}: {error}") from None
+    if options.callback is not None:
+        result = options.callback(profile)
+        if not result.successful:
+            problem = f"Provided QoS overrides {subject}, are not valid: {result.reason}"
+            raise InvalidQosOverridesError(problem)
+    return profile

@@ -176,29 +176,14 @@ class Graph:
             return dict.fromkeys(questions, Answer(None, problem))
         nodes = dict.fromkeys(question.node for question in questions)
         clients = {node: self._client(service, node) for node in nodes}
-        open_: dict[Question, tuple[Any, float]] = {}
-        results: dict[Question, Any] = {}
         try:
             executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
             executor.add_node(self._node)
+            calls = _Calls(service, clients, questions)
             end = time.monotonic() + patience
-            while (now := time.monotonic()) < end and len(results) < len(questions):
-                for question, (future, since) in [*open_.items()]:
-                    if future.done():
-                        results[question] = future.result()
-                    if future.done() or now - since > DROPPED:
-                        del open_[question]
-                        clients[question.node].remove_pending_request(future)
-                counts = Counter(question.node for question in open_)
-                for question in questions:
-                    node, name, hash_ = question
-                    is_due = question not in results and question not in open_
-                    if is_due and counts[node] < MOST_OPEN and _is_ready(clients[node]):
-                        request = service.Request(
-                            type_name=name, type_hash=hash_, include_type_sources=True
-                        )
-                        open_[question] = clients[node].call_async(request), now
-                        counts[node] += 1
+            while (now := time.monotonic()) < end and len(calls.results) < len(questions):
+                calls.collect(now)
+                calls.start(now)
                 executor.spin_once(timeout_sec=_PAUSE)
             executor.remove_node(self._node)
             executor.shutdown()
@@ -207,6 +192,7 @@ class Graph:
                 self._node.destroy_client(client)
         names = {name for name, _ in self._node.get_service_names_and_types()}
         offered = {node for node in nodes if f"{node}/get_type_description" in names}
+        results = calls.results
         return {each: answer_of(results.get(each), each.node in offered) for each in questions}
 
     def _client(self, service: Any, node: str) -> Any:
@@ -217,6 +203,42 @@ class Graph:
 
 def _is_ready(client: Any) -> bool:
     return client is not None and bool(client.service_is_ready())
+
+
+class _Calls:
+    """Calls of the services that answer questions, few of each node at a time."""
+
+    def __init__(
+        self, service: Any, clients: Mapping[str, Any], questions: Sequence[Question]
+    ) -> None:
+        self._service = service
+        self._clients = clients
+        self._questions = questions
+        self._open: dict[Question, tuple[Any, float]] = {}
+        self.results: dict[Question, Any] = {}
+
+    def collect(self, now: float) -> None:
+        """Take the results that arrived, and give up calls that are open for too long."""
+        for question, (future, since) in [*self._open.items()]:
+            if future.done():
+                self.results[question] = future.result()
+            if future.done() or now - since > DROPPED:
+                del self._open[question]
+                self._clients[question.node].remove_pending_request(future)
+
+    def start(self, now: float) -> None:
+        """Call the service for each question that waits, up to the limit of each node."""
+        counts = Counter(question.node for question in self._open)
+        for question in self._questions:
+            node, name, hash_ = question
+            is_due = question not in self.results and question not in self._open
+            client = self._clients[node]
+            if is_due and counts[node] < MOST_OPEN and _is_ready(client):
+                request = self._service.Request(
+                    type_name=name, type_hash=hash_, include_type_sources=True
+                )
+                self._open[question] = client.call_async(request), now
+                counts[node] += 1
 
 
 class RobotGraph:
@@ -256,6 +278,11 @@ def _robot_endpoints(end: RobotEntity) -> Iterator[Endpoint]:
 #: A structure's full name and type hash.
 Key = tuple[str, str]
 _HASHES = "nodes announce type hashes from Iron on"
+#: The variables that choose a graph.
+_OF_A_ROBOT = "ROS_DOMAIN_ID to the nodes' value"
+_OF_RCLPY = (
+    "ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION to the nodes' values"
+)
 _NO_NODE = "no node has the interface's description"
 _SERVICE_EVENTS = (
     "a node describes a service only to nodes with the same version; to see the difference, add "
@@ -299,18 +326,14 @@ def compare_with_graph(
     joined = connected(options.against, report, patience) if is_robot else join_graph(report)
     with joined as view:
         graph = RobotGraph(view) if isinstance(view, Session) else view
-        endpoints = graph.endpoints(patience) if graph else ()
-        if graph is None or not endpoints:
-            hint = (
-                "set ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION to the "
-                "nodes' values, or raise --timeout"
-            )
-            if is_robot:
-                hint = "set ROS_DOMAIN_ID to the nodes' value, or raise --timeout"
+        if graph is None:
+            return None
+        endpoints = graph.endpoints(patience)
+        if not endpoints:
+            variables = _OF_A_ROBOT if is_robot else _OF_RCLPY
             message = f"no node appeared within {patience:g} seconds"
-            report.extend(
-                [codes.EMPTY_GRAPH.of(options.against, message, hint=hint)] if graph else []
-            )
+            hint = f"set {variables}, or raise --timeout"
+            report.add(codes.EMPTY_GRAPH.of(options.against, message, hint=hint))
             return None
         whole = graph.has_hashes_of_services
         models, local = _local_versions(local_models, endpoints, scope, whole)
@@ -333,12 +356,19 @@ def compare_with_graph(
     skipped = Skipped(tuple(names), "nodes announce no type hash", _HASHES)
     left = report_skipped([skipped], options, report)
     judged = judge(changes, options, report)
-    named: set[tuple[str, str]] = {(endpoint.entity, endpoint.name) for endpoint in endpoints}
-    named |= {("node", endpoint.node) for endpoint in endpoints if endpoint.node}
-    numbers = Counter(kind for kind, _ in named)
-    counts = {kind: numbers[kind] for kind in ("node", *get_args(Entity))}
     facts = len(silent), endpoints, judged.hidden, left
-    return GraphVerdict(judged.levels, judged.allowed, counts, *facts)
+    return GraphVerdict(judged.levels, judged.allowed, _counts(endpoints), *facts)
+
+
+def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
+    """Return the number of nodes, topics, services and actions."""
+    named: set[tuple[str, str]] = set()
+    for endpoint in endpoints:
+        named.add((endpoint.entity, endpoint.name))
+        if endpoint.node:
+            named.add(("node", endpoint.node))
+    numbers = Counter(kind for kind, _ in named)
+    return {kind: numbers[kind] for kind in ("node", *get_args(Entity))}
 
 
 def _local_versions(

@@ -75,8 +75,7 @@ def compare_with_recordings(
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
     for models, recorded in earlier.versions:
-        pairs = later.pairs(models, recorded) if later else local.pairs(models, recorded)
-        for old, new in pairs:
+        for old, new in (later or local).pairs(models, recorded):
             seen |= {interface.name for interface in old.own}
             with stage("compare", old.package):
                 new_ones = local.compared(old, new).changes
@@ -84,21 +83,7 @@ def compare_with_recordings(
                 **{(change.subject, change.message): change for change in new_ones},
                 **changes,
             }
-    unknown = (earlier.names - seen) if later else local.unknown
-    where = "absent from the other recordings" if later else "not found"
-    if packages and not later:  # what else was recorded is not meant
-        earlier.undefined = {
-            topic: name
-            for topic, name in earlier.undefined.items()
-            if name and name.package in local.packages
-        }
-    skipped = [
-        Skipped(tuple(map(str, sorted(unknown))), where),
-        Skipped(tuple(sorted(earlier.undefined)), "the recording contains no definition"),
-    ]
-    if later:
-        undefined = tuple(sorted(later.undefined))
-        skipped.append(Skipped(undefined, "the recording contains no definition"))
+    skipped = [*_skipped(earlier, later, local, seen)]
     if not seen:
         reason = "the recordings contain none of these interfaces"
         hint = "`idlc show` lists the types of a recording; name the folder of these interfaces"
@@ -108,6 +93,30 @@ def compare_with_recordings(
     judged = judge([*changes.values()], options, report, concerns=concerns_readers)
     others, hidden = (0, judged.hidden) if options.levels else (judged.hidden, 0)
     return RecordedVerdict(judged.levels, judged.allowed, others, counts, hidden, names)
+
+
+def _skipped(
+    earlier: _Recorded, later: _Recorded | None, local: _LocalVersions, seen: set[ir.TypeName]
+) -> Iterator[Skipped]:
+    """Yield the types and topics that were not compared, with the reasons."""
+    undefined = earlier.undefined
+    if later:
+        yield Skipped(_sorted(earlier.names - seen), "absent from the other recordings")
+    else:
+        yield Skipped(_sorted(local.unknown), "not found")
+        if local.packages:  # what else was recorded is not meant
+            undefined = {
+                topic: name
+                for topic, name in undefined.items()
+                if name and name.package in local.packages
+            }
+    yield Skipped(tuple(sorted(undefined)), "the recording contains no definition")
+    if later:
+        yield Skipped(tuple(sorted(later.undefined)), "the recording contains no definition")
+
+
+def _sorted(names: Iterable[ir.TypeName]) -> tuple[str, ...]:
+    return tuple(map(str, sorted(names)))
 
 
 class _Recorded:

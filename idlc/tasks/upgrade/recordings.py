@@ -44,11 +44,11 @@ from idlc.recordings.types import (
 )
 from idlc.runtime.typeinfo import Structure
 from idlc.tasks.upgrade.targets import Target, compiled, target_of
-from idlc.versions.constants import renumbered
 from idlc.versions.conversion import Finding, Plan, Version, make_plan
 from idlc.versions.converters import RunRules
 from idlc.versions.distribution import PREFIX
 from idlc.versions.exact import Payloads
+from idlc.versions.meanings import renumbered
 from idlc.versions.revision import GIT
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 

@@ -1,13 +1,17 @@
-"""The body of `idlc check`, free of click."""
+"""`idlc check` and `idlc lsp`, free of click."""
 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Report
-    from idlc.tasks.check import CheckResult
+from idlc.check.select import selection
+from idlc.cli import output
+from idlc.diagnostics import terminal
+from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.terminal import counted
+from idlc.diagnostics.text import one_line
+from idlc.project.settings import scope, settings_here
+from idlc.tasks.check import CheckOptions, CheckResult, check
 
 
 def check_paths(
@@ -29,11 +33,6 @@ def check_paths(
 
     `select` and `ignore` are lists of rules with commas.
     """
-    from idlc.check.select import selection
-    from idlc.cli import output
-    from idlc.project.settings import scope, settings_here
-    from idlc.tasks.check import CheckOptions, CheckResult, check
-
     settings, report = settings_here()
     chosen = selection(settings, report).with_lists(select, ignore)
     checked = CheckResult(())
@@ -61,13 +60,20 @@ def check_paths(
     return output.status(report) or int(is_refused)
 
 
+def check_file(path: str, *, strict: bool) -> tuple[list[str], list[str]]:
+    """Return the errors in a file as text, and a line for each warning; none if `strict`."""
+    settings, report = settings_here()
+    chosen = selection(settings, report)
+    if not report.had_errors:
+        check(CheckOptions((path,), scope(settings), chosen), report)
+    errors = [problem for problem in report if strict or problem.severity is Severity.ERROR]
+    others = [problem for problem in report if problem not in errors]
+    lines = [f"{problem.where[0]}: {problem.code}: {problem.message}" for problem in others]
+    return list(terminal.text(errors)), lines
+
+
 def _show(checked: CheckResult, report: Report, *, diff: bool) -> None:
     """Print problems and a summary; a diff goes to standard output alone, so it can be applied."""
-    from idlc.cli import output
-    from idlc.diagnostics import terminal
-    from idlc.diagnostics.terminal import counted
-    from idlc.diagnostics.text import one_line
-
     stream = sys.stderr if diff else sys.stdout
     paint = output.painter(stream)
     if diff:
@@ -106,3 +112,13 @@ def serve_editor() -> int:
     # nor does anything stay in sys.stdout that cannot be written when the program ends
     writer = open(sys.stdout.fileno(), "wb", closefd=False)  # noqa: SIM115
     return serve(reader, writer)
+
+
+def show_capabilities() -> int:
+    """Write what the server can do; return the exit status."""
+    import json
+
+    from idlc.editor.protocol import initialize_result
+
+    sys.stdout.write(json.dumps(initialize_result({}), indent=2) + "\n")
+    return 0
