@@ -21,8 +21,8 @@ from idlc.recordings.containers.file import CDR, START, full_name, other_encodin
 from idlc.recordings.containers.messages import (
     ALWAYS,
     NO_TIME,
-    Messages,
     Raw,
+    TopicMessages,
     Window,
     in_order,
     join_messages,
@@ -69,7 +69,7 @@ def readings(as_: Any, rules: Any) -> dict[str, Reading]:
     return {structure_of(kind).name: Reading(kind, rules) for kind in kinds}
 
 
-Kind = TypeVar("Kind")
+KindT = TypeVar("KindT")
 Selected = TypeVar("Selected", bound="Selection")
 #: The path in errors of many messages: the index of a message, and the path in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
@@ -81,13 +81,13 @@ TIMES = ("log_time", "publish_time")
 
 if TYPE_CHECKING:
 
-    class Stamped(tuple[int, Kind]):
+    class Stamped(tuple[int, KindT]):
         """The class for type checkers: named tuples can be generic from Python 3.11 on."""
 
         log_time: int
-        message: Kind
+        message: KindT
 
-        def __new__(cls, log_time: int, message: Kind) -> Stamped[Kind]: ...  # noqa: D102
+        def __new__(cls, log_time: int, message: KindT) -> Stamped[KindT]: ...  # noqa: D102
 
 else:
 
@@ -132,16 +132,16 @@ class Selection:
         self.options = options
         self.absent = 0
 
-    def read_all(self) -> Iterator[Messages]:
+    def read_all(self) -> Iterator[TopicMessages]:
         """Yield all messages as they are recorded, many at a time."""
         raise NotImplementedError
 
-    def recorded(self) -> Iterator[Messages]:
+    def recorded(self) -> Iterator[TopicMessages]:
         """Yield the messages that match, as they are recorded, many at a time."""
         self.absent = 0
         return self.matching(self.read_all())
 
-    def matching(self, batches: Iterable[Messages]) -> Iterator[Messages]:
+    def matching(self, batches: Iterable[TopicMessages]) -> Iterator[TopicMessages]:
         """Yield the messages of batches that match the conditions."""
         if not self.options.conditions:
             yield from batches
@@ -162,14 +162,14 @@ class Selection:
                 _raise(error, self.topic, views[len(results)], done + len(results))
             done += len(batch)
 
-    def batches(self) -> Iterator[Messages]:
+    def batches(self) -> Iterator[TopicMessages]:
         """Yield the messages, many at a time, in the version that they are read as."""
         done = 0
         for batch in self.recorded():
             yield self.read_as(batch, done)
             done += len(batch)
 
-    def read_as(self, batch: Messages, first: int = 0) -> Messages:
+    def read_as(self, batch: TopicMessages, first: int = 0) -> TopicMessages:
         """Return messages in the version that they are read as."""
         if self.options.reading is None or self._upgrade.plan.same:
             return batch
@@ -205,7 +205,7 @@ class Selection:
                 break
         return raws
 
-    def compare_lengths(self, batch: Messages | None = None, kind: Any = None) -> None:
+    def compare_lengths(self, batch: TopicMessages | None = None, kind: Any = None) -> None:
         """Compare the lengths of the first messages with their type: see `_judge`."""
         if self._compared >= SAMPLE or self.topic.encoding != CDR:
             return
@@ -238,7 +238,7 @@ class Selection:
             self._differs = True
             warnings.warn(problem, OtherDefinitionWarning, stacklevel=4)
 
-    def _on_unread(self, kind: Any, batch: Messages) -> Callable[[Any], None]:
+    def _on_unread(self, kind: Any, batch: TopicMessages) -> Callable[[Any], None]:
         """Return what judges messages whose lengths were compared as they were read."""
         self.compare_lengths(batch, kind)
 
@@ -279,7 +279,7 @@ class Selection:
     def messages(self, kind: None = None, *, fields: None = None) -> Iterator[Stamped[Any]]: ...
 
     @overload
-    def messages(self, kind: type[Kind], *, fields: None = None) -> Iterator[Stamped[Kind]]: ...
+    def messages(self, kind: type[KindT], *, fields: None = None) -> Iterator[Stamped[KindT]]: ...
 
     @overload
     def messages(
@@ -324,7 +324,9 @@ class Selection:
 
         return type_of(self._source(None))
 
-    def table(self, batch: Messages, fields: Iterable[str] | None, numbers: Any = 0) -> pa.Table:
+    def table(
+        self, batch: TopicMessages, fields: Iterable[str] | None, numbers: Any = 0
+    ) -> pa.Table:
         """Return the columns of some messages, whose `numbers` in the recording errors name."""
         from idlc.recordings.columns import to_arrow
 
@@ -402,7 +404,7 @@ def _names(fields: list[str]) -> list[str]:
     return [f"_{name}" if name in fields else name for name in TIMES]
 
 
-def _table(source: Any, options: Any, batch: Messages | None = None) -> pa.Table:
+def _table(source: Any, options: Any, batch: TopicMessages | None = None) -> pa.Table:
     """Return the table of some messages, or of none, with their times in front."""
     from idlc.recordings.columns import to_arrow
 
@@ -508,7 +510,7 @@ class Part(Selection):
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
 
-    def read_all(self) -> Iterator[Messages]:
+    def read_all(self) -> Iterator[TopicMessages]:
         """Yield all messages as they are recorded, many at a time."""
         with closing(open_pieces(self.place, *self.options.checks)) as file:
             warned = 0
@@ -792,7 +794,7 @@ class RecordedTopic(Selection):
     def _narrowed(self, window: Window, options: ReadOptions) -> RecordedTopic:
         return RecordedTopic(self._container, self.topic, window, options)
 
-    def read_all(self) -> Iterator[Messages]:
+    def read_all(self) -> Iterator[TopicMessages]:
         """Yield all messages as they are recorded, many at a time."""
         warned = len(self._container.damage)
         for batch in self._container.messages(self.topic, self.window):
@@ -840,17 +842,17 @@ class RecordedVersions(RecordedTopic):
         """Return pieces for others to read, those of each version apart."""
         return [part for version in self.versions for part in version.parts(size)]
 
-    def compare_lengths(self, batch: Messages | None = None, kind: Any = None) -> None:
+    def compare_lengths(self, batch: TopicMessages | None = None, kind: Any = None) -> None:
         """Compare nothing: `recorded` compares the lengths of each version."""
 
-    def _on_unread(self, _kind: Any, _batch: Messages) -> Callable[[Any], None]:
+    def _on_unread(self, _kind: Any, _batch: TopicMessages) -> Callable[[Any], None]:
         return lambda _: None
 
-    def read_as(self, batch: Messages, first: int = 0) -> Messages:  # noqa: ARG002
+    def read_as(self, batch: TopicMessages, first: int = 0) -> TopicMessages:  # noqa: ARG002
         """Return messages as they are: `recorded` has converted them."""
         return batch
 
-    def recorded(self) -> Iterator[Messages]:
+    def recorded(self) -> Iterator[TopicMessages]:
         """Yield the messages as one version; those that are stored together in order of time."""
         numbers: dict[int, list[tuple[RecordedTopic, list[int]]]] = {}
         for version in self.versions:

@@ -13,7 +13,7 @@ from idlc.project.root import Root
 from idlc.recordings.columns import to_arrow, to_columns
 from idlc.recordings.containers.messages import Separate
 from idlc.versions.classes import version_of
-from idlc.versions.conversion import NO_RULES, Finding, Plan, RuleFiles, make_plan
+from idlc.versions.conversion import NO_RULES, FieldFate, Plan, RuleFiles, make_plan
 from idlc.versions.converters import Converters, Functions, words_of
 from idlc.versions.exact import Payloads
 from idlc.versions.rules import Known, read_rules, rule_files, run_rules
@@ -25,7 +25,7 @@ class UpgradeError(ValueError):
     `findings` are the fields that need a rule.
     """
 
-    def __init__(self, message: str, findings: Iterable[Finding] = ()) -> None:
+    def __init__(self, message: str, findings: Iterable[FieldFate] = ()) -> None:
         super().__init__(message)
         self.findings = tuple(findings)
 
@@ -97,7 +97,7 @@ class Upgrade:
         return self._arguments[0]
 
     @property
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[FieldFate]:
         """The changed fields, at any depth."""
         return self.plan.findings()
 

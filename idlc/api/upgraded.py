@@ -10,18 +10,18 @@ import numpy as np
 from idlc.recordings.batches import Batch
 from idlc.recordings.columns.read import to_columns
 from idlc.recordings.columns.values import Columns, Ragged
-from idlc.recordings.containers.messages import Messages, Raw
-from idlc.versions.conversion import Plan, Step
+from idlc.recordings.containers.messages import Raw, TopicMessages
+from idlc.versions.conversion import ConversionStep, Plan
 from idlc.versions.converters import kind_of
 
 
-class Upgraded(Messages, frozen=True, eq=False):
+class Upgraded(TopicMessages, frozen=True, eq=False):
     """Messages that are read as another version by an `Upgrade`.
 
     Errors count from `first` and name the topic.
     """
 
-    recorded: Messages
+    recorded: TopicMessages
     upgrade: Any
     topic: str = ""
     first: int = 0
@@ -75,7 +75,7 @@ def _picked(column: Any, wanted: Any) -> Any:
     return Columns(columns, len(column), wanted.times)
 
 
-def _column(step: Step, old: Any, wanted: Any) -> Any:
+def _column(step: ConversionStep, old: Any, wanted: Any) -> Any:
     """Return the column of a field."""
     if not isinstance(wanted, Ragged):
         values = _elements(step, old, wanted)
@@ -89,7 +89,7 @@ def _column(step: Step, old: Any, wanted: Any) -> Any:
     return Ragged(offsets, _elements(step, values, wanted.values), wanted.size)
 
 
-def _elements(step: Step, old: Any, wanted: Any) -> Any:
+def _elements(step: ConversionStep, old: Any, wanted: Any) -> Any:
     """Return the column of elements."""
     if isinstance(wanted, Columns):
         assert step.nested is not None

@@ -19,7 +19,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
 from idlc.packaging import setup_edits
 from idlc.packaging.facts import Facts
-from idlc.packaging.layout import Layout, layout
+from idlc.packaging.layout import PackageLayout, layout
 from idlc.packaging.setup_py import DataFiles, Setup, defines, range_of, span_of
 from idlc.project.find import KINDS
 from idlc.project.lock import Runtime
@@ -76,7 +76,7 @@ def check_setup(
     return report
 
 
-def _layout(facts: Facts, setup: Setup) -> Layout | None:
+def _layout(facts: Facts, setup: Setup) -> PackageLayout | None:
     return layout(setup, facts.setup_cfg, facts.pyproject, facts.folders)
 
 
@@ -188,7 +188,7 @@ def _data_files_problem(
     )
 
 
-def _missing_packages(package: _Package, view: Layout) -> Iterator[Diagnostic]:
+def _missing_packages(package: _Package, view: PackageLayout) -> Iterator[Diagnostic]:
     """Yield the problem with generated packages that setuptools leaves out."""
     name = package.name
     if view.installed is None or any(root.startswith(f"{name}.") for root in view.roots):
@@ -212,7 +212,7 @@ def _missing_packages(package: _Package, view: Layout) -> Iterator[Diagnostic]:
     yield _packages_problem(view.installed.place, message, package, view, missing)
 
 
-def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
+def _absent_folders(package: _Package, view: PackageLayout) -> Iterator[Diagnostic]:
     """Yield the problem with packages that are listed and have no folder."""
     setup = package.setup
     if not setup.whole:
@@ -236,7 +236,7 @@ def _absent_folders(package: _Package, view: Layout) -> Iterator[Diagnostic]:
 
 
 def _packages_problem(
-    place: Span, message: str, package: _Package, view: Layout, missing: Sequence[str]
+    place: Span, message: str, package: _Package, view: PackageLayout, missing: Sequence[str]
 ) -> Diagnostic:
     """Return a problem with the edits that add `missing` to what setuptools installs.
 
@@ -271,7 +271,7 @@ def _packages_problem(
     return code.at(place, message, hint=hint, edits=(*imports, *edits) if edits else ())
 
 
-def _config_hint(place: Span, name: str, view: Layout, missing: Sequence[str]) -> str:
+def _config_hint(place: Span, name: str, view: PackageLayout, missing: Sequence[str]) -> str:
     """Return what to write into a setup.cfg or pyproject.toml that omits packages."""
     root = view.roots.get("", "").removesuffix(".")
     if view.installed and view.installed.finders:

@@ -39,7 +39,7 @@ def _means(word: str, code: codes.DiagnosticCode) -> bool:
     return begins or word in ("all", code.category)
 
 
-class Selection(msgspec.Struct, frozen=True):
+class RuleSelection(msgspec.Struct, frozen=True):
     """The selected codes; `select` replaces the default ones, `ignore` removes some.
 
     `per_path` are pairs of a path, in which `*` and `?` match any text, and the codes to ignore
@@ -50,11 +50,11 @@ class Selection(msgspec.Struct, frozen=True):
     ignore: tuple[str, ...] = ()
     per_path: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
-    def with_lists(self, select: str | None, ignore: str | None) -> Selection:
+    def with_lists(self, select: str | None, ignore: str | None) -> RuleSelection:
         """Return the selection changed by comma-separated lists from the command line."""
         chosen = tuple(select.split(",")) if select else self.select
         ignored = (*self.ignore, *(ignore.split(",") if ignore else ()))
-        return Selection(chosen, ignored, self.per_path)
+        return RuleSelection(chosen, ignored, self.per_path)
 
     def has(self, code: codes.DiagnosticCode) -> bool:
         """Return whether a code is switched on."""
@@ -151,7 +151,7 @@ def _unknown_remarks(source: Source) -> Iterator[Diagnostic]:
         )
 
 
-def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
+def switched_off(diagnostic: Diagnostic, selection: RuleSelection) -> bool:
     """Return whether an unused remark names a rule that did not run."""
     if diagnostic.code != codes.UNUSED_IGNORE.id or diagnostic.span is None:
         return False
@@ -207,11 +207,11 @@ class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):
     per_path: TableValue = {}
 
 
-def selection(config: Config, report: Report) -> Selection:
+def selection(config: Config, report: Report) -> RuleSelection:
     """Return the selection in `[tool.idlc.check]`."""
     table, place = command_table(config, "check", CheckSettings, report)
     if place is None:
-        return Selection()
+        return RuleSelection()
     paths = place._replace(table=f"{place.table}.per-path", shown=f"[{place.table}.per-path]")
     per_path = {
         path: read_value(words, TextsValue, path, paths, report) or ()
@@ -223,4 +223,4 @@ def selection(config: Config, report: Report) -> Selection:
             if not is_selector(word):
                 message = f"`{key}` in {where.shown} contains `{word}`, which is not a rule"
                 where.wrong(key, message, report, similar_selector(word))
-    return Selection(table.select, table.ignore, tuple(per_path.items()))
+    return RuleSelection(table.select, table.ignore, tuple(per_path.items()))

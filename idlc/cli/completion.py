@@ -10,17 +10,17 @@ import click
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-Words: TypeAlias = "list[str] | list[CompletionItem[str]]"
-Offer: TypeAlias = Callable[[click.Context, click.Parameter, str], Words]
+Candidates: TypeAlias = "list[str] | list[CompletionItem[str]]"
+Offer: TypeAlias = Callable[[click.Context, click.Parameter, str], Candidates]
 
 
 def _offer(name: str) -> Offer:
     """Return the function of `run/completion.py`."""
 
-    def offer(context: click.Context, parameter: click.Parameter, word: str) -> Words:
+    def offer(context: click.Context, parameter: click.Parameter, word: str) -> Candidates:
         from idlc.cli.run import completion
 
-        words: Words = getattr(completion, name)(context, parameter, word)
+        words: Candidates = getattr(completion, name)(context, parameter, word)
         return words
 
     return offer

@@ -26,6 +26,8 @@ REPEATS = 3
 LINE_WIDTH = 100
 TEXT_WIDTH = 1000
 BEFORE_CARET = 40
+#: Shows how much of something is done: its name, the bytes done, and all bytes.
+Progress: TypeAlias = Callable[[str, int, int], object]
 
 _STYLES = {
     "error": "1;31",

@@ -150,6 +150,8 @@ class Server:
                 self._dispatch(arrival)
         except (OSError, ValueError):  # nobody reads what is written
             return 1
+        finally:
+            gc.enable()
 
     def answer(self, name: str, params: object) -> object:
         """Return the answer to a request; raises RequestError."""

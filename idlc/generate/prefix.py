@@ -176,9 +176,9 @@ class Overlay(Target):
 
 def write_setup_scripts(overlay: Target) -> bool:
     """Write the setup files for shells; foreign files stay, with a note."""
-    from idlc.project.templates import Text
+    from idlc.project.templates import EscapedText
 
-    prefix = Text(quote(overlay.path.as_posix()))
+    prefix = EscapedText(quote(overlay.path.as_posix()))
     tree, changes = Tree(overlay.path), []
     for shell in ("sh", "bash", "zsh"):
         # for shells that do not know the path of the file that they source

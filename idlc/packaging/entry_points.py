@@ -15,8 +15,8 @@ from typing import Any, TypeAlias
 
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
-from idlc.packaging.layout import Layout
-from idlc.packaging.outcome import Edited, Outcome, Refused, Script, already_taken, split
+from idlc.packaging.layout import PackageLayout
+from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused, already_taken, split
 from idlc.packaging.setup_edits import (
     append_element,
     insertion,
@@ -43,7 +43,7 @@ def _section(lines: list[str], name: str) -> tuple[int, int] | None:
     return None
 
 
-def _add_entry(text: str, script: Script, *, in_section: bool) -> Outcome:
+def _add_entry(text: str, script: ConsoleScript, *, in_section: bool) -> Outcome:
     """Return a text of entries with one more, at its end or in a section, made if need be."""
     lines = text.splitlines(keepends=True)
     body = _section(lines, KEY) if in_section else (0, _last(lines))
@@ -55,7 +55,7 @@ def _add_entry(text: str, script: Script, *, in_section: bool) -> Outcome:
     return _inserted(lines, _last(lines), [f"{margin}[{KEY}]", f"{margin}{script.line}"])
 
 
-def add_to_cfg(text: str, script: Script) -> Outcome:
+def add_to_cfg(text: str, script: ConsoleScript) -> Outcome:
     """Return a setup.cfg with a console script in its `[options.entry_points]`."""
     lines = text.splitlines(keepends=True)
     section = _section(lines, SECTION)
@@ -72,7 +72,9 @@ def add_to_cfg(text: str, script: Script) -> Outcome:
     return _with_entry(lines, key, end, script, _margin(lines[key + 1 : end]) or "    ")
 
 
-def _with_entry(lines: list[str], start: int, end: int, script: Script, margin: str) -> Outcome:
+def _with_entry(
+    lines: list[str], start: int, end: int, script: ConsoleScript, margin: str
+) -> Outcome:
     """Return a text with another line in a range of entries; a command has one entry."""
     for line in lines[start:end]:
         entry = re.sub(rf"^{KEY}\s*[=:]", "", line)
@@ -108,10 +110,10 @@ IN_SETUP = f"to `{KEY}` in the `entry_points` of setup()"
 UNKNOWN = "idlc cannot parse the entry points"
 
 #: The edits of a file, or the reason why there are none.
-Change: TypeAlias = tuple[Edit, ...] | str
+EntryPointEdits: TypeAlias = tuple[Edit, ...] | str
 
 
-def add_to_setup(text: str, script: Script) -> Outcome:
+def add_to_setup(text: str, script: ConsoleScript) -> Outcome:
     """Return the file with a console script."""
     setup = Setup(Source("setup.py", text))
     if parse(text) is None:
@@ -141,11 +143,11 @@ def _lines(setup: Setup) -> set[str]:
     return {line.strip() for text in texts if isinstance(text, str) for line in text.splitlines()}
 
 
-def _refusal(script: Script, why: str) -> Refused:
+def _refusal(script: ConsoleScript, why: str) -> Refused:
     return Refused(why, f"'{script.line}',", IN_SETUP)
 
 
-def _with_script(setup: Setup, call: ast.Call, script: Script) -> Change:
+def _with_script(setup: Setup, call: ast.Call, script: ConsoleScript) -> EntryPointEdits:
     """Return the edits that give setup() a console script."""
     passed = {keyword.arg: keyword.value for keyword in call.keywords}
     if "entry_points" in passed:
@@ -160,7 +162,7 @@ def _with_script(setup: Setup, call: ast.Call, script: Script) -> Change:
     return append_element(setup.source, call, f"entry_points={points}")
 
 
-def _in_entry_points(setup: Setup, node: ast.expr, script: Script) -> Change:
+def _in_entry_points(setup: Setup, node: ast.expr, script: ConsoleScript) -> EntryPointEdits:
     """Return the edits of the value of `entry_points`."""
     value = setup.value(node)
     if isinstance(value, ast.Constant) and isinstance(value.value, str):
@@ -187,7 +189,7 @@ def _unknown(node: ast.expr, value: ast.expr | None) -> str:
     return ""
 
 
-def _in_scripts(setup: Setup, node: ast.expr, script: Script) -> Change:
+def _in_scripts(setup: Setup, node: ast.expr, script: ConsoleScript) -> EntryPointEdits:
     """Return the edits of the value of `console_scripts`."""
     value = setup.value(node)
     if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):
@@ -220,7 +222,9 @@ def _is_enclosed(source: Source, node: ast.List | ast.Tuple) -> bool:
     return source.text[start] in "[(" and parse(f"({inside}\n)") is not None
 
 
-def _in_literal(setup: Setup, value: ast.Constant, script: Script, *, in_section: bool) -> Change:
+def _in_literal(
+    setup: Setup, value: ast.Constant, script: ConsoleScript, *, in_section: bool
+) -> EntryPointEdits:
     """Return the edit of a text of several lines."""
     start, end = range_of(setup.source, value)
     literal = re.fullmatch(r"(?s)\w*('{3}|\"{3})(.*)\1", setup.source.text[start:end])
@@ -237,7 +241,7 @@ SETUP_CFG = "setup.cfg"
 SETUP_PY = "setup.py"
 
 
-def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, Outcome]:
+def add_console_script(files: Mapping[str, str], script: ConsoleScript) -> tuple[str, Outcome]:
     """Return the file of a package to edit, and the edit; `files` are the existing ones.
 
     The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
@@ -269,12 +273,12 @@ def _table(text: str, name: str) -> dict[str, Any] | Refused:
     return table if isinstance(table, dict) else {}
 
 
-def _line(script: Script) -> str:
+def _line(script: ConsoleScript) -> str:
     key = script.name if re.fullmatch(r"[A-Za-z0-9_-]+", script.name) else f'"{script.name}"'
     return f'{key} = "{script.target}"'
 
 
-def _in_pyproject(text: str, name: str, project: dict[str, Any], script: Script) -> Outcome:
+def _in_pyproject(text: str, name: str, project: dict[str, Any], script: ConsoleScript) -> Outcome:
     """Return a pyproject.toml with another line in the table of scripts, added if missing."""
     why, table = "idlc cannot edit the scripts", f"{name}.scripts"
     refused = Refused(why, _line(script), f"to [{table}]")
@@ -320,7 +324,7 @@ def _installs(entry: DataFiles, path: str) -> bool:
     )
 
 
-def add_package(text: str, package: str, view: Layout | None) -> tuple[str, str]:
+def add_package(text: str, package: str, view: PackageLayout | None) -> tuple[str, str]:
     """Return a setup.py that installs a Python package, and what it lacks, if anything.
 
     `view` is setuptools' view of the folders, the package's included. What is computed stays.

@@ -73,7 +73,7 @@ class PackagingConfig(NamedTuple):
     roots: Mapping[str, str] | None = None
 
 
-class Layout(NamedTuple):
+class PackageLayout(NamedTuple):
     """The folders of packages, and the packages that setuptools installs, `None` if unknown."""
 
     roots: Mapping[str, str]
@@ -105,7 +105,7 @@ class Layout(NamedTuple):
 
 def layout(
     setup: Setup, cfg: Source | None, pyproject: Source | None, folders: Mapping[str, bool]
-) -> Layout | None:
+) -> PackageLayout | None:
     """Return setuptools' view of a package; `None` if the folders of packages are unknown.
 
     `folders` are the existing ones, by dotted name.
@@ -118,13 +118,13 @@ def layout(
     if not all(map(_is_within, roots.values())) or len(roots) > _MOST_ROOTS:
         return None
     if "packages" in setup.arguments:  # older setuptools do not read pyproject.toml
-        return Layout(roots, None if of_toml.packages else of_setup.packages)
+        return PackageLayout(roots, None if of_toml.packages else of_setup.packages)
     if not setup.whole or _HOOKS & setup.arguments.keys():
-        return Layout(roots, None)
+        return PackageLayout(roots, None)
     installed = [config.packages for config in configs if config.packages]
     if installed:
         is_certain = len(installed) == 1
-        return Layout(roots or _searched(installed[0]), installed[0] if is_certain else None)
+        return PackageLayout(roots or _searched(installed[0]), installed[0] if is_certain else None)
     return _of_default_search(setup.place("packages"), roots, folders)
 
 
@@ -136,14 +136,14 @@ def _searched(installed: Installed) -> dict[str, str]:
 
 def _of_default_search(
     place: Span, roots: Mapping[str, str], folders: Mapping[str, bool]
-) -> Layout:
+) -> PackageLayout:
     """Return the layout of a package that lists its packages nowhere."""
     if "src" in folders:
-        return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
+        return PackageLayout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
     tops = {name for name in folders if "." not in name} - _NOT_FOUND
     if len(tops) > 1 and not roots:
-        return Layout(roots, Installed(place, is_nothing=True))
-    return Layout(roots, None)
+        return PackageLayout(roots, Installed(place, is_nothing=True))
+    return PackageLayout(roots, None)
 
 
 #: The backend of a package that names none.

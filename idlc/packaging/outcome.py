@@ -22,7 +22,7 @@ class Refused(NamedTuple):
 Outcome: TypeAlias = Edited | Refused
 
 
-class Script(NamedTuple):
+class ConsoleScript(NamedTuple):
     """A console script: the command and the function that it calls."""
 
     name: str
@@ -44,7 +44,7 @@ def split(entry: str) -> tuple[str, str]:
     return name.strip(), "".join(target.split())
 
 
-def already_taken(script: Script, target: str, where: str) -> Refused:
+def already_taken(script: ConsoleScript, target: str, where: str) -> Refused:
     """Return the refusal of a command that calls something else already."""
     why = f"`{script.name}` is already the command for `{target}`"
     return Refused(why, script.line, where)

@@ -101,7 +101,7 @@ _DEPTH = 50
 _GROWING = frozenset({"append", "extend", "insert"})
 
 
-class Item(NamedTuple):
+class ListPart(NamedTuple):
     """A part of a list: an element, or an expression for any number of elements."""
 
     node: ast.expr
@@ -133,7 +133,7 @@ class Setup:
         self.call = self.calls[0] if len(self.calls) == 1 else None
         self.arguments: dict[str, ast.expr] = {}
         self._texts: dict[str, str | None] = {}
-        self._lists: dict[str, list[Item]] = {}
+        self._lists: dict[str, list[ListPart]] = {}
         self.whole = self.call is not None and not self.call.args
         for keyword in self.call.keywords if self.call else ():
             if keyword.arg:
@@ -176,15 +176,17 @@ class Setup:
         return bound
 
     @cached_property
-    def _grown(self) -> dict[str, list[Item]]:
+    def _grown(self) -> dict[str, list[ListPart]]:
         """The items that are added to a name's list after its assignment."""
-        grown: dict[str, list[Item]] = {}
+        grown: dict[str, list[ListPart]] = {}
         for node in self.nodes:
             if isinstance(node, ast.Call) and (name := _grows(node)):
                 is_element = getattr(node.func, "attr", "") != "extend"
-                grown.setdefault(name, []).extend(Item(arg, is_element) for arg in node.args[-1:])
+                grown.setdefault(name, []).extend(
+                    ListPart(arg, is_element) for arg in node.args[-1:]
+                )
             elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-                grown.setdefault(node.target.id, []).append(Item(node.value, False))
+                grown.setdefault(node.target.id, []).append(ListPart(node.value, False))
         return grown
 
     @cached_property
@@ -260,40 +262,40 @@ class Setup:
         pairs = zip(texts, parts[1:], strict=True)
         return parts[0] + "".join((text or "") + part for text, part in pairs)
 
-    def items(self, node: ast.expr | None, depth: int = 0) -> list[Item]:
+    def items(self, node: ast.expr | None, depth: int = 0) -> list[ListPart]:
         """Return the parts of a list; parts that cannot be taken apart are no elements."""
         if node is None:
             return []
         if isinstance(node, ast.Name) and depth <= _DEPTH:
             if node.id not in self._lists:
-                self._lists[node.id] = [Item(node, False)]
+                self._lists[node.id] = [ListPart(node, False)]
                 self._lists[node.id] = self._named_items(node, depth + 1)
             return self._lists[node.id]
-        items: list[Item] = []
+        items: list[ListPart] = []
         if isinstance(node, (ast.List, ast.Tuple)) and depth <= _DEPTH:
             for element in node.elts:
                 if isinstance(element, ast.Starred):
                     items += self.items(element.value, depth + 1)
                 else:
-                    items.append(Item(element, True))
+                    items.append(ListPart(element, True))
                 if len(items) > _MOST:
                     break
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add) and depth <= _DEPTH:
             items = self.items(node.left, depth + 1) + self.items(node.right, depth + 1)
         else:
-            items = [Item(node, False)]
-        return items if len(items) <= _MOST else [Item(node, False)]
+            items = [ListPart(node, False)]
+        return items if len(items) <= _MOST else [ListPart(node, False)]
 
-    def _named_items(self, node: ast.Name, depth: int) -> list[Item]:
+    def _named_items(self, node: ast.Name, depth: int) -> list[ListPart]:
         value = self.value(node)
         if value is None or node.id in self._shared:
-            return [Item(node, False)]
+            return [ListPart(node, False)]
         items = list(self.items(value, depth))
         for item in self._grown.get(node.id, ()):
             items += [item] if item.is_element else self.items(item.node, depth)
             if len(items) > _MOST:
                 break
-        return items if len(items) <= _MOST else [Item(node, False)]
+        return items if len(items) <= _MOST else [ListPart(node, False)]
 
     def texts(self, node: ast.expr | None) -> list[str | None]:
         """Return the texts in a list, `None` for each part that is computed."""

@@ -30,7 +30,7 @@ class Code(str):
     __slots__ = ()
 
 
-class Text(str):
+class EscapedText(str):
     """Words of others, escaped for the place where a template puts them."""
 
     __slots__ = ()
@@ -65,9 +65,11 @@ def code() -> jinja2.Environment:
 
 
 def _placed(value: object) -> object:
-    if isinstance(value, (Code, Text, int, jinja2.Undefined)):
+    if isinstance(value, (Code, EscapedText, int, jinja2.Undefined)):
         return value
-    raise TypeError(f"a template may place Code and Text, not {type(value).__name__} {value!r:.80}")
+    raise TypeError(
+        f"a template may place Code and EscapedText, not {type(value).__name__} {value!r:.80}"
+    )
 
 
 def _concatenated(parts: Iterable[str]) -> Code:

@@ -30,7 +30,7 @@ from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import fits
 from idlc.recordings.memory import (
-    Models,
+    ModelsByName,
     class_in,
     find_spec,
     home_of,
@@ -40,8 +40,8 @@ from idlc.recordings.memory import (
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import (
     LocalTypes,
-    Reader,
     RecordedTypes,
+    TypesReader,
     read_topics,
     recorded_types,
     topics_of,
@@ -78,7 +78,7 @@ class CompileError(ValueError):
 class LoadedPackages(ModuleType):
     """Packages that were compiled together; requested interfaces also by their own names."""
 
-    def __init__(self, models: Models, names: Iterable[ir.TypeName]) -> None:
+    def __init__(self, models: ModelsByName, names: Iterable[ir.TypeName]) -> None:
         super().__init__(home_of(models), "The packages that `idlc.load` compiled.")
         self._packages = {package: model.kinds for package, model in sorted(models.items())}
         self._interfaces = {str(class_(name)): name for name in names}
@@ -115,7 +115,7 @@ def loaded(
     *,
     include: Iterable[str] = (),
     distro: str | None = None,
-    read: Reader = read_topics,
+    read: TypesReader = read_topics,
 ) -> LoadedPackages:
     """Return the classes of what `idlc.load` names; `read` reads recordings."""
     report = Report()
@@ -129,8 +129,8 @@ def _models_of(
     include: tuple[str, ...],
     distro: str | None,
     report: Report,
-    read: Reader = read_topics,
-) -> tuple[Models, Iterable[ir.TypeName]]:
+    read: TypesReader = read_topics,
+) -> tuple[ModelsByName, Iterable[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
     where = scope(Config(root=Root.here()), None, include, distro=distro)
     if is_recording(what, where.root):
@@ -165,7 +165,7 @@ def _models_of(
 class TopicType:
     """The type of a topic's messages, compiled from what was recorded."""
 
-    def __init__(self, models: Models, name: ir.TypeName) -> None:
+    def __init__(self, models: ModelsByName, name: ir.TypeName) -> None:
         self._models = models
         self._name = name
 

@@ -21,7 +21,7 @@ from idlc.model.link import Model
 from idlc.model.python_names import class_
 from idlc.runtime.message import SHOWN, InterfaceMeta
 
-Models = dict[str, Model]
+ModelsByName = dict[str, Model]
 
 #: The package that all loaded ones are in.
 LOADED = "idlc.loaded"
@@ -82,7 +82,7 @@ def _keep(home: str, texts: Mapping[str, str]) -> None:
     _IMPORTER.texts[home] = ""
 
 
-def home_of(models: Models) -> str:
+def home_of(models: ModelsByName) -> str:
     """Return the package that holds the packages of models, after they are rendered if need be."""
     from idlc.generate.python.imports import Surroundings
     from idlc.generate.python.render import interface_files

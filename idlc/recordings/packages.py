@@ -22,9 +22,9 @@ from idlc.project.settings import Scope
 from idlc.recordings.types import (
     NAMED,
     LocalTypes,
-    Reader,
     RecordedTypes,
-    Version,
+    TopicsVersion,
+    TypesReader,
     contradictions,
     recorded_types,
     topics_of,
@@ -32,7 +32,7 @@ from idlc.recordings.types import (
 )
 
 
-def check_versions(groups: Sequence[Version], report: Report) -> None:
+def check_versions(groups: Sequence[TopicsVersion], report: Report) -> None:
     """Report IDL653 for each name with several definitions."""
     for name, first, second in contradictions(groups):
         message = f"conflicting definition of `{name}`"
@@ -69,7 +69,7 @@ def _forbidden_names(types: RecordedTypes) -> Iterator[Diagnostic]:
 
 
 def recorded_models(
-    read: Reader, paths: Sequence[str], scope: Scope, report: Report
+    read: TypesReader, paths: Sequence[str], scope: Scope, report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
     """Yield the models of recordings, without faulty interfaces, and the names of their types."""
     local = LocalTypes(scope, report)
@@ -83,7 +83,7 @@ def recorded_models(
 
 
 def recorded_packages(
-    read: Reader,
+    read: TypesReader,
     paths: Sequence[str],
     topics_wanted: Sequence[str],
     scope: Scope,
@@ -133,7 +133,7 @@ def recorded_packages(
 
 
 def write_definitions(
-    read: Reader, recording: str, topics: Sequence[str], out: str, scope: Scope, report: Report
+    read: TypesReader, recording: str, topics: Sequence[str], out: str, scope: Scope, report: Report
 ) -> list[str]:
     """Write each definition of a recording, or of some topics, to its file; return their paths.
 

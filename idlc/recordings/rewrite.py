@@ -10,7 +10,7 @@ import re
 import secrets
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from idlc.diagnostics.terminal import Progress
 from idlc.project.atomic import (
     ended_by_errors,
     locked,
@@ -51,8 +52,6 @@ class Rewritten(NamedTuple):
     damage: tuple[Damage, ...]
 
 
-#: Called with a file's name, how much of it is done, and its size.
-Progress = Callable[[str, int, int], object]
 #: The files that SQLite has beside a database, whose content is in the copy of that.
 BESIDE = ("-journal", "-shm", "-wal")
 

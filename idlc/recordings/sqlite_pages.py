@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from struct import unpack_from
 from typing import NamedTuple
 
-from idlc.recordings.containers.source import Source
+from idlc.recordings.containers.source import FileSource
 
 INTERIOR, LEAF = 5, 13
 #: Numbers of rows.
 SMALLEST, LARGEST = -(1 << 63), (1 << 63) - 1
 
 
-class Leaf(NamedTuple):
+class RowSpan(NamedTuple):
     """The rows from one number to another, which are in a page if anywhere."""
 
     first: int
@@ -35,7 +35,7 @@ class Cell(NamedTuple):
 class Pages:
     """The pages of a database; `usable` bytes of each are SQLite's."""
 
-    def __init__(self, source: Source, size: int, reserved: int) -> None:
+    def __init__(self, source: FileSource, size: int, reserved: int) -> None:
         self.source = source
         self.size = size
         self.usable = size - reserved
@@ -48,13 +48,13 @@ class Pages:
         start = (number - 1) * self.size
         return self.source.view(start, min(self.size, self.source.size - start))
 
-    def leaves(self, root: int) -> Iterator[Leaf]:
+    def leaves(self, root: int) -> Iterator[RowSpan]:
         """Yield the leaves of a table in their order.
 
         A page that cannot be read stands for all below it.
         """
         seen: set[int] = set()
-        waiting = [Leaf(SMALLEST, LARGEST, root)]
+        waiting = [RowSpan(SMALLEST, LARGEST, root)]
         while waiting:
             leaf = waiting.pop()
             if leaf.page in seen:
@@ -71,10 +71,10 @@ class Pages:
                 (child,) = unpack_from(">I", data, at)
                 last, _ = _varint(data, at + 4)
                 if first <= last <= leaf.last:
-                    below.append(Leaf(first, last, child))
+                    below.append(RowSpan(first, last, child))
                     first = last + 1
             if first <= leaf.last:
-                below.append(Leaf(first, leaf.last, right))
+                below.append(RowSpan(first, leaf.last, right))
             waiting += below[::-1]
 
     def rows(self, number: int) -> Iterator[Cell]:

@@ -43,10 +43,10 @@ class RecordingTopics(NamedTuple):
     topics: tuple[RecordedDefinition, ...]
     unread: tuple[UnreadTopic, ...] = ()
     damage: tuple[Damage, ...] = ()
-    summary: Summary | None = None
+    summary: RecordingSummary | None = None
 
 
-class Summary(NamedTuple):
+class RecordingSummary(NamedTuple):
     """The times of the first and last message, the bytes of the files, and of each topic."""
 
     span: tuple[int, int] | None
@@ -68,10 +68,10 @@ def damage_problems(path: str, damage: Sequence[Damage]) -> Iterator[Diagnostic]
 
 
 #: Returns the topics of a recording by its path, and maybe those of a robot by its address.
-Reader: TypeAlias = "Callable[[str, Root, Report], RecordingTopics | None]"
+TypesReader: TypeAlias = "Callable[[str, Root, Report], RecordingTopics | None]"
 
 
-class Version(msgspec.Struct):
+class TopicsVersion(msgspec.Struct):
     """Topics whose definitions do not contradict each other, and these definitions."""
 
     topics: list[RecordedDefinition]
@@ -102,7 +102,7 @@ def read_topics(
             summary = None
             if check:
                 size = sum(file.size for file in container.files)
-                summary = Summary(container.span(), size, container.sizes())
+                summary = RecordingSummary(container.span(), size, container.sizes())
             damage = tuple(
                 msgspec.structs.replace(each, file=each.file.replace(place, path))
                 for each in container.damage
@@ -116,7 +116,7 @@ def read_topics(
 
 
 def topics_of(
-    read: Reader, paths: Sequence[str], selected: Sequence[str], root: Root, report: Report
+    read: TypesReader, paths: Sequence[str], selected: Sequence[str], root: Root, report: Report
 ) -> list[RecordedDefinition] | None:
     """Return the topics of what `read` reads, or the selected ones; `None` after an error.
 
@@ -138,19 +138,19 @@ def topics_of(
     return [topic for topic in topics if not selected or topic.topic.name in selected]
 
 
-def versions(topics: Iterable[RecordedDefinition]) -> list[Version]:
+def versions(topics: Iterable[RecordedDefinition]) -> list[TopicsVersion]:
     """Return topics in as few groups as they have different definitions of one name.
 
     Definitions that differ in comments only are equal.
     """
-    groups: list[Version] = []
+    groups: list[TopicsVersion] = []
     contents = Contents()
-    placed: dict[int, Version] = {}  # topics of one definition share their texts
+    placed: dict[int, TopicsVersion] = {}  # topics of one definition share their texts
     for topic in topics:
         if id(topic.texts) not in placed:
             # real recordings have few versions; of many, not all are tried
             some = (each for each in groups[-TRIED:] if contents.agree(topic.texts, each.texts))
-            version = next(some, None) or Version([], {})
+            version = next(some, None) or TopicsVersion([], {})
             if not version.topics:
                 groups.append(version)
             for name, source in topic.texts.items():
@@ -160,7 +160,7 @@ def versions(topics: Iterable[RecordedDefinition]) -> list[Version]:
     return groups
 
 
-def contradictions(groups: Sequence[Version]) -> Iterator[tuple[ir.TypeName, Source, Source]]:
+def contradictions(groups: Sequence[TopicsVersion]) -> Iterator[tuple[ir.TypeName, Source, Source]]:
     """Yield each name that has several definitions, with the first two of them."""
     contents = Contents()
     seen: dict[ir.TypeName, Source] = {}
@@ -261,7 +261,7 @@ class LocalTypes:
         return self._hashes[name]
 
 
-def recorded_types(version: Version, local: LocalTypes, report: Report) -> RecordedTypes:
+def recorded_types(version: TopicsVersion, local: LocalTypes, report: Report) -> RecordedTypes:
     """Return the types of the topics of a version; reports IDL652 for undefined ones.
 
     Local definitions replace those that have errors or another hash than the recorded one, unless
@@ -289,7 +289,11 @@ class RecordedTypes:
     """The types of the topics of a version, and all that these refer to."""
 
     def __init__(
-        self, version: Version, local: LocalTypes, report: Report, broken: Mapping[ir.TypeName, str]
+        self,
+        version: TopicsVersion,
+        local: LocalTypes,
+        report: Report,
+        broken: Mapping[ir.TypeName, str],
     ) -> None:
         """Look the types up; reports IDL652 for types that the recording does not define.
 
@@ -334,7 +338,7 @@ class RecordedTypes:
             self.models = {name: model.sound(faulty) for name, model in self.models.items()}
         report.extend(self._substitutions())
 
-    def _typed(self, version: Version, report: Report) -> Iterator[DefinedTopic]:
+    def _typed(self, version: TopicsVersion, report: Report) -> Iterator[DefinedTopic]:
         """Yield the topics whose types are known; report the others."""
         missing: dict[tuple[str, str], list[str]] = {}
         for topic in version.topics:

@@ -8,7 +8,7 @@ from itertools import islice
 from threading import Condition
 from typing import Any, TypeVar
 
-from idlc.robot.keys import Entity, Kind, parse_token
+from idlc.robot.keys import Entity, EntityKind, parse_token
 from idlc.robot.transport import Transport
 
 #: The memory of a graph's entities, about so much for each and for each character of its token.
@@ -42,7 +42,7 @@ class Graph:
         self._limit = limit
         self._bytes = 0
         self._entities: dict[str, Entity] = {}
-        self._named: dict[tuple[Kind | None, str | None], dict[str, Entity]] = {}
+        self._named: dict[tuple[EntityKind | None, str | None], dict[str, Entity]] = {}
         self._changed = Condition()
         #: Conditions to trigger after each change.
         self.watchers: set[Any] = set()
@@ -82,18 +82,20 @@ class Graph:
         """Stop watching; the entities stay as they are."""
         self._watch.close()
 
-    def entities(self, kind: Kind | None = None, name: str | None = None) -> tuple[Entity, ...]:
+    def entities(
+        self, kind: EntityKind | None = None, name: str | None = None
+    ) -> tuple[Entity, ...]:
         """Return the entities of this kind; with a kind and an absolute name, those of both."""
         with self._changed:
             known = self._entities if name is None else self._named.get((kind, name), {})
             return tuple(entity for entity in known.values() if kind in (None, entity.kind))
 
-    def count(self, kind: Kind, name: str) -> int:
+    def count(self, kind: EntityKind, name: str) -> int:
         """Return the number of publishers, say, of the topic with this absolute name."""
         with self._changed:
             return len(self._named.get((kind, name), ()))
 
-    def types(self, *kinds: Kind) -> dict[str, tuple[str, ...]]:
+    def types(self, *kinds: EntityKind) -> dict[str, tuple[str, ...]]:
         """Return the types of each topic or service, by its absolute name, sorted."""
         types: dict[str, set[str]] = {}
         for kind in kinds:

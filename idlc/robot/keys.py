@@ -36,7 +36,7 @@ _QOS = "{}:{}:{},{}:{},{}:{},{}:{},{},{}"
 _QOS_PATTERN = re.compile(_QOS.replace("{}", r"(\d{0,10})"), re.ASCII)
 
 
-class Kind(str, Enum):
+class EntityKind(str, Enum):
     """A kind of entity; the values are those in tokens."""
 
     NODE = "NN"
@@ -59,7 +59,7 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
     session: str
     node_id: int
     id: int
-    kind: Kind
+    kind: EntityKind
     enclave: str = "/"
     namespace: str = "/"
     node: str
@@ -105,7 +105,7 @@ def all_tokens(domain: int | None) -> str:
 def _make_token(entity: Entity) -> str:
     names = [entity.enclave, entity.namespace, entity.node]
     end = []
-    if entity.kind is not Kind.NODE:
+    if entity.kind is not EntityKind.NODE:
         names += (entity.name, dds_type(entity.type), entity.hash or NO_HASH)
         end = [format_qos(entity.qos)]
     head = (_PREFIX, entity.domain, entity.session, entity.node_id, entity.id, entity.kind.value)
@@ -131,7 +131,7 @@ def parse_token(token: str) -> Entity | None:
         return None
     parts |= {name: int(parts[name]) for name in ("domain", "node_id", "id")}
     parts["hash"] = "" if parts["hash"] == NO_HASH else parts["hash"]
-    parts |= {"kind": Kind(parts["kind"] or Kind.NODE), "type": type_ or ""}
+    parts |= {"kind": EntityKind(parts["kind"] or EntityKind.NODE), "type": type_ or ""}
     return Entity(**parts | {"qos": qos or QoSProfile(), "token": token})
 
 

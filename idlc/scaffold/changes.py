@@ -23,7 +23,7 @@ from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 from idlc.project.write import FileChange, WritePlan, apply, compare, difference, shown
-from idlc.scaffold.roles import ROLES, Endpoint, Role
+from idlc.scaffold.roles import ROLES, EndpointSpec, Role
 
 
 class FileOutcome(NamedTuple):
@@ -33,7 +33,7 @@ class FileOutcome(NamedTuple):
     what: str
 
 
-class Settings(NamedTuple):
+class ScaffoldOptions(NamedTuple):
     """The options of every scaffold command, and the folder that it works in."""
 
     root: Root
@@ -42,7 +42,7 @@ class Settings(NamedTuple):
     include: tuple[str, ...] = ()
 
 
-class Result(NamedTuple):
+class ScaffoldResult(NamedTuple):
     """The files that a command wrote or would write, with a diff if it wrote nothing.
 
     `notes` list steps to do by hand, `following` the arguments of the next `idlc` command.
@@ -63,7 +63,9 @@ def marked(text: str, old: bytes) -> bytes:
 class Project:
     """A package's folder, existing or not; `name` is the folder's name in reports."""
 
-    def __init__(self, name: str, settings: Settings, report: Report, package: str = "") -> None:
+    def __init__(
+        self, name: str, settings: ScaffoldOptions, report: Report, package: str = ""
+    ) -> None:
         self.name = name
         self.package = package
         self.path: Path = settings.root.absolute(name)
@@ -129,7 +131,7 @@ class Project:
 
     def write(
         self, added: Mapping[str, str], edited: Mapping[str, str] = MappingProxyType({})
-    ) -> Result | None:
+    ) -> ScaffoldResult | None:
         """Write all files or none, or only show the changes; `None` after a problem.
 
         `edited` texts replace what was read before; `added` ones only an equal file, unless the
@@ -163,9 +165,11 @@ class Project:
         if self._report.had_errors:
             return None
         if self._settings.dry_run:
-            return Result(self.name, tuple(done), tuple(self._diff(changes.values())))
+            return ScaffoldResult(self.name, tuple(done), tuple(self._diff(changes.values())))
         plan = WritePlan(self.path, (*changes.values(),), {})
-        return Result(self.name, tuple(done)) if apply(plan, self.name, self._report) else None
+        return (
+            ScaffoldResult(self.name, tuple(done)) if apply(plan, self.name, self._report) else None
+        )
 
     def _diff(self, changes: Iterable[FileChange]) -> Iterator[str]:
         """Yield the lines of a unified diff of planned changes."""
@@ -182,7 +186,7 @@ class Project:
                 yield f"--- {before}\n+++ b/{path}\n"
 
 
-def find_package(settings: Settings, report: Report) -> Project | None:
+def find_package(settings: ScaffoldOptions, report: Report) -> Project | None:
     """Return the package that the working folder belongs to; report a missing one."""
     root = settings.root
     path = root.manifest(root.base)
@@ -196,18 +200,20 @@ def find_package(settings: Settings, report: Report) -> Project | None:
     return None if name is None else Project(folder, settings, report, name)
 
 
-def check(role: Role, type_: str, settings: Settings) -> None:
+def check(role: Role, type_: str, settings: ScaffoldOptions) -> None:
     """Raise ValueError if there is no such interface for the package of the working folder."""
     report = Report()
     project = find_package(settings, report)
     if project is None or role.kind is None:
         return  # a missing package is reported when the node is written
-    type_name(Endpoint(role, type_, ""), project.package, project.library(), report)
+    type_name(EndpointSpec(role, type_, ""), project.package, project.library(), report)
     for problem in report:
         raise ValueError("; ".join(filter(None, (problem.message, problem.hint))))
 
 
-def type_name(endpoint: Endpoint, own: str, library: Library, report: Report) -> ir.TypeName | None:
+def type_name(
+    endpoint: EndpointSpec, own: str, library: Library, report: Report
+) -> ir.TypeName | None:
     """Return the interface that `Name`, `package/Name` or `package/kind/Name` means here."""
     kind = endpoint.role.kind
     if kind is None:

@@ -43,7 +43,7 @@ from idlc.project.prefixes import INDEX
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, load_settings, scope, toml
 from idlc.project.templates import code
-from idlc.scaffold.changes import Project, Result, Settings, marked
+from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult, marked
 from idlc.scaffold.interface import implied_packages, starter
 from idlc.scaffold.layouts import SETUP, Layout, package_of, tool_of
 from idlc.scaffold.package import LICENSES, Package, package_files
@@ -129,12 +129,12 @@ class Draft:
             texts[self.path / path] = marked(text, old if isinstance(old, bytes) else b"")
         return Root(self.path, texts)
 
-    def write(self, report: Report, *, dry_run: bool = False) -> Result | None:
+    def write(self, report: Report, *, dry_run: bool = False) -> ScaffoldResult | None:
         """Write all files or none, or only show the changes.
 
         Reports IDL612 for a file that was edited since the changes were planned.
         """
-        settings = Settings(Root(self.path), dry_run=dry_run)
+        settings = ScaffoldOptions(Root(self.path), dry_run=dry_run)
         project = Project(".", settings, report, self.project.package)
         for path, before in self._before.items():
             if project.text(path) != before:
@@ -206,7 +206,7 @@ def _included(inner: Root, paths: Sequence[str], around: Mapping[str, Path]) -> 
 
 def prepare(
     layout: Layout,
-    settings: Settings,
+    settings: ScaffoldOptions,
     report: Report,
     around: Mapping[str, Path] = MappingProxyType({}),
 ) -> Preparation | None:
@@ -650,7 +650,7 @@ def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
     # what CMake's packages generate for Python is not committed, and others name their folder
     is_committed = top == layout.folder and layout.kind not in ("ament_cmake", "workspace")
     text = code().get_template(template).render(is_committed=is_committed)
-    draft = Draft(Project(".", Settings(Root(top)), report))
+    draft = Draft(Project(".", ScaffoldOptions(Root(top)), report))
     if _MOVING in text and (commit := git.commit("HEAD", top.parent / "idlc")):
         text = text.replace(_MOVING, f"rev: {commit}")
     present = draft.text(path)
@@ -674,7 +674,7 @@ def obtaining(draft: Draft) -> list[str]:
 
 def recommendation(root: Root, report: Report) -> Draft:
     """Plan that VS Code recommends idlc's extension, in a folder that has settings for it."""
-    draft = Draft(Project(".", Settings(root), report))
+    draft = Draft(Project(".", ScaffoldOptions(root), report))
     path, name = ".vscode/extensions.json", '"idlc.idlc"'
     place = root.base / ".vscode"
     text = draft.text(path) if is_folder(place) and not place.is_symlink() else name

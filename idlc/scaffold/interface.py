@@ -16,7 +16,7 @@ from idlc.packaging.cmake import calls
 from idlc.packaging.facts import folders
 from idlc.packaging.outcome import Edited, Outcome, Refused
 from idlc.project.settings import load_settings
-from idlc.scaffold.changes import Result, Settings, find_package
+from idlc.scaffold.changes import ScaffoldOptions, ScaffoldResult, find_package
 from idlc.scaffold.package import rendered_for
 
 SEPARATOR = "---"
@@ -121,9 +121,9 @@ def interface(
     kind: ir.Kind,
     name: str,
     fields: Sequence[str],
-    settings: Settings,
+    settings: ScaffoldOptions,
     report: Report,
-) -> Result | None:
+) -> ScaffoldResult | None:
     """Write an interface file into the package that the working folder belongs to."""
     project = find_package(settings, report)
     if project is None:

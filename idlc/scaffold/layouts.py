@@ -27,7 +27,7 @@ from idlc.project.package_xml import declared_name, read_statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, broken_toml, load_settings, scope, toml
 
-Kind: TypeAlias = Literal["ament_python", "ament_cmake", "library", "empty", "workspace"]
+LayoutKind: TypeAlias = Literal["ament_python", "ament_cmake", "library", "empty", "workspace"]
 
 SETUP = "setup.py"
 #: Files that may lie in a folder in which a package begins, and in a package's `src`.
@@ -46,7 +46,7 @@ class Layout(NamedTuple):
     `backend` builds an installable one. `packages` are the folders in a workspace.
     """
 
-    kind: Kind
+    kind: LayoutKind
     folder: Path
     name: str = ""
     home: str = ""

@@ -18,16 +18,16 @@ from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.packaging import dependencies, entry_points, launch_py
 from idlc.packaging.facts import folders, home_of
 from idlc.packaging.layout import layout
-from idlc.packaging.outcome import Edited, Outcome, Refused, Script
+from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused
 from idlc.packaging.setup_py import Setup
 from idlc.project.package_xml import statements
 from idlc.project.prefixes import distribution, python_folders
 from idlc.project.settings import load_settings
 from idlc.scaffold import changes, interface, spec
-from idlc.scaffold.changes import Project, Result, Settings
+from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult
 from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
-from idlc.scaffold.spec import Plan, plan
+from idlc.scaffold.spec import NodePlan, plan
 
 MANIFEST = "package.xml"
 SETUP = "setup.py"
@@ -38,7 +38,7 @@ ROBUST_TESTS = "test/robust"
 LAUNCH_ENDING = "launch.py"
 
 
-class Entry(NamedTuple):
+class NodeEntry(NamedTuple):
     """The changes that add a node to a package: new files, edits, and steps to do by hand.
 
     `notes` name the file that each is about.
@@ -63,13 +63,13 @@ def paths(package: str, launch_files: Iterable[str], home: str = "") -> list[str
 
 
 def node_entry(
-    planned: Plan,
+    planned: NodePlan,
     texts: Mapping[str, str],
     *,
     keys: Iterable[str] = (),
     folders: Mapping[str, bool] = MappingProxyType({}),
     home: str = "",
-) -> Entry:
+) -> NodeEntry:
     """Return the changes that add a node to a package, but for its own files.
 
     `texts` are those of the package's files that exist. A package with interfaces,
@@ -78,7 +78,7 @@ def node_entry(
     A launch file lists the node, unless it does one thing and ends: that is for the command line.
     """
     node = planned.node
-    script = Script(node.name, f"{node.package}.{node.name}:main")
+    script = ConsoleScript(node.name, f"{node.package}.{node.name}:main")
     described = {name: texts[name] for name in SETUP_FILES if name in texts}
     if (own := tuple(keys)) and SETUP in described:
         text = described[SETUP]
@@ -100,11 +100,11 @@ def node_entry(
     if conftest not in texts:
         template = f"node/{'short/' if planned.short else ''}conftest.py.jinja"
         added[conftest] = rendered_for(node.package, template)
-    entry = Entry(added, edits, tuple(notes))
+    entry = NodeEntry(added, edits, tuple(notes))
     return _with_launch(entry, node, texts) if launch else entry
 
 
-def _with_launch(entry: Entry, node: spec.Node, texts: Mapping[str, str]) -> Entry:
+def _with_launch(entry: NodeEntry, node: spec.NodeSpec, texts: Mapping[str, str]) -> NodeEntry:
     """Return an entry that also adds the node to a launch file, which setup.py installs."""
     added, edits, notes = {**entry.added}, {**entry.edits}, [*entry.notes]
     file = next((name for name in texts if name.startswith("launch/")), "")
@@ -127,7 +127,7 @@ def _with_launch(entry: Entry, node: spec.Node, texts: Mapping[str, str]) -> Ent
         if line:
             why = f"does not show whether it installs `{path}`"
             notes.append((SETUP, f"{why}: if not, add {line} to `data_files`"))
-    return Entry(added, edits, tuple(notes))
+    return NodeEntry(added, edits, tuple(notes))
 
 
 def _installed_package(
@@ -154,12 +154,14 @@ def _installed_package(
         yield SETUP, f"may not install the node: {missing}"
 
 
-def _tests(planned: Plan) -> str:
+def _tests(planned: NodePlan) -> str:
     """Return the folder of the node's test."""
     return TESTS if planned.short else ROBUST_TESTS
 
 
-def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
+def node(
+    requested: spec.NodeSpec, settings: ScaffoldOptions, report: Report
+) -> ScaffoldResult | None:
     """Write a node and its test, and add it to the files that list the nodes of its package."""
     project = changes.find_package(settings, report)
     if project is None:
@@ -173,7 +175,7 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     planned = _planned(requested._replace(package=own), project, report)
     if planned is None or report.had_errors:
         return None
-    entry = Entry({}, {})
+    entry = NodeEntry({}, {})
     with stage("scaffold", name):
         files = {
             f"{home}/{name}.py": render(planned),
@@ -198,7 +200,7 @@ def node(requested: spec.Node, settings: Settings, report: Report) -> Result | N
     return result._replace(notes=tuple(notes), following=after)
 
 
-def _notes(planned: Plan, entry: Entry, project: Project) -> list[str]:
+def _notes(planned: NodePlan, entry: NodeEntry, project: Project) -> list[str]:
     """Return what is left to do by hand, and the packages that cannot be imported here."""
     notes = [f"`{project.shown(path)}` {text}" for path, text in entry.notes]
     absent = [package for package in planned.packages if not python_folders(package)]
@@ -222,7 +224,7 @@ def _needs_python(project: Project) -> Diagnostic:
     return codes.CANNOT_EDIT.of(project.shown(MANIFEST), message, hint=hint)
 
 
-def _planned(requested: spec.Node, project: Project, report: Report) -> Plan | None:
+def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> NodePlan | None:
     """Return the node with the interfaces of its endpoints; report missing ones."""
     library = project.library()
     interfaces: list[ir.Interface | None] = []

@@ -11,7 +11,7 @@ from idlc.model import derive, ir
 from idlc.project.templates import Code, code
 from idlc.scaffold import roles, samples, spec
 from idlc.scaffold.samples import Page
-from idlc.scaffold.spec import Placed, Plan
+from idlc.scaffold.spec import NodePlan, ResolvedEndpoint
 
 #: Names that a module of a node uses itself, whatever its roles.
 _TAKEN = (
@@ -50,7 +50,7 @@ class Import(NamedTuple):
     names: tuple[Code, ...] = ()
 
 
-class Part(NamedTuple):
+class EndpointPart(NamedTuple):
     """An endpoint: `word` is for names, `title` for text, `name` the literal of its name in ROS 2.
 
     `template` has the sections of its role. `sample` has values for the sections of the interface
@@ -66,7 +66,7 @@ class Part(NamedTuple):
     period: Code
     qos: Code
     patience: Code
-    sample: Mapping[str, samples.Sample]
+    sample: Mapping[str, samples.SampleMessage]
     log: Mapping[str, Code]
 
 
@@ -96,7 +96,7 @@ class RequestView(NamedTuple):
     type: Code
     method: Code
     cancel: Code
-    sample: samples.Sample
+    sample: samples.SampleMessage
     arguments: tuple[samples.Argument, ...]
 
 
@@ -113,14 +113,14 @@ class NodeView(NamedTuple):
     imports: tuple[tuple[Import, ...], ...]
     constants: tuple[Code, ...]
     parameters: tuple[ParameterView, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[EndpointPart, ...]
     requests: tuple[RequestView, ...]
     helpers: frozenset[str]
     lifecycle: bool
     once: bool
 
 
-def render(planned: Plan) -> str:
+def render(planned: NodePlan) -> str:
     """Return the text of a node's module."""
     node = planned.node
     page = Page(planned.messages, clock=CLOCK, taken=_TAKEN, own=node.package)
@@ -155,7 +155,9 @@ def render(planned: Plan) -> str:
     return code().get_template("node/module.py.jinja").render(node=view)
 
 
-def _part(placed: Placed, page: Page, short: bool, spelled_out: Iterable[str] = ()) -> Part:
+def _part(
+    placed: ResolvedEndpoint, page: Page, short: bool, spelled_out: Iterable[str] = ()
+) -> EndpointPart:
     """Return an endpoint as its node or its test sees it, with values for some sections."""
     endpoint, word, interface = placed
     messages = derive.sections(interface) if interface else ()
@@ -165,7 +167,7 @@ def _part(placed: Placed, page: Page, short: bool, spelled_out: Iterable[str] = 
     period = repr(round(seconds, 6))
     if abs(float(period) - seconds) >= seconds * 1e-9:
         period = f"1.0 / {1.0 / seconds:.6g}"
-    return Part(
+    return EndpointPart(
         template=f"node/{'short/' if short else ''}{endpoint.role.name}.py.jinja",
         word=Code(word),
         title=Code(endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word),
@@ -179,17 +181,17 @@ def _part(placed: Placed, page: Page, short: bool, spelled_out: Iterable[str] = 
     )
 
 
-def _helpers(node: spec.Node) -> frozenset[str]:
+def _helpers(node: spec.NodeSpec) -> frozenset[str]:
     return frozenset().union(*(endpoint.role.helpers for endpoint in node.endpoints))
 
 
-def _constants(node: spec.Node) -> tuple[Code, ...]:
+def _constants(node: spec.NodeSpec) -> tuple[Code, ...]:
     """Return the lines that define constants of qualities of service."""
     lines = (endpoint.qos.constant for endpoint in node.endpoints)
     return tuple(map(Code, dict.fromkeys(filter(None, lines))))
 
 
-def _parameter(parameter: spec.Parameter) -> ParameterView:
+def _parameter(parameter: spec.ParameterSpec) -> ParameterView:
     value = parameter.default
     return ParameterView(
         name=Code(repr(parameter.name)),
@@ -199,7 +201,7 @@ def _parameter(parameter: spec.Parameter) -> ParameterView:
     )
 
 
-def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
+def _requests(planned: NodePlan, page: Page) -> Iterator[RequestView]:
     """Yield the requests that a node sends."""
     alone = len(planned.asking) == 1
     for endpoint, word, interface in planned.asking:
@@ -222,7 +224,7 @@ def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
         )
 
 
-def _short_request(planned: Plan, page: Page) -> Iterator[RequestView]:
+def _short_request(planned: NodePlan, page: Page) -> Iterator[RequestView]:
     """Yield the request that a short node sends, if there is one, with sensible values."""
     for endpoint, word, interface in planned.asking:
         assert endpoint.role.request is not None
@@ -239,7 +241,7 @@ def _short_request(planned: Plan, page: Page) -> Iterator[RequestView]:
         )
 
 
-def _short_imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
+def _short_imports(planned: NodePlan, page: Page) -> tuple[tuple[Import, ...], ...]:
     """Return the imports of a short node, in groups."""
     imports = defaultdict(set, page.imports())
     for endpoint in planned.node.endpoints:
@@ -251,7 +253,7 @@ def _short_imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
     return _import_groups(imports, ("rclpy",))
 
 
-def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
+def _imports(planned: NodePlan, page: Page) -> tuple[tuple[Import, ...], ...]:
     """Return the imports in groups: of the standard library, then all others."""
     node = planned.node
     waits = "pause" in _helpers(node)
@@ -319,13 +321,13 @@ class TestView(NamedTuple):
     constants: tuple[Code, ...]
     offered: tuple[Code, ...]
     parameters: tuple[ParameterView, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[EndpointPart, ...]
     lifecycle: bool
     once: bool
     ends: bool
 
 
-def render_test(planned: Plan) -> str:
+def render_test(planned: NodePlan) -> str:
     """Return the text of a node's test."""
     node = planned.node
     parts, imports = _tested(planned)
@@ -388,14 +390,14 @@ def _indent(line: str) -> str:
     return line[: len(line) - len(line.lstrip())]
 
 
-def _resolved(endpoint: roles.Endpoint, node: str) -> str:
+def _resolved(endpoint: roles.EndpointSpec, node: str) -> str:
     """Return the name of an endpoint in ROS 2's graph."""
     topic = endpoint.topic.replace("~", f"/{node}")
     whole = topic if topic.startswith("/") else f"/{topic}"
     return f"{whole}/_action/send_goal" if endpoint.role.kind == "action" else whole
 
 
-def test_packages(planned: Plan) -> list[str]:
+def test_packages(planned: NodePlan) -> list[str]:
     """Return the packages that the test and its conftest.py need besides those of the node."""
     packages = {module.partition(".")[0] for module in _tested(planned)[1]} | {"rclpy"}
     if not planned.short:
@@ -404,7 +406,7 @@ def test_packages(planned: Plan) -> list[str]:
     return ["python3-pytest", *sorted(others)]
 
 
-def _tested(planned: Plan) -> tuple[tuple[Part, ...], Mapping[str, set[str]]]:
+def _tested(planned: NodePlan) -> tuple[tuple[EndpointPart, ...], Mapping[str, set[str]]]:
     """Return the endpoints as a test sees them, and its imports besides pytest."""
     node = planned.node
     page = Page(planned.messages, taken=_TAKEN_BY_TESTS)

@@ -18,8 +18,8 @@ from idlc.model.names import why_not_package
 from idlc.project.lock import BUILD_STEP
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
-from idlc.project.templates import Code, Text, code
-from idlc.scaffold.changes import Project, Result, Settings
+from idlc.project.templates import Code, EscapedText, code
+from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult
 
 VERSION = "0.1.0"
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
@@ -50,10 +50,10 @@ class PackageView(NamedTuple):
     version: Code
     license: Code
     build_type: Code
-    description: Text
-    xml_description: Text
-    xml_maintainer: Text
-    xml_email: Text
+    description: EscapedText
+    xml_description: EscapedText
+    xml_maintainer: EscapedText
+    xml_email: EscapedText
     py_description: Code
     py_maintainer: Code
     py_email: Code
@@ -121,10 +121,10 @@ def rendered(template: str, package: Package) -> str:
         version=Code(VERSION),
         license=Code(package.license),
         build_type=Code(package.build_type),
-        description=Text(package.description),
-        xml_description=Text(escape(package.description)),
-        xml_maintainer=Text(escape(package.maintainer)),
-        xml_email=Text(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
+        description=EscapedText(package.description),
+        xml_description=EscapedText(escape(package.description)),
+        xml_maintainer=EscapedText(escape(package.maintainer)),
+        xml_email=EscapedText(quoteattr(package.email)[1:-1].replace('"', "&quot;")),
         py_description=Code(repr(package.description)),
         py_maintainer=Code(repr(package.maintainer)),
         py_email=Code(repr(package.email)),
@@ -146,11 +146,11 @@ _Choice: TypeAlias = tuple[str, Span, list[str], str]
 
 def package(
     requested: Package,
-    settings: Settings,
+    settings: ScaffoldOptions,
     report: Report,
     starters: Mapping[str, str] | None = None,
     chosen: Collection[str] = (),
-) -> Result | None:
+) -> ScaffoldResult | None:
     """Write a new package, with interfaces if it has none yet.
 
     `chosen` are the fields of `requested`, and `starters`, that the user chose. Reports IDL620

@@ -57,7 +57,7 @@ class Question(NamedTuple):
     separator: str = ""
 
 
-class Request(NamedTuple):
+class NodeRequest(NamedTuple):
     """A request that a node sends, with values from its command line.
 
     `method` is the name of the coroutine that sends it, `cancel` of one that cancels it, both with
@@ -70,12 +70,12 @@ class Request(NamedTuple):
 
 
 #: The value of an option, taken apart: type, topic, and period in seconds.
-Value: TypeAlias = tuple[str, str, float | None]
+EndpointValue: TypeAlias = tuple[str, str, float | None]
 
 _TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
-def _typed(text: str, shape: str = "TYPE:NAME") -> Value:
+def _typed(text: str, shape: str = "TYPE:NAME") -> EndpointValue:
     """Return the interface and the name that `TYPE:NAME` means."""
     type_, colon, topic = text.partition(":")
     if not colon or not type_ or not topic:
@@ -111,13 +111,13 @@ class Role(NamedTuple):
     summary: str
     family: str
     metavar: str = "TYPE:NAME"
-    read: Callable[[str], Value] = _typed
+    read: Callable[[str], EndpointValue] = _typed
     samples: tuple[str, ...] = ()
     question: Question | None = None
     imports: Imports = NO_IMPORTS
     test_imports: Imports = NO_IMPORTS
     helpers: frozenset[str] = frozenset()
-    request: Request | None = None
+    request: NodeRequest | None = None
     short: Imports | None = None
     short_test: Imports = NO_IMPORTS
 
@@ -127,7 +127,7 @@ class Role(NamedTuple):
         return f"--{self.name.replace('_', '-')}"
 
 
-class Endpoint(NamedTuple):
+class EndpointSpec(NamedTuple):
     """One thing that a node does, in a role. `type` is empty in roles without an interface."""
 
     role: Role
@@ -142,7 +142,7 @@ class Endpoint(NamedTuple):
         return re.sub(r"[^a-z0-9]+", "_", self.topic.lower()).strip("_")[:30].rstrip("_")
 
 
-def _published(text: str) -> Value:
+def _published(text: str) -> EndpointValue:
     """Return what `TYPE:TOPIC[@HZ]` means."""
     type_, colon, rest = text.partition(":")
     topic, at, hertz = rest.partition("@")
@@ -205,7 +205,7 @@ ROLES: tuple[Role, ...] = (
         summary="Calls {}",
         family="action",
         helpers=frozenset({"pause", "until"}),
-        request=Request("the request", "call_{}"),
+        request=NodeRequest("the request", "call_{}"),
     ),
     Role(
         name="action_server",
@@ -241,7 +241,7 @@ ROLES: tuple[Role, ...] = (
         },
         test_imports={"rclpy.action.server": _SERVER, "rclpy.task": ("Future",)},
         helpers=frozenset({"pause", "retire", "until"}),
-        request=Request("the goal", "send_{}_goal", cancel="cancel_{}_goal"),
+        request=NodeRequest("the goal", "send_{}_goal", cancel="cancel_{}_goal"),
     ),
     Role(
         name="timer",

@@ -8,7 +8,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.model import ir, python_names
-from idlc.project.templates import Code, Text
+from idlc.project.templates import Code, EscapedText
+from idlc.wire.layout import Messages
 
 #: The width of comments, which may be indented far.
 COMMENT = 64
@@ -22,8 +23,6 @@ _QUATERNION = ir.TypeName("geometry_msgs", "msg", "Quaternion")
 _STRINGS = {"frame_id": "base_link", "child_frame_id": "base_link", "data": "hello"}
 #: Fields that hold one of the constants of their message.
 _CHOICES = ("type", "state", "status", "mode", "kind", "level", "command", "action", "code")
-
-Messages = Mapping[ir.TypeName, ir.Message]
 
 
 class Page:
@@ -72,12 +71,12 @@ class FieldSample(NamedTuple):
     """A field with a sensible value: source, or a message that is spelled out."""
 
     name: Code
-    comment: tuple[Text, ...]
+    comment: tuple[EscapedText, ...]
     value: Code
-    message: Sample | None = None
+    message: SampleMessage | None = None
 
 
-class Sample(NamedTuple):
+class SampleMessage(NamedTuple):
     """A message whose fields have sensible values; `type` is its class in the module."""
 
     type: Code
@@ -86,7 +85,7 @@ class Sample(NamedTuple):
 
 def sample(
     message: ir.Message, page: Page, values: Mapping[str, str] = MappingProxyType({})
-) -> Sample:
+) -> SampleMessage:
     """Return a message with a value for each field.
 
     `values` are those of fields that come from elsewhere. A field with a long default keeps it.
@@ -95,7 +94,7 @@ def sample(
     for field in message.fields:
         name = Code(python_names.field(field.name))
         meaning = _meaning(field) if message.name.package == page.own else ""
-        comment = tuple(map(Text, textwrap.wrap(meaning, COMMENT)))
+        comment = tuple(map(EscapedText, textwrap.wrap(meaning, COMMENT)))
         nested = _nested(field, page)
         if field.name in values:
             fields.append(FieldSample(name, (), Code(values[field.name])))
@@ -103,7 +102,7 @@ def sample(
             fields.append(FieldSample(name, comment, Code(), sample(nested, page)))
         elif not _has_long_default(field):
             fields.append(FieldSample(name, comment, Code(field_value(message, field, page))))
-    return Sample(Code(page.use(message.name)), tuple(fields))
+    return SampleMessage(Code(page.use(message.name)), tuple(fields))
 
 
 def _has_long_default(field: ir.Field) -> bool:
@@ -217,7 +216,7 @@ class Argument(NamedTuple):
 
 def request(
     message: ir.Message, page: Page, prefix: str, *, positional: bool
-) -> tuple[Sample, tuple[Argument, ...]]:
+) -> tuple[SampleMessage, tuple[Argument, ...]]:
     """Return a request whose fields come from the command line, and its arguments there."""
     values, arguments = {}, []
     for field in message.fields:

@@ -9,19 +9,18 @@ import keyword
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from idlc.model import ir
-from idlc.scaffold.roles import DEFAULT_QOS, ROLES, Endpoint, Role, qos_preset
+from idlc.scaffold.roles import DEFAULT_QOS, ROLES, EndpointSpec, Role, qos_preset
 
 #: Names that a module of a node cannot have in its package.
 TAKEN = frozenset({"msg", "srv", "action"})
 _NODE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*")
 
-Scalar: TypeAlias = bool | int | float | str
 #: The types of parameters by their usual names.
-PARAMETERS: dict[str, type[Scalar]] = {
+PARAMETERS: dict[str, type[ir.Scalar]] = {
     "bool": bool,
     "int": int,
     "integer": int,
@@ -33,11 +32,11 @@ PARAMETERS: dict[str, type[Scalar]] = {
 _BOOLEANS = {"true": True, "false": False}
 
 
-class Parameter(NamedTuple):
+class ParameterSpec(NamedTuple):
     """A parameter with its default."""
 
     name: str
-    default: Scalar | tuple[Scalar, ...]
+    default: ir.Scalar | tuple[ir.Scalar, ...]
     annotation: str
 
     @property
@@ -46,13 +45,13 @@ class Parameter(NamedTuple):
         return self.name.lower().replace(".", "_")
 
 
-class Node(NamedTuple):
+class NodeSpec(NamedTuple):
     """A requested node; its endpoints are in the order of the roles."""
 
     name: str
     package: str
-    endpoints: tuple[Endpoint, ...] = ()
-    parameters: tuple[Parameter, ...] = ()
+    endpoints: tuple[EndpointSpec, ...] = ()
+    parameters: tuple[ParameterSpec, ...] = ()
     lifecycle: bool = False
     robust: bool = False
 
@@ -71,16 +70,16 @@ def check_name(name: str) -> str:
     return name
 
 
-def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
+def endpoint(role: Role, text: str, preset: str | None = None) -> EndpointSpec:
     """Return the endpoint that an option's value means, with a quality of service by its name."""
     if preset is not None and role.kind != "msg":
         options = ", ".join(other.option for other in ROLES if other.kind == "msg")
         raise ValueError(f"--qos is for {options}")
     quality = DEFAULT_QOS if preset is None else qos_preset(preset)
-    return Endpoint(role, *role.read(text), quality)
+    return EndpointSpec(role, *role.read(text), quality)
 
 
-def parameter(text: str) -> Parameter:
+def parameter(text: str) -> ParameterSpec:
     """Return the parameter that `NAME:TYPE=DEFAULT` means; `TYPE[]` for several values."""
     head, equals, default = text.partition("=")
     name, _, type_ = head.partition(":")
@@ -92,15 +91,15 @@ def parameter(text: str) -> Parameter:
             + ", and arrays of these with []"
         )
     if not type_.endswith("[]"):
-        return Parameter(name, _value(element, default, name), element.__name__)
+        return ParameterSpec(name, _value(element, default, name), element.__name__)
     parts = [part.strip() for part in default.split(",") if part.strip()]
     values = tuple(_value(element, part, name) for part in parts)
     if not values:
         raise ValueError(f"the parameter `{name}` needs at least one value, such as `=1,2`")
-    return Parameter(name, values, f"list[{element.__name__}]")
+    return ParameterSpec(name, values, f"list[{element.__name__}]")
 
 
-def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
+def _value(type_: type[ir.Scalar], text: str, name: str) -> ir.Scalar:
     try:
         if type_ is bool:
             return _BOOLEANS[text.lower()]
@@ -115,23 +114,23 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
     return value
 
 
-class Placed(NamedTuple):
+class ResolvedEndpoint(NamedTuple):
     """An endpoint with its interface, if its role has one, and a word for its names."""
 
-    endpoint: Endpoint
+    endpoint: EndpointSpec
     word: str
     interface: ir.Interface | None
 
 
-class Plan(NamedTuple):
+class NodePlan(NamedTuple):
     """A node with its endpoints and all messages that those may need."""
 
-    node: Node
-    endpoints: tuple[Placed, ...]
+    node: NodeSpec
+    endpoints: tuple[ResolvedEndpoint, ...]
     messages: Mapping[ir.TypeName, ir.Message]
 
     @property
-    def asking(self) -> tuple[Placed, ...]:
+    def asking(self) -> tuple[ResolvedEndpoint, ...]:
         """The endpoints that send requests or goals, which the command line describes."""
         return tuple(placed for placed in self.endpoints if placed.endpoint.role.request)
 
@@ -162,15 +161,15 @@ class Plan(NamedTuple):
 
 
 def plan(
-    node: Node,
+    node: NodeSpec,
     interfaces: Iterable[ir.Interface | None],
     messages: Mapping[ir.TypeName, ir.Message],
-) -> Plan:
+) -> NodePlan:
     """Return a node with the interfaces of its endpoints, in their order.
 
     Endpoints of one family have different words.
     """
-    placed: list[Placed] = []
+    placed: list[ResolvedEndpoint] = []
     seen: set[tuple[str, str]] = set()
     for endpoint, interface in zip(node.endpoints, interfaces, strict=True):
         word, count = endpoint.word, 1
@@ -178,5 +177,5 @@ def plan(
             count += 1
             word = f"{endpoint.word}_{count}"
         seen.add((endpoint.role.family, word))
-        placed.append(Placed(endpoint, word, interface))
-    return Plan(node, tuple(placed), messages)
+        placed.append(ResolvedEndpoint(endpoint, word, interface))
+    return NodePlan(node, tuple(placed), messages)

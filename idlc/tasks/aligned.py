@@ -11,7 +11,8 @@ import msgspec
 from idlc.api.recording import Recording
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.recordings.aligned.table import Summary
+from idlc.diagnostics.terminal import Progress
+from idlc.recordings.aligned.table import ClockFit
 from idlc.recordings.containers.source import RecordingError
 from idlc.tasks.columns import (
     STDOUT,
@@ -19,7 +20,6 @@ from idlc.tasks.columns import (
     TEXT,
     ColumnsOptions,
     Job,
-    Progress,
     WrittenFile,
     checked,
     opened,
@@ -42,7 +42,7 @@ class Grid(msgspec.Struct, frozen=True):
 
 def write_aligned(
     grid: Grid,
-    announce: Callable[[list[Summary]], None],
+    announce: Callable[[list[ClockFit]], None],
     recording: Recording,
     options: ColumnsOptions,
     report: Report,

@@ -10,7 +10,7 @@ import msgspec
 
 from idlc.check import builds, cmake_lists, outputs
 from idlc.check.registry import advise, check_package
-from idlc.check.select import Selection, switched_off, without_ignored
+from idlc.check.select import RuleSelection, switched_off, without_ignored
 from idlc.compiler.compiler import Compiler, library_for, stage
 from idlc.compiler.verdicts import IncrementalFindings
 from idlc.diagnostics import codes
@@ -40,7 +40,7 @@ class CheckOptions(msgspec.Struct, frozen=True):
 
     paths: tuple[str, ...]
     scope: Scope
-    selection: Selection = Selection()
+    selection: RuleSelection = RuleSelection()
     fix: bool = False
     diff: bool = False
 
@@ -251,7 +251,7 @@ class Checker:
 
 
 def check_all(
-    checkers: Mapping[str, Checker], packages: Sequence[inputs.Inputs], selection: Selection
+    checkers: Mapping[str, Checker], packages: Sequence[inputs.Inputs], selection: RuleSelection
 ) -> tuple[list[Diagnostic], dict[str, list[Model]]]:
     """Return the problems to show, each once, and the models for each distribution."""
     reports = {distro: Report() for distro in checkers}

@@ -24,6 +24,7 @@ from idlc.api.conditions import Condition
 from idlc.api.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.terminal import Progress
 from idlc.model.ir import DUMMY_FIELD
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
@@ -208,8 +209,6 @@ STDOUT = "-"
 TEXT = "text"
 
 
-#: Called with a topic, the number of messages done, and of all.
-Progress = Callable[[str, int, int], None]
 #: Writes files from an open recording.
 Work = Callable[["Recording", "ColumnsOptions", Report, Progress], Iterable["WrittenFile"]]
 

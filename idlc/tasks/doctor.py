@@ -11,7 +11,7 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.check.select import Selection
+from idlc.check.select import RuleSelection
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, enumerated, first_few
 from idlc.diagnostics.terminal import counted
@@ -147,7 +147,9 @@ def _installed(root: Root) -> Iterator[Finding]:
 
 def _packages(scope: Scope) -> Iterator[Finding]:
     report = Report()
-    check(CheckOptions((".",), scope, Selection(select=(codes.STALE_GENERATED_CODE.id,))), report)
+    check(
+        CheckOptions((".",), scope, RuleSelection(select=(codes.STALE_GENERATED_CODE.id,))), report
+    )
     for problem in report:
         if problem.code in (codes.STALE_GENERATED_CODE.id, codes.DUPLICATE_PACKAGE.id):
             yield Finding("package", f"{problem.where[0]}: {problem.message}", problem.hint or "")

@@ -26,7 +26,7 @@ BLOCKS = " ▁▂▃▄▅▆▇█"
 EXACT = 1 << 53
 
 
-class Numbers:
+class NumberStatistics:
     """The finite numbers of a column: extremes and mean, and sums for each interval of time."""
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class Preview:
         self.title = title
         self.rows = 0
         self.firsts: dict[str, list[str]] = {name: [] for name in names}
-        self.numbers: dict[str, Numbers] = {}
+        self.numbers: dict[str, NumberStatistics] = {}
         self.start = self.end = 0
         self.origin, self.interval = 0, 1  # of the intervals, in nanoseconds
 
@@ -119,7 +119,7 @@ class Preview:
             if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
                 values = column.to_numpy(zero_copy_only=False).astype(np.float64)
                 with np.errstate(over="ignore", invalid="ignore"):
-                    self.numbers.setdefault(name, Numbers()).add(values, intervals)
+                    self.numbers.setdefault(name, NumberStatistics()).add(values, intervals)
 
     def _intervals(self, times: Any) -> Any:
         """Return the interval of each time, after there are intervals for all."""

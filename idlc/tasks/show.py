@@ -214,7 +214,7 @@ def recording(
     from idlc.api.sources import read_source
     from idlc.recordings.types import (
         LocalTypes,
-        Summary,
+        RecordingSummary,
         damage_problems,
         recorded_types,
         versions,
@@ -227,7 +227,7 @@ def recording(
     report.extend(damage_problems(path, recording.damage))
     local = LocalTypes(scope, report)
     facts = []
-    span, size, sizes = recording.summary or Summary(None, 0, {})
+    span, size, sizes = recording.summary or RecordingSummary(None, 0, {})
     if span and span[1] >= END_OF_TIME:
         report.notes.append(f"`{path}`: a time is after the year 2262, so its length is not known")
         span = None

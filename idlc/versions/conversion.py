@@ -24,7 +24,7 @@ FATES: tuple[Fate, ...] = ("lost", "needs a rule", "rule", "automatic", "same by
 OPEN = FATES[:2]
 
 
-class Key(NamedTuple):
+class VersionKey(NamedTuple):
     """A version of a type: its full name and its type hash."""
 
     type: str
@@ -62,9 +62,9 @@ class Version:
         return self._model.messages[self.name]
 
     @cached_property
-    def key(self) -> Key:
+    def key(self) -> VersionKey:
         """The name and type hash."""
-        return Key(str(self.name), self._model.describer.hash(str(self.name)))
+        return VersionKey(str(self.name), self._model.describer.hash(str(self.name)))
 
     @cached_property
     def reached(self) -> set[ir.TypeName]:
@@ -80,7 +80,7 @@ class Version:
         return Version(models, name, self.find)
 
 
-class Finding(NamedTuple):
+class FieldFate(NamedTuple):
     """The fate of one field: of the new version, or of the old one if it was removed.
 
     `path` leads to it from the top, such as `wheels[].radius`; `type` is the structure that holds
@@ -102,7 +102,7 @@ ElementChange: TypeAlias = Literal[
 ]
 
 
-class Step(NamedTuple):
+class ConversionStep(NamedTuple):
     """The way from an old value to a new one.
 
     `element` says what is done with each element: `as is`, `float`, `int` (of a bool), `number` or
@@ -123,19 +123,19 @@ class FieldPlan(NamedTuple):
 
     new: ir.Field
     old: ir.Field | None
-    step: Step | None
-    finding: Finding
+    step: ConversionStep | None
+    finding: FieldFate
 
 
 class RuleFile(Protocol):
     """The rules for one pair of versions, as far as their syntax shows."""
 
     @property
-    def old(self) -> Key:
+    def old(self) -> VersionKey:
         """The version that the rules read."""
 
     @property
-    def new(self) -> Key:
+    def new(self) -> VersionKey:
         """The version that the rules write."""
 
     @property
@@ -158,7 +158,7 @@ class RuleFile(Protocol):
 class RuleFiles(Protocol):
     """Rules for several pairs of versions."""
 
-    def starting(self, old: Key) -> Iterable[RuleFile]:
+    def starting(self, old: VersionKey) -> Iterable[RuleFile]:
         """Return the rules that read a version."""
 
     def version(self, rules: RuleFile) -> Version | None:
@@ -168,7 +168,7 @@ class RuleFiles(Protocol):
 class _NoRules:
     """The rules of nobody."""
 
-    def starting(self, _: Key) -> Iterable[RuleFile]:
+    def starting(self, _: VersionKey) -> Iterable[RuleFile]:
         return ()
 
     def version(self, _: RuleFile) -> Version | None:
@@ -189,10 +189,10 @@ class Plan:
         self.old = old
         self.new = new
         self.fields: tuple[FieldPlan, ...] = ()
-        self.dropped: tuple[Finding, ...] = ()
+        self.dropped: tuple[FieldFate, ...] = ()
         self.through: tuple[Plan, ...] = ()
         self.rules: RuleFile | None = None
-        self.notes: tuple[Finding, ...] = ()
+        self.notes: tuple[FieldFate, ...] = ()
         self.in_order = True
 
     @cached_property
@@ -215,10 +215,10 @@ class Plan:
 
     def findings(
         self, prefix: str = "", seen: set[int | tuple[str, str, str]] | None = None
-    ) -> list[Finding]:
+    ) -> list[FieldFate]:
         """Return the findings at any depth, each with the first path to it."""
         seen = set() if seen is None else seen
-        findings: list[Finding] = []
+        findings: list[FieldFate] = []
         if id(self) in seen:  # otherwise exponential for structures that hold each other twice
             return findings
         seen.add(id(self))
@@ -243,7 +243,7 @@ class Plan:
         return next(fate for fate in FATES if fate in fates)
 
     @cached_property
-    def missing(self) -> list[Finding]:
+    def missing(self) -> list[FieldFate]:
         """The findings that need rules, or that no rule could help."""
         return [each for each in self.findings() if each.fate in OPEN]
 
@@ -280,7 +280,7 @@ class _Planner:
 
     def __init__(self, rules: RuleFiles) -> None:
         self._rules = rules
-        self._plans: dict[tuple[Key, Key, int, int], Plan] = {}
+        self._plans: dict[tuple[VersionKey, VersionKey, int, int], Plan] = {}
 
     def plan(self, old: Version, new: Version) -> Plan:
         """Return the plan from one version to another."""
@@ -303,7 +303,7 @@ class _Planner:
 
         It ends at the new version, or at one from which the rest needs no rule.
         """
-        ways: dict[Key, list[tuple[Version, Version, RuleFile | None]]] = {old.key: []}
+        ways: dict[VersionKey, list[tuple[Version, Version, RuleFile | None]]] = {old.key: []}
         order = [(old.key, old)]
         for key, version in order:
             for rules in self._rules.starting(key):
@@ -370,10 +370,10 @@ class _Planner:
     ) -> FieldPlan:
         """Return the plan of a field that both versions have, or of an added one."""
 
-        def finding(fate: Fate, reason: str, proposal: str = "") -> Finding:
+        def finding(fate: Fate, reason: str, proposal: str = "") -> FieldFate:
             span, earlier = field.name_span, before.name_span if before else None
             holder = str(new.name)
-            return Finding(fate, field.name, holder, field.name, reason, span, earlier, proposal)
+            return FieldFate(fate, field.name, holder, field.name, reason, span, earlier, proposal)
 
         if before is None:
             default = "" if field.default is None else f", {spell_value(field.default.value)}"
@@ -426,7 +426,7 @@ class _Planner:
 
     def _step(
         self, old: Version, new: Version, before: ir.FieldType, after: ir.FieldType
-    ) -> Step | str:
+    ) -> ConversionStep | str:
         """Return the way from a value of one type to one of another, or why there is none."""
         step = self._element(old, new, ir.element_of(before), ir.element_of(after))
         if isinstance(step, str):
@@ -453,20 +453,20 @@ class _Planner:
 
     def _element(
         self, old: Version, new: Version, before: ir.Element, after: ir.Element
-    ) -> Step | str:
+    ) -> ConversionStep | str:
         match before, after:
             case ir.Ref(), ir.Ref():
                 if before.target != after.target:
                     return "it is another type"
                 nested = self.plan(old.of(before.target), new.of(after.target))
-                return Step("nested", nested, same=nested.same, alike=nested.alike)
+                return ConversionStep("nested", nested, same=nested.same, alike=nested.alike)
             case ir.String(), ir.String():
                 if tighter(before, after):
                     return "old messages may contain text that is too long"
                 if before.wide and not after.wide:
                     return "a string cannot hold every text of a wstring"
                 same = before.wide == after.wide
-                return Step(same=same, alike=same)
+                return ConversionStep(same=same, alike=same)
             case ir.Primitive(), ir.Primitive():
                 return _number(before.name, after.name)
         return "the values are of another kind"
@@ -475,17 +475,17 @@ class _Planner:
 OCTETS = frozenset({"uint8", "char"})
 
 
-def _number(before: str, after: str) -> Step | str:
+def _number(before: str, after: str) -> ConversionStep | str:
     """Return the way from one primitive to another, or the reason why values may not fit."""
     if before == after or {before, after} <= OCTETS:
-        return Step()
+        return ConversionStep()
     if before == "byte" and after in OCTETS:
-        return Step("number", alike=False)
+        return ConversionStep("number", alike=False)
     if after == "byte" and before in OCTETS:
-        return Step("byte", alike=False)
+        return ConversionStep("byte", alike=False)
     if before == "bool":
         is_integer = after in _INTEGERS and after != "byte"
-        step = Step("int", same=False, alike=False)
+        step = ConversionStep("int", same=False, alike=False)
         return step if is_integer else "a bool is not such a number"
     if after in ("bool", "byte"):
         return "not every number fits"
@@ -495,7 +495,7 @@ def _number(before: str, after: str) -> Step | str:
     element: ElementChange = "number" if before == "byte" else "as is"
     if before in _INTEGERS and after not in _INTEGERS:
         element = "byte as float" if before == "byte" else "float"
-    return Step(element, same=False, alike=False)
+    return ConversionStep(element, same=False, alike=False)
 
 
 #: The least and the greatest value of each type of integers.
@@ -545,10 +545,10 @@ def _with_rule(entry: FieldPlan, plan: Plan, changes: Mapping[str, Renumbering])
     return FieldPlan(field, None, None, finding)
 
 
-def _dropped(field: ir.Field, plan: Plan) -> Finding:
+def _dropped(field: ir.Field, plan: Plan) -> FieldFate:
     """Return the finding of a field that only the old version has."""
     source = plan.new.message.source
-    return Finding(
+    return FieldFate(
         "automatic",
         field.name,
         str(plan.old.message.name),
@@ -619,7 +619,7 @@ def replaced_by(field: ir.Field, replaced: Mapping[str, Sequence[ir.Field]]) -> 
     return {name for name, fields in replaced.items() if field in fields}
 
 
-def _constants(old: ir.Message, new: ir.Message) -> Iterator[Finding]:
+def _constants(old: ir.Message, new: ir.Message) -> Iterator[FieldFate]:
     """Yield a finding for each constant whose value is another now: recorded values stay."""
     values = {constant.name: constant for constant in new.constants}
     for constant in old.constants:
@@ -627,7 +627,7 @@ def _constants(old: ir.Message, new: ir.Message) -> Iterator[Finding]:
         if later is not None and repr(later.value) != repr(constant.value):
             was, now = spell_value(constant.value), spell_value(later.value)
             reason = f"constant `{constant.name}` changed from {was} to {now}: recorded values stay"
-            yield Finding(
+            yield FieldFate(
                 "same bytes",
                 constant.name,
                 str(new.name),

@@ -14,7 +14,7 @@ from idlc.runtime.checked import validate, validate_element
 from idlc.runtime.codec import maker
 from idlc.runtime.names import ValidationError, public_name, slot_name
 from idlc.runtime.typeinfo import FieldInfo, structure_of
-from idlc.versions.conversion import FieldPlan, Plan, Step, Version, is_list
+from idlc.versions.conversion import ConversionStep, FieldPlan, Plan, Version, is_list
 
 Function: TypeAlias = Callable[[Any], Any]
 #: The rules of a file: the function of each field that has one.
@@ -134,7 +134,7 @@ class Converters:
 
 
 def list_change(
-    step: Step, new: ir.FieldType, element: Function | None, is_same: bool
+    step: ConversionStep, new: ir.FieldType, element: Function | None, is_same: bool
 ) -> Function | None:
     """Return the function from the old value of a field to the new one; `None` for the value.
 
@@ -154,7 +154,7 @@ def list_change(
     return lambda values: [element(value) for value in values]
 
 
-def value_change(step: Step) -> Function | None:
+def value_change(step: ConversionStep) -> Function | None:
     """Return the function of an element that is no message; `None` for the element itself."""
     return _CHANGES.get(step.element)
 

@@ -15,7 +15,7 @@ from idlc.project.files import is_folder
 from idlc.project.find import RULES
 from idlc.project.root import Root
 from idlc.versions.changes import Change
-from idlc.versions.conversion import Key, Plan, Version, direct_plan, make_plan
+from idlc.versions.conversion import Plan, Version, VersionKey, direct_plan, make_plan
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 
@@ -38,7 +38,7 @@ def rule_problems(folders: Sequence[str], model: Model, root: Root) -> Iterator[
 
 
 def _ambiguous(files: Sequence[Rules]) -> Iterator[Diagnostic]:
-    pairs: dict[tuple[Key, Key], Rules] = {}
+    pairs: dict[tuple[VersionKey, VersionKey], Rules] = {}
     for rules in files:
         first = pairs.setdefault((rules.old, rules.new), rules)
         if first is not rules:

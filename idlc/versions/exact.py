@@ -20,7 +20,7 @@ from idlc.runtime.checked import validate
 from idlc.runtime.codec import FAILURES, maker
 from idlc.runtime.names import public_name, slot_name
 from idlc.runtime.typeinfo import structure_of
-from idlc.versions.conversion import OCTETS, FieldPlan, Plan, Step, Version, is_list
+from idlc.versions.conversion import OCTETS, ConversionStep, FieldPlan, Plan, Version, is_list
 from idlc.versions.converters import (
     Function,
     RunRules,
@@ -38,7 +38,7 @@ PACKAGE = "idlc_exact"
 _INTEGERS = {"bool": "uint8", "byte": "uint8", "float32": "uint32", "float64": "uint64"}
 
 
-def is_same(step: Step, before: ir.Element, after: ir.Element) -> bool:
+def is_same(step: ConversionStep, before: ir.Element, after: ir.Element) -> bool:
     """Return whether the elements of a field have the same bytes in both versions."""
     if step.nested is not None:
         return step.nested.same
@@ -132,7 +132,7 @@ class _Layouts:
         return self._add(before), self._add(new_types)
 
     def _field(
-        self, plan: Plan, before: ir.FieldType, after: ir.FieldType, step: Step
+        self, plan: Plan, before: ir.FieldType, after: ir.FieldType, step: ConversionStep
     ) -> tuple[ir.FieldType, ir.FieldType]:
         """Return the types of a field of both versions."""
         elements = ir.element_of(before), ir.element_of(after)
@@ -233,7 +233,7 @@ class ExactConversion:
         elif not is_kept:
             element = value_change(step)
         if is_kept:
-            step, after = Step(wraps=step.wraps), _integers(field.old.type, after)
+            step, after = ConversionStep(wraps=step.wraps), _integers(field.old.type, after)
         change = list_change(step, after, element, field.step.same)
         if change is None:
             return get

@@ -18,7 +18,7 @@ from idlc.model import ir
 from idlc.project.files import entries, is_file, is_folder, read_bytes
 from idlc.project.root import Root
 from idlc.versions.classes import version_of_texts
-from idlc.versions.conversion import Key, Version
+from idlc.versions.conversion import Version, VersionKey
 
 #: The folder of the recorded classes, beside rules.
 TYPES = "types"
@@ -65,10 +65,10 @@ class Rules:
         except (KeyError, ValueError, TypeError, SyntaxError, RecursionError, MemoryError):
             return None
 
-    def _key(self, name: str) -> Key:
+    def _key(self, name: str) -> VersionKey:
         match self._value(name):
             case (str(type_), str(digest)):
-                return Key(type_, digest)
+                return VersionKey(type_, digest)
         line = self._head[name].lineno if name in self._head else 1
         message = f'it needs `{name} = ("package/msg/Name", "RIHS01_…")`'
         raise BadRulesError(message, self._line(line))
@@ -122,12 +122,12 @@ class Known:
 
     def __init__(self, files: Iterable[Rules]) -> None:
         self.files = tuple(files)
-        self._starting: dict[Key, list[Rules]] = {}
+        self._starting: dict[VersionKey, list[Rules]] = {}
         for file in self.files:
             self._starting.setdefault(file.old, []).append(file)
-        self._versions: dict[tuple[Key, Path], Version | None] = {}
+        self._versions: dict[tuple[VersionKey, Path], Version | None] = {}
 
-    def starting(self, old: Key) -> list[Rules]:
+    def starting(self, old: VersionKey) -> list[Rules]:
         """Return the rules that read a version."""
         return self._starting.get(old, [])
 
@@ -135,7 +135,7 @@ class Known:
         """Return the version that rules write, from the classes beside them."""
         return self.version_beside(rules, rules.new)
 
-    def version_beside(self, rules: Rules, key: Key) -> Version | None:
+    def version_beside(self, rules: Rules, key: VersionKey) -> Version | None:
         """Return a version from the classes beside rules; `None` if they are not there."""
         place = key, rules.file.parent
         if place not in self._versions:
@@ -144,7 +144,7 @@ class Known:
         return self._versions[place]
 
 
-def _version_in(folder: Path, key: Key) -> Version | None:
+def _version_in(folder: Path, key: VersionKey) -> Version | None:
     """Return the version that a folder of generated packages describes, read as syntax."""
     texts: dict[ir.TypeName, Source] = {}
     for entry in sorted(entries(folder)):

@@ -16,9 +16,9 @@ from idlc.model import ir, python_names
 from idlc.model.link import Model
 from idlc.project import write
 from idlc.project.root import Root
-from idlc.project.templates import Code, RenderedFile, Text, code
+from idlc.project.templates import Code, EscapedText, RenderedFile, code
 from idlc.recordings.definitions import interface_of
-from idlc.versions.conversion import FieldPlan, Key, Plan, Version, is_list
+from idlc.versions.conversion import FieldPlan, Plan, Version, VersionKey, is_list
 from idlc.versions.meanings import renumbered
 from idlc.versions.rules import TYPES, Rules, read_rules
 
@@ -43,7 +43,7 @@ class _FunctionView(NamedTuple):
 
     name: Code
     type: Code
-    reason: Text
+    reason: EscapedText
     body: Code
     imports: tuple[str, ...] = ()
 
@@ -110,7 +110,7 @@ def _file(plan: Plan) -> str:
         if (change := changes.get(field.new.name))
     ]
     view = {
-        "title": Text(f"Rules from {old.short} to {new.short} of {new.type}."),
+        "title": EscapedText(f"Rules from {old.short} to {new.short} of {new.type}."),
         "iterable": any("Iterable" in function.type for function in functions),
         "imports": [Code(line) for line in sorted(lines)],
         "old": _key(old),
@@ -134,7 +134,7 @@ def _completed(rules: Rules, plan: Plan) -> str:
     return text
 
 
-def _key(key: Key) -> _KeyView:
+def _key(key: VersionKey) -> _KeyView:
     return _KeyView(Code(string_literal(key.type)), Code(string_literal(key.hash)))
 
 
@@ -162,7 +162,7 @@ def _function(plan: Plan, field: FieldPlan) -> _FunctionView:
     return _FunctionView(
         Code(python_names.field(field.new.name)),
         Code(type_),
-        Text(one_line(finding.reason)),
+        EscapedText(one_line(finding.reason)),
         Code(body),
         lines,
     )

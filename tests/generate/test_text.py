@@ -12,7 +12,7 @@ from msgspec.structs import asdict, replace
 from idlc.generate.python import imports, literals, render
 from idlc.model import ir, link
 from idlc.model.python_names import modules
-from idlc.project.templates import Code, Text, code
+from idlc.project.templates import Code, EscapedText, code
 from tests.support import generated
 from tests.support.examples import example, given, st
 
@@ -163,21 +163,21 @@ MADE = [
 @pytest.mark.parametrize("template", PLACED)
 def test_templates_place_code_and_text_and_no_other_string(template):
     page = code().from_string(template)
-    for kind in (Code, Text):
+    for kind in (Code, EscapedText):
         assert page.render(text=kind("a + b")) == "a + b"
     for other in ("a + b", None, ["a"], b"a"):
-        with pytest.raises(TypeError, match="a template may place Code and Text, not"):
+        with pytest.raises(TypeError, match="a template may place Code and EscapedText, not"):
             page.render(text=other)
 
 
 @pytest.mark.parametrize("template", MADE)
 def test_what_templates_make_of_text_cannot_be_placed(template):
-    with pytest.raises(TypeError, match="Code and Text, not str"):
-        code().from_string(template).render(text=Text("a + b"))
+    with pytest.raises(TypeError, match="Code and EscapedText, not str"):
+        code().from_string(template).render(text=EscapedText("a + b"))
 
 
 def test_indented_lines_get_a_margin_unless_they_are_empty():
-    text = Text("a\n\nb")
+    text = EscapedText("a\n\nb")
     assert code().from_string("  {{ text | indent(2) }}").render(text=text) == "  a\n\n  b"
 
 
@@ -205,7 +205,7 @@ def with_an_ordinary_string(view):
     """Yield a view once for each text in it, which is an ordinary string there."""
     match view:
         case str():
-            assert isinstance(view, (Code, Text)), view
+            assert isinstance(view, (Code, EscapedText)), view
             if view:
                 yield f"{view} of others"
         case tuple():

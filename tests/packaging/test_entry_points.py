@@ -8,10 +8,10 @@ import tokenize
 import pytest
 
 from idlc.packaging.entry_points import add_to_setup
-from idlc.packaging.outcome import Edited, Refused, Script
+from idlc.packaging.outcome import ConsoleScript, Edited, Refused
 from tests.support.examples import HealthCheck, given, settings, st
 
-TALKER = Script("talker", "demo.talker:main")
+TALKER = ConsoleScript("talker", "demo.talker:main")
 HEAD = "from setuptools import setup\n\npackage_name = 'demo'\n"
 
 

@@ -7,11 +7,11 @@ from catkin_pkg.package import parse_package_string
 
 from idlc.packaging import dependencies, entry_points, launch_py
 from idlc.packaging.entry_points import add_console_script
-from idlc.packaging.outcome import Edited, Outcome, Refused, Script
+from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused
 from idlc.scaffold import interface
 
 TALKING = launch_py.Started("demo", "talker")
-TALKER = Script("talker", "demo.talker:main")
+TALKER = ConsoleScript("talker", "demo.talker:main")
 
 
 def text_of(outcome: Outcome) -> str:

@@ -95,7 +95,7 @@ def test_urls_of_settings_are_not_opened(words, here, monkeypatch, capsys):
     write("msg/A.msg", "int8 a\n")
     url = "simplecache::https://localhost/a.mcap"
     write("pyproject.toml", f"tool.idlc.paths = ['{url}']\ntool.idlc.breaking.against = '{url}'\n")
-    monkeypatch.setattr("idlc.recordings.containers.source.Source", None)
+    monkeypatch.setattr("idlc.recordings.containers.source.FileSource", None)
     assert main([*words]) == 2
     said = "".join(capsys.readouterr())
     assert "IDL611" in said

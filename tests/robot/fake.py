@@ -12,7 +12,7 @@ from idlc.api.sources import load
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
 from idlc.project.settings import Scope
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.names import action_names
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import open_session
@@ -92,7 +92,7 @@ class Robot:
         self.like_rosidl = False
         self.node_id = self.session.next_id()
         self.declared = []
-        self.announce(Kind.NODE)
+        self.announce(EntityKind.NODE)
 
     def announce(self, kind, name="", type_="", hash_=None, qos=None, wait=True, declare=None):
         """Show an entity; `declare` declares its end, without which DDS shows nothing."""
@@ -102,7 +102,7 @@ class Robot:
             domain=self.session.domain,
             session=self.session.id,
             node_id=self.node_id,
-            id=self.node_id if kind is Kind.NODE else self.session.next_id(),
+            id=self.node_id if kind is EntityKind.NODE else self.session.next_id(),
             kind=kind,
             node=self.node,
             name=name,
@@ -110,7 +110,7 @@ class Robot:
             hash=hash_,
             qos=qos or QoSProfile(depth=10),
         )
-        if declare is None and self.address.startswith("dds") and kind is not Kind.NODE:
+        if declare is None and self.address.startswith("dds") and kind is not EntityKind.NODE:
             declare = self.declare_idle
         if declare is not None:
             self.declared.append(declare(entity))
@@ -121,9 +121,9 @@ class Robot:
 
     def declare_idle(self, entity):
         """Declare an end that neither sends nor answers."""
-        if entity.kind is Kind.PUBLISHER:
+        if entity.kind is EntityKind.PUBLISHER:
             return self.transport.publisher(entity)
-        if entity.kind is Kind.SERVICE:
+        if entity.kind is EntityKind.SERVICE:
             return self.transport.service(entity, lambda request: request.drop())
         return self.transport.subscriber(entity, lambda _: None)
 
@@ -162,7 +162,7 @@ class Robot:
 
         name, callback = f"/{self.node}/get_type_description", receive if like_rosidl else reply
         declare = partial(self.transport.service, callback=callback)
-        self.announce(Kind.SERVICE, name, DESCRIBE, declare=declare)
+        self.announce(EntityKind.SERVICE, name, DESCRIBE, declare=declare)
 
     def description(self, service, asked):
         hash_, description, interface = described(asked.type_name, tuple(self.files.items()))
@@ -189,7 +189,7 @@ class Robot:
     def publisher(self, name, type_, qos=None, hash_=None):
         """Return a function that publishes a message or bytes."""
         declare = self.transport.publisher
-        entity = self.announce(Kind.PUBLISHER, name, type_, hash_, qos, declare=declare)
+        entity = self.announce(EntityKind.PUBLISHER, name, type_, hash_, qos, declare=declare)
         sender = self.declared[-2]
         count = iter(range(1, 1 << 30))
 
@@ -213,7 +213,7 @@ class Robot:
                 request.reply(data, request.attachment)
 
         declare = partial(self.transport.service, callback=reply)
-        self.announce(Kind.SERVICE, name, type_, declare=declare)
+        self.announce(EntityKind.SERVICE, name, type_, declare=declare)
 
     def action(self, name, type_):
         """Announce the five parts of an action server."""
@@ -226,7 +226,7 @@ class Robot:
         )
         for place, part in zip(action_names(name), types, strict=True):
             is_topic = place.endswith(("feedback", "status"))
-            self.announce(Kind.PUBLISHER if is_topic else Kind.SERVICE, place, part)
+            self.announce(EntityKind.PUBLISHER if is_topic else EntityKind.SERVICE, place, part)
 
     def close(self):
         self.observer.close()

@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 
 from idlc.robot.dds import discovery, formats, graph, wire
-from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import MOST_WAITING, Received
 from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
@@ -233,7 +233,7 @@ def test_many_heartbeats_draw_one_answer_at_a_time():
 def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():
     topics = ("rt/a", "rt/\x1b[2J", "rt/a%b", "rt/a/", "rt/", "a", "rt//a")
     ends = [
-        Endpoint(SOURCE + bytes([0, 0, number, 3]), topic, TYPE, ALL)
+        EndpointData(SOURCE + bytes([0, 0, number, 3]), topic, TYPE, ALL)
         for number, topic in enumerate(topics)
     ]
     names = (("/", "a"), ("/a%b", "c"), ("/", "a%b"), ("", "b\n"))

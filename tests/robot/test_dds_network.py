@@ -7,7 +7,7 @@ import random
 import pytest
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.graph import READER, WRITER, guid_of
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS, Participant
 from idlc.robot.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -76,7 +76,7 @@ class Network:
                         self.send(own, own.tick(self.now))
 
     def writer(self, participant, qos, number=1, topic="rt/chatter"):
-        end = Endpoint(guid_of(participant.prefix, number, WRITER), topic, TYPE, qos)
+        end = EndpointData(guid_of(participant.prefix, number, WRITER), topic, TYPE, qos)
         participant.shared.now = self.now
         writer = participant.add_writer(end)
         self.send(participant, participant.shared.collect())
@@ -84,7 +84,7 @@ class Network:
 
     def reader(self, participant, qos, number=2, topic="rt/chatter"):
         received = []
-        end = Endpoint(guid_of(participant.prefix, number, READER), topic, TYPE, qos)
+        end = EndpointData(guid_of(participant.prefix, number, READER), topic, TYPE, qos)
         participant.shared.now = self.now
         reader = participant.add_reader(end, lambda sample: received.append(sample.payload))
         self.send(participant, participant.shared.collect())

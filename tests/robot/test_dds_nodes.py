@@ -8,7 +8,7 @@ import pytest
 import idlc
 from idlc.robot import ActionClient, ActionServer, DurabilityPolicy, QoSProfile
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
 from tests.support.domains import held_domain
 from tests.support.waiting import wait_for
@@ -74,7 +74,7 @@ def test_nodes_talk_and_leave(pair, monkeypatch):
         nobody.call(SetBool.Request(), LONG)
 
     assert {*left.get_node_names()} == {"left", "right"}
-    (end,) = left.graph.entities(Kind.SERVICE, "/set")
+    (end,) = left.graph.entities(EntityKind.SERVICE, "/set")
     assert (end.node_name, end.hash) == ("/right", client.entity.hash)
     right.session.close()
     wait_for(lambda: left.get_node_names() == ["left"])

@@ -6,7 +6,7 @@ import pytest
 
 from idlc.robot import graph as graph_module
 from idlc.robot.graph import Graph
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.live.overview import mismatches
 from idlc.robot.qos import QoSProfile, qos_profile_sensor_data
 from tests.support.waiting import LIMIT, join
@@ -40,7 +40,7 @@ class Tokens:
 
 
 def entity(kind, number=0, name="/chatter", type_="std_msgs/msg/String", hash_=HASH, **more):
-    if kind is Kind.NODE:
+    if kind is EntityKind.NODE:
         name = type_ = hash_ = ""
     return Entity(
         domain=0,
@@ -59,41 +59,41 @@ def entity(kind, number=0, name="/chatter", type_="std_msgs/msg/String", hash_=H
 def test_an_endpoint_can_come_before_its_node_and_stay_after_it():
     tokens = Tokens()
     graph = Graph(tokens, 0)
-    endpoint, node = entity(Kind.PUBLISHER, 1), entity(Kind.NODE)
+    endpoint, node = entity(EntityKind.PUBLISHER, 1), entity(EntityKind.NODE)
     tokens.update(endpoint.token, True)
     assert graph.entities() == (endpoint,)
     tokens.update(node.token, True)
     tokens.update(node.token, True)
-    assert graph.entities(Kind.NODE) == (node,)
+    assert graph.entities(EntityKind.NODE) == (node,)
     assert graph.entities() == (endpoint, node)
     tokens.update(node.token, False)
     tokens.update(node.token, False)
     assert graph.entities() == (endpoint,)
     tokens.update(endpoint.token, False)
     assert graph.entities() == ()
-    assert graph.count(Kind.PUBLISHER, "/chatter") == 0
+    assert graph.count(EntityKind.PUBLISHER, "/chatter") == 0
 
 
 def test_entities_are_selected_by_all_that_is_known():
     ends = [
-        entity(Kind.PUBLISHER, 1),
-        entity(Kind.PUBLISHER, 2, node="other"),
-        entity(Kind.SUBSCRIPTION, 3, type_="std_msgs/msg/Int8"),
-        entity(Kind.SERVICE, 4, name="/add", type_="a/srv/Add"),
+        entity(EntityKind.PUBLISHER, 1),
+        entity(EntityKind.PUBLISHER, 2, node="other"),
+        entity(EntityKind.SUBSCRIPTION, 3, type_="std_msgs/msg/Int8"),
+        entity(EntityKind.SERVICE, 4, name="/add", type_="a/srv/Add"),
     ]
     graph = Graph(Tokens(*(end.token for end in ends)), 0)
-    assert graph.entities(Kind.PUBLISHER, name="/chatter") == tuple(ends[:2])
-    assert graph.entities(Kind.SUBSCRIPTION) == (ends[2],)
-    assert graph.entities(Kind.CLIENT, name="/add") == ()
-    assert graph.count(Kind.PUBLISHER, "/chatter") == 2
-    assert graph.types(Kind.PUBLISHER, Kind.SUBSCRIPTION) == {
+    assert graph.entities(EntityKind.PUBLISHER, name="/chatter") == tuple(ends[:2])
+    assert graph.entities(EntityKind.SUBSCRIPTION) == (ends[2],)
+    assert graph.entities(EntityKind.CLIENT, name="/add") == ()
+    assert graph.count(EntityKind.PUBLISHER, "/chatter") == 2
+    assert graph.types(EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION) == {
         "/chatter": ("std_msgs/msg/Int8", "std_msgs/msg/String")
     }
-    assert graph.types(Kind.SERVICE) == {"/add": ("a/srv/Add",)}
+    assert graph.types(EntityKind.SERVICE) == {"/add": ("a/srv/Add",)}
 
 
 def test_a_token_that_went_while_the_others_were_fetched_stays_away():
-    stays, goes = entity(Kind.PUBLISHER, 1), entity(Kind.PUBLISHER, 2)
+    stays, goes = entity(EntityKind.PUBLISHER, 1), entity(EntityKind.PUBLISHER, 2)
     tokens = Tokens(stays.token, goes.token)
     tokens.gone.add(goes.token)
     assert Graph(tokens, 0).entities() == (stays,)
@@ -138,7 +138,7 @@ def test_a_slow_network_is_asked_again_or_its_graph_is_incomplete(
     parts, late, is_incomplete, monkeypatch
 ):
     monkeypatch.setattr(graph_module, "_SETTLED", 0.01)
-    ends = [entity(Kind.PUBLISHER, number) for number in range(3)]
+    ends = [entity(EntityKind.PUBLISHER, number) for number in range(3)]
     tokens = SlowTokens(*(end.token for end in ends), parts=parts, late=late)
     graph = Graph(tokens, 0)
     assert graph.is_incomplete == is_incomplete
@@ -146,7 +146,7 @@ def test_a_slow_network_is_asked_again_or_its_graph_is_incomplete(
 
 
 def test_garbage_is_counted_and_nothing_else():
-    tokens = Tokens("@ros2_lv/0/x", "", entity(Kind.NODE).token)
+    tokens = Tokens("@ros2_lv/0/x", "", entity(EntityKind.NODE).token)
     graph = Graph(tokens, 0)
     tokens.update("never/seen", False)
     tokens.update("@ros2_lv/0/" + "x" * 100_000, True)
@@ -158,7 +158,7 @@ def test_garbage_is_counted_and_nothing_else():
 def test_a_closed_graph_stays_as_it_is():
     tokens = Tokens()
     graph = Graph(tokens, 0)
-    publisher = entity(Kind.PUBLISHER)
+    publisher = entity(EntityKind.PUBLISHER)
     tokens.update(publisher.token, True)
     graph.close()
     assert tokens.update is None
@@ -168,13 +168,13 @@ def test_a_closed_graph_stays_as_it_is():
 def test_waiting_ends_with_a_change_or_with_time():
     tokens = Tokens()
     graph = Graph(tokens, 0)
-    publisher = entity(Kind.PUBLISHER, 1)
+    publisher = entity(EntityKind.PUBLISHER, 1)
     assert graph.wait_for(lambda graph: graph.entities(), 0) == ()
     started = threading.Event()
 
     def condition(graph):
         started.set()
-        return graph.entities(Kind.PUBLISHER)
+        return graph.entities(EntityKind.PUBLISHER)
 
     results = []
     thread = threading.Thread(target=lambda: results.append(graph.wait_for(condition, None)))
@@ -198,12 +198,15 @@ def test_waiting_ends_with_a_change_or_with_time():
 )
 def test_ends_of_one_name_are_compared(changed, reasons):
     expected = [("/chatter", "/talker", "/other", reasons)] if reasons else []
-    for sends, receives in ((Kind.PUBLISHER, Kind.SUBSCRIPTION), (Kind.CLIENT, Kind.SERVICE)):
+    for sends, receives in (
+        (EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION),
+        (EntityKind.CLIENT, EntityKind.SERVICE),
+    ):
         sender, receiver = entity(sends), entity(receives, 1, node="other", **changed)
         assert [*mismatches([receiver, sender])] == expected
 
 
 def test_many_ends_of_one_topic_do_not_cost_the_square():
-    offered = [entity(Kind.PUBLISHER, n, qos=qos_profile_sensor_data) for n in range(1000)]
-    requested = [entity(Kind.SUBSCRIPTION, n) for n in range(1000)]
+    offered = [entity(EntityKind.PUBLISHER, n, qos=qos_profile_sensor_data) for n in range(1000)]
+    requested = [entity(EntityKind.SUBSCRIPTION, n) for n in range(1000)]
     assert sum(1 for _ in mismatches([*offered, *requested])) == 100_000

@@ -12,7 +12,7 @@ import pytest
 
 from idlc.robot import keys
 from idlc.robot.graph import Graph
-from idlc.robot.keys import Kind, pack_attachment, parse_attachment, parse_token
+from idlc.robot.keys import EntityKind, pack_attachment, parse_attachment, parse_token
 from idlc.robot.names import is_absolute, is_namespace, is_node_name
 from tests.robot.test_graph import Tokens, entity
 from tests.robot.test_keys import TOKENS
@@ -55,7 +55,7 @@ def mutated(rng, text):
 def is_sound(end):
     """Return whether an entity contains only what a node or an endpoint can have."""
     names = is_namespace(end.enclave) and is_namespace(end.namespace) and is_node_name(end.node)
-    if end.kind is Kind.NODE:
+    if end.kind is EntityKind.NODE:
         return names and (end.name, end.type, end.hash) == ("", "", "")
     key = end.key
     return names and is_absolute(end.name) and key.isascii() and not set("*$?# \n") & set(key)
@@ -120,7 +120,7 @@ def test_mutated_attachments_are_refused_or_read():
 
 
 def test_a_robot_with_ten_thousand_endpoints_takes_little_memory():
-    made = [entity(Kind.PUBLISHER, n, name=f"/topic_{n}").token for n in range(10_000)]
+    made = [entity(EntityKind.PUBLISHER, n, name=f"/topic_{n}").token for n in range(10_000)]
     tracemalloc.start()
     try:
         graph = Graph(Tokens(*made), 0)
@@ -134,7 +134,7 @@ def test_a_robot_with_ten_thousand_endpoints_takes_little_memory():
 def tokens_of(length):
     """Yield ever new valid tokens, as short as possible or with this number of characters."""
     for number in range(1 << 30):
-        token = entity(Kind.NODE, number, node="n").token
+        token = entity(EntityKind.NODE, number, node="n").token
         yield token if length is None else f"{token}/".ljust(length, "\u202e")
 
 
@@ -156,6 +156,6 @@ def test_a_flood_of_tokens_is_cut(length):
     known = graph.entities()
     for end in known:
         tokens.update(end.token, False)
-    late = entity(Kind.PUBLISHER)
+    late = entity(EntityKind.PUBLISHER)
     tokens.update(late.token, True)
     assert graph.entities() == (late,)

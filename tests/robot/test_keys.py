@@ -7,7 +7,7 @@ import pytest
 
 from idlc.robot.keys import (
     Entity,
-    Kind,
+    EntityKind,
     format_qos,
     pack_attachment,
     parse_attachment,
@@ -63,9 +63,9 @@ nodes = {
 types = st.from_regex(
     r"[a-z][a-z0-9_]{0,8}/(msg|srv|action)/[A-Z][A-Za-z0-9_]{0,8}", fullmatch=True
 )
-entities = st.builds(Entity, kind=st.just(Kind.NODE), **nodes) | st.builds(
+entities = st.builds(Entity, kind=st.just(EntityKind.NODE), **nodes) | st.builds(
     Entity,
-    kind=st.sampled_from([kind for kind in Kind if kind is not Kind.NODE]),
+    kind=st.sampled_from([kind for kind in EntityKind if kind is not EntityKind.NODE]),
     name=absolute,
     type=types,
     hash=st.from_regex(r"RIHS01_[0-9a-f]{64}", fullmatch=True) | st.just(""),
@@ -84,7 +84,7 @@ def test_tokens_and_ids_are_those_of_rmw_zenoh(token, gid):
 def test_a_token_is_read_part_by_part():
     token = next(token for token in TOKENS if "qos_sensor" in token)
     entity = parse_token(token)
-    assert entity.kind is Kind.PUBLISHER
+    assert entity.kind is EntityKind.PUBLISHER
     assert (entity.domain, entity.session, entity.node_id) == (0, token.split("/")[2], 0)
     assert (entity.enclave, entity.namespace, entity.node) == ("/", "/ns/deep", "golden")
     assert (entity.node_name, entity.name) == ("/ns/deep/golden", "/ns/deep/qos_sensor")

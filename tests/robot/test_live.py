@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 
 from idlc.api.recording import Recording
 from idlc.cli.main import main
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from idlc.robot.live.recorder import Recorder
 from idlc.robot.qos import DurabilityPolicy, QoSProfile
 from tests.robot.fake import FILES, Robot, demo_classes, standard, write_files
@@ -43,7 +43,7 @@ def running(address, *arguments):
 def test_the_types_that_a_robot_uses_are_compiled(robot, address, capsys):
     robot.publisher("/drive", "demo_msgs/msg/Drive")
     robot.publisher("/nothing", "demo_msgs/msg/Nothing")
-    robot.announce(Kind.SERVICE, "/gear", "demo_msgs/srv/Gear")
+    robot.announce(EntityKind.SERVICE, "/gear", "demo_msgs/srv/Gear")
     robot.action("/move", "demo_msgs/action/Move")
     assert main(["gen", address, "-o", "out"]) == 0
     assert "demo_msgs: 32 files from 5 interfaces" in capsys.readouterr().out
@@ -112,9 +112,9 @@ def test_the_graph_is_shown_with_what_does_not_fit(robot, address, capsys):
     robot.publisher("/nothing", "demo_msgs/msg/Nothing")
     robot.action("/move", "demo_msgs/action/Move")
     with running(address, "teleop", {**FILES, "msg/Drive.msg": "int8 x\n"}) as other:
-        other.announce(Kind.SUBSCRIPTION, "/drive", "demo_msgs/msg/Drive")
-        other.announce(Kind.SUBSCRIPTION, "/nothin", "demo_msgs/msg/Nothing")
-        other.announce(Kind.SUBSCRIPTION, "/hum", "demo_msgs/msg/Humble", "")
+        other.announce(EntityKind.SUBSCRIPTION, "/drive", "demo_msgs/msg/Drive")
+        other.announce(EntityKind.SUBSCRIPTION, "/nothin", "demo_msgs/msg/Nothing")
+        other.announce(EntityKind.SUBSCRIPTION, "/hum", "demo_msgs/msg/Humble", "")
         assert main(["show", address]) == 0
         text = capsys.readouterr().out
         assert main(["show", address, "--format", "json"]) == 0
@@ -246,8 +246,8 @@ def test_a_recording_is_read_by_idlc_and_mcap(robot, address, capsys, monkeypatc
 
 def test_a_robot_with_many_endpoints_is_shown(robot, address, capsys):
     for number in range(2000):
-        robot.announce(Kind.PUBLISHER, f"/t{number}", "std_msgs/msg/String", wait=False)
-    robot.await_count(Kind.PUBLISHER, "", 2000)
+        robot.announce(EntityKind.PUBLISHER, f"/t{number}", "std_msgs/msg/String", wait=False)
+    robot.await_count(EntityKind.PUBLISHER, "", 2000)
     assert main(["show", address, "--format", "json"]) == 0
     assert capsys.readouterr().out.count('"type": "topic"') == 2000
     assert threading.active_count() < 100

@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 
 from idlc.api.recording import Recording
 from idlc.cli.main import main
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from idlc.robot.live.connect import Inbox
 from idlc.robot.live.recorder import Recorder
 from idlc.robot.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
@@ -91,7 +91,7 @@ def test_a_node_is_asked_again_for_what_it_dropped(address, capsys):
 def silent(router, node):
     """Return a robot that has a type of its own, and holds all questions for ever."""
     robot = Robot(router, node=node, files={"msg/Own.msg": "int8 own\n"})
-    entity = robot.announce(Kind.SERVICE, f"/{node}/get_type_description", DESCRIBE)
+    entity = robot.announce(EntityKind.SERVICE, f"/{node}/get_type_description", DESCRIBE)
     robot.declared.append(robot.transport.service(entity, robot.requests.append))
     return robot
 
@@ -113,7 +113,7 @@ def test_no_silent_node_costs_a_message_or_a_second(router, capsys, monkeypatch)
         if step >= 200:
             return len(arrivals) >= 2000
         if step % 10 == 0:
-            babbling.announce(Kind.PUBLISHER, f"/b{step}", "demo_msgs/msg/Own", wait=False)
+            babbling.announce(EntityKind.PUBLISHER, f"/b{step}", "demo_msgs/msg/Own", wait=False)
         if step == 100:
             dying.close()
         for _ in range(10):
@@ -126,7 +126,7 @@ def test_no_silent_node_costs_a_message_or_a_second(router, capsys, monkeypatch)
             arrivals.append(number)
 
     def started(recorder, _):
-        run(recorder, lambda: fast.observer.graph.count(Kind.SUBSCRIPTION, "/words") > 0)
+        run(recorder, lambda: fast.observer.graph.count(EntityKind.SUBSCRIPTION, "/words") > 0)
         run(recorder, is_over)
 
     monkeypatch.setattr("idlc.robot.live.recorder.TICK", 0.02)

@@ -11,7 +11,7 @@ from click.shell_completion import ShellComplete
 
 from idlc.cli.app import app
 from idlc.cli.main import main
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.live import connect
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import Session
@@ -22,7 +22,7 @@ ADDRESS = "tcp/robot:7447"
 STRING = "std_msgs/msg/String"
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 #: Publishers and subscriptions in turn.
-KINDS = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
+KINDS = (EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)
 DESCRIBE = "type_description_interfaces/srv/GetTypeDescription"
 
 
@@ -61,7 +61,7 @@ def hash_of(number):
 
 
 def topics(number):
-    return {"name": f"/topic_{number}/image", "kind": Kind.PUBLISHER}
+    return {"name": f"/topic_{number}/image", "kind": EntityKind.PUBLISHER}
 
 
 def similar(number):
@@ -84,7 +84,7 @@ def profiles(number):
 
 def actions(number):
     part, type_ = (("feedback", "FeedbackMessage"), ("get_result", "GetResult"))[number % 2]
-    kind = (Kind.PUBLISHER, Kind.SERVICE)[number % 2]
+    kind = (EntityKind.PUBLISHER, EntityKind.SERVICE)[number % 2]
     name, type_ = f"/move/_action/{part}", f"many_msgs/action/T_{type_}"
     return {"name": name, "type": type_, "hash": hash_of(number), "kind": kind}
 
@@ -92,13 +92,17 @@ def actions(number):
 def describers(number):
     if number % 2:
         return types(number)
-    return {"name": f"/n{number}/get_type_description", "type": DESCRIBE, "kind": Kind.SERVICE}
+    return {
+        "name": f"/n{number}/get_type_description",
+        "type": DESCRIBE,
+        "kind": EntityKind.SERVICE,
+    }
 
 
 @pytest.fixture(params=[topics, similar, types, versions, profiles, actions, describers])
 def robot(request, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    common = {"kind": Kind.PUBLISHER, "type": STRING, "hash": STRING_HASH}
+    common = {"kind": EntityKind.PUBLISHER, "type": STRING, "hash": STRING_HASH}
     ids = {"domain": 0, "session": "f1", "node_id": 0}
     tokens = [
         Entity(**ids, id=n, node=f"n{n % 50}", **{**common, **request.param(n)}).token

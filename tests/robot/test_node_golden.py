@@ -17,7 +17,7 @@ from idlc.robot import (
     ReliabilityPolicy,
     open_session,
 )
-from idlc.robot.keys import Kind, pack_attachment, parse_attachment
+from idlc.robot.keys import EntityKind, pack_attachment, parse_attachment
 from idlc.robot.qos import (
     qos_profile_parameter_events,
     qos_profile_parameters,
@@ -121,7 +121,7 @@ def test_replies_are_those_of_rclpy(router, types):
         node.create_service(types.srv.Add, "add", lambda _, response: response)
         sequence, _, gid = parse_attachment(bytes.fromhex(attachment))
         request = types.srv.Add.Request(a=1, b=2).serialize()
-        spin_until(lambda: other.graph.count(Kind.SERVICE, "/ns/deep/add"), node)
+        spin_until(lambda: other.graph.count(EntityKind.SERVICE, "/ns/deep/add"), node)
         other.transport.call(
             Keyed(key), request, pack_attachment(sequence, 0, gid), replies.put, timeout=LONG
         )

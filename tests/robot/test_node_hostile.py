@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from idlc.robot import Future, QoSProfile, open_session
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.transport import Sample
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
 
@@ -148,7 +148,7 @@ def test_a_service_that_replies_for_ever_is_cut_short(node, router):
                 session=other.id,
                 node_id=0,
                 id=1,
-                kind=Kind.SERVICE,
+                kind=EntityKind.SERVICE,
                 node="hostile",
                 name="/set",
                 type=client.interface.name,

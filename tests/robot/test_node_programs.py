@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
 
 PROGRAM = """
@@ -77,7 +77,7 @@ def test_signals_end_a_program_without_a_trace(address, program, number):
     with node_at(address, "listener") as node:
         names = {"/robot/chatter"}
         graph = node.graph
-        assert graph.wait_for(lambda _: names <= {*graph.types(Kind.PUBLISHER)}, LONG)
+        assert graph.wait_for(lambda _: names <= {*graph.types(EntityKind.PUBLISHER)}, LONG)
         program.send_signal(number)
         _, errors = program.communicate(timeout=LONG)
         assert (program.returncode, errors) == (0, "")
@@ -115,13 +115,13 @@ def test_a_blocked_call_ends_with_the_program(address, tmp_path, kind, number):
         command = [sys.executable, file, address]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
             try:
-                assert node.graph.wait_for(lambda graph: graph.count(Kind.CLIENT, name), LONG)
+                assert node.graph.wait_for(lambda graph: graph.count(EntityKind.CLIENT, name), LONG)
                 process.send_signal(number)
                 _, errors = process.communicate(timeout=LONG)
                 assert (process.returncode, errors) == (0, "")
             finally:
                 process.kill()
-        assert node.graph.wait_for(lambda graph: not graph.count(Kind.CLIENT, name), LONG)
+        assert node.graph.wait_for(lambda graph: not graph.count(EntityKind.CLIENT, name), LONG)
 
 
 def test_an_exception_of_a_callback_ends_a_program(address, tmp_path):

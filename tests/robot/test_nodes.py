@@ -20,7 +20,7 @@ from idlc.robot import (
     SubscriptionEventCallbacks,
     open_session,
 )
-from idlc.robot.keys import Kind, parse_attachment
+from idlc.robot.keys import EntityKind, parse_attachment
 from idlc.robot.names import InvalidNameError
 from idlc.robot.nodes.interfaces import _HASHES, interface_of, standard
 from idlc.robot.nodes.services import SERVICE
@@ -116,7 +116,7 @@ def test_any_thread_may_publish(pair):
     samples = []
     publisher = left.create_publisher(String, "chatter", 10)
     right.create_subscription(String, "chatter", lambda _: None, 10)
-    end = publisher.entity.replace(id=right.session.next_id(), kind=Kind.SUBSCRIPTION)
+    end = publisher.entity.replace(id=right.session.next_id(), kind=EntityKind.SUBSCRIPTION)
     right.transport.subscriber(end, samples.append)
     spin_until(publisher.get_subscription_count, left)
 
@@ -349,7 +349,7 @@ def test_the_graph_is_listed_as_in_rclpy(pair):
     assert ("/set", ["std_srvs/srv/SetBool"]) in left.get_service_names_and_types()
     assert {*left.get_node_names()} == {"left", "right"}
     spin_until(lambda: right.count_publishers("chatter"), right)
-    (entity,) = right.graph.entities(Kind.PUBLISHER, name="/chatter")
+    (entity,) = right.graph.entities(EntityKind.PUBLISHER, name="/chatter")
     assert (entity.node_name, entity.type) == ("/left", "std_msgs/msg/String")
     assert entity.qos.depth == 7
     right.destroy_node()

@@ -27,7 +27,7 @@ import pytest
 import idlc
 from idlc.cli.main import main
 from idlc.robot import QoSProfile
-from idlc.robot.keys import Kind, parse_attachment
+from idlc.robot.keys import EntityKind, parse_attachment
 from idlc.robot.qos import DurabilityPolicy
 from tests.robot.conftest import free_endpoint
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
@@ -130,7 +130,7 @@ def network(tmp_path_factory):
 
             def is_there(name=name, process=process):
                 assert process.poll() is None, logs[name].read_text()
-                return node.graph.count(Kind.SERVICE, f"/{name}/set")
+                return node.graph.count(EntityKind.SERVICE, f"/{name}/set")
 
             # pyzeros compiles
             wait_for(is_there, logs[name].read_text, limit=WORK)
@@ -188,7 +188,7 @@ def test_messages_of_each_arrive_at_all(network, name):
 def test_each_counts_its_messages(network, name):
     _, node = network
     graph = node.graph
-    (publisher,) = graph.entities(Kind.PUBLISHER, name=f"/{name}/seen")
+    (publisher,) = graph.entities(EntityKind.PUBLISHER, name=f"/{name}/seen")
     samples = []
     receiver = node.transport.subscriber(publisher, samples.append)
     state = JointState.from_dict(STATE)

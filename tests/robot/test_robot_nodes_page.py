@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from tests.robot.conftest import environ_of
 from tests.robot.nodes import LONG, SetBool, node_at
 from tests.support.paths import ROOT
@@ -27,7 +27,7 @@ def test_the_programs_of_the_page_talk_to_each_other(address, tmp_path):
     ):
         try:
             graph = node.graph
-            assert graph.wait_for(lambda _: graph.count(Kind.PUBLISHER, "/greetings"), LONG)
+            assert graph.wait_for(lambda _: graph.count(EntityKind.PUBLISHER, "/greetings"), LONG)
             done = subprocess.run(
                 [sys.executable, listener],
                 env=environ,

@@ -14,7 +14,7 @@ import pytest
 from idlc.cli.main import main
 from idlc.project.find import is_address
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from idlc.robot.session import open_router, open_session
 from tests.robot.conftest import free_endpoint, start_router
@@ -30,8 +30,8 @@ def opened(*addresses, **options):
     return open_session(*addresses, **{"environ": {}, "timeout": LONG, **options})
 
 
-def entity(session, kind=Kind.PUBLISHER, **more):
-    words = {} if kind is Kind.NODE else {"name": "/chatter", "type": "std_msgs/msg/String"}
+def entity(session, kind=EntityKind.PUBLISHER, **more):
+    words = {} if kind is EntityKind.NODE else {"name": "/chatter", "type": "std_msgs/msg/String"}
     return Entity(
         domain=session.domain,
         session=session.id,
@@ -52,16 +52,20 @@ def sessions(router):
 
 def test_nodes_and_endpoints_appear_in_the_other_graph_and_go(sessions):
     left, right = sessions
-    node, early, late = entity(left, Kind.NODE), entity(left), entity(left)
+    node, early, late = entity(left, EntityKind.NODE), entity(left), entity(left)
     for each in (node, early):
         left.transport.announce(each)
     assert right.graph.wait_for(lambda graph: len(graph.entities()) == 2, LONG)
     assert {*right.graph.entities()} == {node, early}
     declaration = left.transport.announce(late)
-    assert right.graph.wait_for(lambda graph: graph.count(Kind.PUBLISHER, "/chatter") == 2, LONG)
+    assert right.graph.wait_for(
+        lambda graph: graph.count(EntityKind.PUBLISHER, "/chatter") == 2, LONG
+    )
     declaration.close()
     declaration.close()
-    assert right.graph.wait_for(lambda graph: graph.count(Kind.PUBLISHER, "/chatter") == 1, LONG)
+    assert right.graph.wait_for(
+        lambda graph: graph.count(EntityKind.PUBLISHER, "/chatter") == 1, LONG
+    )
     assert right.graph is right.graph
     left.close()
     left.close()
@@ -109,10 +113,10 @@ def test_ctrl_c_in_a_callback_of_the_main_thread_is_not_lost(sessions, method):
 
 def test_a_session_sees_itself_and_no_other_domain(sessions):
     left, right = sessions
-    left.transport.announce(entity(left, Kind.NODE))
+    left.transport.announce(entity(left, EntityKind.NODE))
     assert left.graph.wait_for(lambda graph: graph.entities(), LONG)
     right.domain = 7
-    other = entity(right, Kind.NODE)
+    other = entity(right, EntityKind.NODE)
     right.transport.announce(other)
     assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (other,)
 
@@ -217,7 +221,7 @@ def test_peers_need_no_router():
     override = f'connect/endpoints=["{free_endpoint()}"];listen/endpoints=["{endpoint}"]'
     alone = {"ZENOH_CONFIG_OVERRIDE": override}
     with opened(environ=alone) as left, opened(endpoint) as right:
-        node = entity(left, Kind.NODE)
+        node = entity(left, EntityKind.NODE)
         left.transport.announce(node)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
 
@@ -227,7 +231,7 @@ def test_peers_meet_at_a_router_that_starts_later():
     environ = {"ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["{endpoint}"]', "ROS_DOMAIN_ID": "3"}
     with open_session(environ=environ) as left, open_session(environ=environ) as right:
         assert left.domain == 3
-        node = entity(left, Kind.NODE)
+        node = entity(left, EntityKind.NODE)
         left.transport.announce(node)
         with open_router([endpoint], environ={}):
             assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
@@ -236,7 +240,7 @@ def test_peers_meet_at_a_router_that_starts_later():
 def test_a_lost_connection_comes_back():
     router, endpoint = start_router()
     with opened(endpoint) as left, opened(endpoint) as right:
-        node = entity(left, Kind.NODE)
+        node = entity(left, EntityKind.NODE)
         left.transport.announce(node)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG)
         router.close()
@@ -250,7 +254,7 @@ def test_a_configuration_file_is_used_and_opens_nothing_more(router, tmp_path):
     file.write_text(f'{{mode: "peer", connect: {{endpoints: ["{router}"]}}}}')
     environ = {"ZENOH_SESSION_CONFIG_URI": str(file)}
     with opened(f"zenoh:{file}") as left, open_session(environ=environ) as right:
-        node = entity(left, Kind.NODE)
+        node = entity(left, EntityKind.NODE)
         left.transport.announce(node)
         assert right.graph.wait_for(lambda graph: graph.entities(), LONG) == (node,)
         assert {address for address in listening() if not address.startswith("127.")} == set()

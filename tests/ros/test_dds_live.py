@@ -25,7 +25,7 @@ from idlc.robot import (
     QoSProfile,
     open_session,
 )
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from idlc.robot.lifecycle import LifecycleNode
 from tests.ros.conftest import domain_of_its_own
 from tests.support.paths import PROGRAMS, ROOT
@@ -239,8 +239,8 @@ def graph_of_ours(pair):
 
 def graph_of_theirs(pair):
     pair.until(lambda: {"peer", "ours"} <= {*pair.node.get_node_names()})
-    pair.until(lambda: pair.graph.count(Kind.SERVICE, "/theirs"))
-    (back,) = pair.until(lambda: pair.graph.entities(Kind.PUBLISHER, "/back"))
+    pair.until(lambda: pair.graph.count(EntityKind.SERVICE, "/theirs"))
+    (back,) = pair.until(lambda: pair.graph.entities(EntityKind.PUBLISHER, "/back"))
     assert (back.node_name, back.type) == ("/peer", "std_msgs/msg/String")
     assert back.hash == pair.node.words.entity.hash
 

@@ -8,7 +8,7 @@ from idlc.cli.main import main
 from idlc.packaging.outcome import Edited, Refused
 from idlc.scaffold import new_node, spec
 from idlc.scaffold.roles import ROLES
-from idlc.scaffold.spec import Plan, plan
+from idlc.scaffold.spec import NodePlan, plan
 from tests.support.files import write_all
 
 SETUP = """\
@@ -24,12 +24,12 @@ TEXTS = {"package.xml": '<package format="3"><name>demo</name></package>', "setu
 (TIMER,) = (role for role in ROLES if role.name == "timer")
 
 
-def heart(*, lifecycle: bool = False) -> Plan:
+def heart(*, lifecycle: bool = False) -> NodePlan:
     endpoints = (spec.endpoint(TIMER, "1"),)
-    return plan(spec.Node("heart", "demo", endpoints, lifecycle=lifecycle), [None], {})
+    return plan(spec.NodeSpec("heart", "demo", endpoints, lifecycle=lifecycle), [None], {})
 
 
-def entered(texts, **options) -> new_node.Entry:
+def entered(texts, **options) -> new_node.NodeEntry:
     return new_node.node_entry(heart(**options), texts)
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from idlc.packaging import dependencies, entry_points, launch_py
-from idlc.packaging.outcome import Edited, Outcome, Script
+from idlc.packaging.outcome import ConsoleScript, Edited, Outcome
 
-TALKER = Script("talker", "demo.talker:main")
+TALKER = ConsoleScript("talker", "demo.talker:main")
 
 
 def edited(data: bytes, edit: Callable[[str], Outcome]) -> tuple[str, str] | None:

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from idlc.check.registry import advise
-from idlc.check.select import Selection
+from idlc.check.select import RuleSelection
 from idlc.diagnostics.codes import CODES, STYLE
 from idlc.diagnostics.report import Severity
 from tests.support import rosidl_view
@@ -192,7 +192,7 @@ def told_by_idlc(example: Example) -> tuple[str, ...]:
 
 
 def _is_shown(code: str) -> bool:
-    return Selection().has(CODES[code]) and CODES[code].category != STYLE
+    return RuleSelection().has(CODES[code]) and CODES[code].category != STYLE
 
 
 def _codes(codes: Any) -> str:

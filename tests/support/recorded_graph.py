@@ -2,7 +2,7 @@
 
 from contextlib import contextmanager
 
-from idlc.robot.live.graph import Endpoint
+from idlc.robot.live.graph import GraphEndpoint
 from idlc.tasks.breaking.graph import Answer
 
 ROLES = {
@@ -16,7 +16,7 @@ ROLES = {
 def end(node, role, name, type_, hash_):
     """Return the end of a topic, or the one of a service that requests pass."""
     entity, sends = ROLES[role]
-    return Endpoint(node, entity, name, role, sends, type_, hash_)
+    return GraphEndpoint(node, entity, name, role, sends, type_, hash_)
 
 
 def hash_of(model, type_):

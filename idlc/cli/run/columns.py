@@ -21,7 +21,7 @@ from idlc.tasks.aligned import Grid, write_aligned
 from idlc.tasks.columns import ColumnsOptions, Work, columns
 
 if TYPE_CHECKING:
-    from idlc.recordings.aligned.table import Summary
+    from idlc.recordings.aligned.table import ClockFit
 
 
 def run(
@@ -76,7 +76,7 @@ def _table_of(
     return partial(write_aligned, Grid(grid, *ways), partial(_show_fit, to_stdout))
 
 
-def _show_fit(is_output: bool, summaries: list[Summary]) -> None:
+def _show_fit(is_output: bool, summaries: list[ClockFit]) -> None:
     """Show how well topics fit the clock of a table."""
     head = ("rate", "longest gap", "mean age", "max age", "no value", "unordered")
     width = max([5, *(len(one_line(fit.topic)) for fit in summaries)])

@@ -69,10 +69,10 @@ def robot_names(
     context: click.Context, parameter: click.Parameter, word: str
 ) -> list[CompletionItem[str]]:
     """Offer the topics or services of the robot that was typed, by the name of the parameter."""
-    from idlc.robot.keys import Kind
+    from idlc.robot.keys import EntityKind
     from idlc.robot.live.connect import TOPICS, robot_entities
 
-    kinds = (Kind.SERVICE,) if parameter.name == "service" else TOPICS
+    kinds = (EntityKind.SERVICE,) if parameter.name == "service" else TOPICS
     with _robot(context) as session:
         entities = robot_entities(session, *kinds) if session else []
     names = dict.fromkeys(end.name for end in entities)
@@ -84,13 +84,13 @@ def robot_fields(
 ) -> list[CompletionItem[str]]:
     """Offer the fields of the request of the service that was typed."""
     from idlc.cli.messages import field_words
-    from idlc.robot.keys import Kind
+    from idlc.robot.keys import EntityKind
     from idlc.robot.live.traffic import find_version
 
     name, kind = str(context.params.get("service") or ""), None
     with _robot(context) as session:
         if session:
-            kind = find_version(session, name, [Kind.SERVICE], Report())[0]
+            kind = find_version(session, name, [EntityKind.SERVICE], Report())[0]
     return [_item(each) for each in field_words(kind.Request, word)] if kind else []
 
 

@@ -18,7 +18,7 @@ from idlc.diagnostics.text import one_line, printable
 from idlc.project.find import list_files
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
-from idlc.scaffold.changes import Settings
+from idlc.scaffold.changes import ScaffoldOptions
 from idlc.scaffold.init import (
     Draft,
     Preparation,
@@ -131,7 +131,9 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
         if inner:
             interfaces = counted(number, "interface") if number else "no interfaces yet"
             sys.stdout.write(f"{within}{one_line(inner.sentence(interfaces))}\n")
-        preparation = prepare(inner, Settings(own), report, siblings(inner)) if inner else None
+        preparation = (
+            prepare(inner, ScaffoldOptions(own), report, siblings(inner)) if inner else None
+        )
         sys.stdout.flush()
         output.show(report, "text", sys.stderr)
         if preparation is None:

@@ -22,11 +22,11 @@ from idlc.diagnostics.text import one_line
 from idlc.project.settings import Scope, settings_here
 from idlc.recordings.types import LocalTypes
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from idlc.robot.live import overview
 from idlc.robot.live.connect import TOPICS, connected, find_endpoints, robot_entities
 from idlc.robot.live.connect import call as call_services
-from idlc.robot.live.overview import Connection
+from idlc.robot.live.overview import OverviewRow
 from idlc.robot.live.traffic import find_version
 from idlc.robot.live.traffic import messages as arriving
 from idlc.robot.qos import QoSProfile
@@ -57,7 +57,7 @@ def call(
     include: tuple[str, ...],
 ) -> None:
     """Call a service and print the response."""
-    kind, ends = find_version(session, service, [Kind.SERVICE], report, include)
+    kind, ends = find_version(session, service, [EntityKind.SERVICE], report, include)
     if kind is None:
         return
     request = messages.message_of(kind.Request, values)
@@ -186,7 +186,7 @@ MISMATCHES = 20
 MOST_MISMATCHES = 1000
 
 
-def _robot_table(found: Sequence[Connection]) -> Iterator[str]:
+def _robot_table(found: Sequence[OverviewRow]) -> Iterator[str]:
     """Yield the lines of a table of what is connected."""
     rows: list[tuple[str, ...]] = [ROBOT_HEAD] if found else []
     for each in found:
@@ -223,7 +223,7 @@ def show_robot(address: str, style: str, scope: Scope, report: Report) -> None:
             return
         entities = robot_entities(session)
     found = overview.connections(entities, LocalTypes(scope, report))
-    nodes = sorted({end.node_name for end in entities if end.kind is Kind.NODE})
+    nodes = sorted({end.node_name for end in entities if end.kind is EntityKind.NODE})
     misfits = [*dict.fromkeys(islice(overview.mismatches(entities), MOST_MISMATCHES))]
     similar = overview.similar_names(found)
     if style == "json":

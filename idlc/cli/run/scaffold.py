@@ -20,14 +20,14 @@ from idlc.model.ir import KINDS
 from idlc.project.git import setting
 from idlc.project.root import Root
 from idlc.scaffold import spec
-from idlc.scaffold.changes import Result, Settings, check
+from idlc.scaffold.changes import ScaffoldOptions, ScaffoldResult, check
 from idlc.scaffold.interface import check_interface_name, interface, interface_text, starter
 from idlc.scaffold.new_node import node
 from idlc.scaffold.package import LICENSES, Package, check_package_name, package
-from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, Endpoint, Role
+from idlc.scaffold.roles import DEFAULT_QOS, QOS_NAMES, ROLES, EndpointSpec, Role
 
 
-def _finish(result: Result | None, report: Report, hints: tuple[str, ...] = ()) -> int:
+def _finish(result: ScaffoldResult | None, report: Report, hints: tuple[str, ...] = ()) -> int:
     """Show the outcome of a command and return the exit status; `hints` are the next commands."""
     output.show(report, "text", sys.stderr)
     if result is None:
@@ -71,7 +71,7 @@ def new_package(
     shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
     chosen |= {"starters"} if starters else set()
-    result = package(requested, Settings(root, **shared), report, examples, chosen)
+    result = package(requested, ScaffoldOptions(root, **shared), report, examples, chosen)
     example = f"{output.program()} scaffold interface msg Status 'float32 battery'"
     return _finish(result, report, (f"cd {name}", example))
 
@@ -102,7 +102,7 @@ def new_interface(
         interface_text(kind, fields)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    settings = Settings(Root.here(), include=include, **arguments)
+    settings = ScaffoldOptions(Root.here(), include=include, **arguments)
     checked_kind = KINDS[KINDS.index(kind)]
     result = interface(checked_kind, name, fields, settings, report)
     return _finish(result, report)
@@ -124,7 +124,7 @@ _QUESTIONS: dict[ir.Kind, tuple[str, str]] = {
 CheckType = Callable[[Role, str], None]
 
 
-def ask(name: str, check_type: CheckType) -> spec.Node:
+def ask(name: str, check_type: CheckType) -> spec.NodeSpec:
     """Return the node that the answers describe; every wrong answer is asked for again at once."""
     roles = {role.answer: role for role in ROLES}
     numbers = {str(number): answer for number, answer in enumerate((*roles, PARAMETER), start=1)}
@@ -135,8 +135,8 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
     ask_next = partial(
         click.prompt, question, default=DONE, type=choices, show_choices=False, show_default=False
     )
-    endpoints: list[Endpoint] = []
-    parameters: list[spec.Parameter] = []
+    endpoints: list[EndpointSpec] = []
+    parameters: list[spec.ParameterSpec] = []
     while (chosen := ask_next()) != DONE:
         chosen = numbers.get(chosen, chosen)
         if chosen == PARAMETER:
@@ -146,7 +146,7 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
             endpoints.append(_endpoint(roles[chosen], check_type))
     lifecycle = click.confirm("Lifecycle node?", default=False, prompt_suffix=" ")
     endpoints.sort(key=lambda endpoint: ROLES.index(endpoint.role))
-    return spec.Node(name, "", tuple(endpoints), tuple(parameters), lifecycle)
+    return spec.NodeSpec(name, "", tuple(endpoints), tuple(parameters), lifecycle)
 
 
 def _answer(question: str, check: Callable[[str], object], default: str | None = None) -> str:
@@ -162,7 +162,7 @@ def _answer(question: str, check: Callable[[str], object], default: str | None =
     return str(click.prompt(question, default=default, value_proc=process))
 
 
-def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
+def _endpoint(role: Role, check_type: CheckType) -> EndpointSpec:
     """Ask for the value of the role's option."""
     value = ""
     if role.kind:
@@ -191,7 +191,7 @@ def interactive() -> bool:
 def new_node(name: str, owners: Sequence[tuple[str, int]], **arguments: Any) -> int:
     """Create a node and return the exit status; `owners` are the roles of the --qos options."""
     shared = ("dry_run", "force", "include")
-    settings = Settings(Root.here(), **{key: arguments[key] for key in shared})
+    settings = ScaffoldOptions(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle", "robust")
     try:
         spec.check_name(name)
@@ -206,7 +206,7 @@ def new_node(name: str, owners: Sequence[tuple[str, int]], **arguments: Any) -> 
             )
             parameters = tuple(map(spec.parameter, arguments["parameters"]))
             forms = arguments["lifecycle"], arguments["robust"]
-            requested = spec.Node(name, "", tuple(endpoints), parameters, *forms)
+            requested = spec.NodeSpec(name, "", tuple(endpoints), parameters, *forms)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()

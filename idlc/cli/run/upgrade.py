@@ -14,10 +14,15 @@ from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.project.settings import scope, settings_here
 from idlc.recordings.find import expand
-from idlc.tasks.upgrade.recordings import Result, TopicPlan, UpgradeOptions, upgrade_recordings
+from idlc.tasks.upgrade.recordings import (
+    TopicPlan,
+    UpgradeOptions,
+    UpgradeResult,
+    upgrade_recordings,
+)
 
 if TYPE_CHECKING:
-    from idlc.versions.conversion import Finding
+    from idlc.versions.conversion import FieldFate
 
 
 def _place(span: Span | None) -> str:
@@ -64,7 +69,7 @@ def _facts(entry: TopicPlan) -> dict[str, object]:
     }
 
 
-def _finding(finding: Finding) -> dict[str, object]:
+def _finding(finding: FieldFate) -> dict[str, object]:
     facts = finding._asdict()
     return {**facts, "span": _place(finding.span), "old": _place(finding.old)}
 
@@ -87,7 +92,7 @@ def run(
     again = shlex.join(("idlc", "upgrade", *options.typed("write_rules", "dry_run", "style")))
     where = scope(settings, package, include, exclude, distro)
     request = UpgradeOptions(recordings, where, out, again=again, **arguments)
-    result = Result([], [], [], {})
+    result = UpgradeResult([], [], [], {})
     if not report.had_errors:
         with output.progress_bar(sys.stderr) as update:
             result = upgrade_recordings(request, report, update)
@@ -99,7 +104,7 @@ def run(
     return output.status(report)
 
 
-def _show(result: Result, request: UpgradeOptions, style: str, *, failed: bool) -> None:
+def _show(result: UpgradeResult, request: UpgradeOptions, style: str, *, failed: bool) -> None:
     """Write the plan of a dry run, the files of rules, and a summary of each topic."""
     if style == "json":
         for entry in result.plans:

@@ -10,7 +10,7 @@ from idlc.generate.python import fields, literals
 from idlc.generate.python.fields import Docstring, FieldView, Naming
 from idlc.generate.python.imports import References
 from idlc.model import enums, ir, python_names
-from idlc.project.templates import Code, Text
+from idlc.project.templates import Code, EscapedText
 
 
 class ConstantView(msgspec.Struct, frozen=True):
@@ -22,7 +22,7 @@ class ConstantView(msgspec.Struct, frozen=True):
     name: Code
     value: Code
     arguments: tuple[Code, ...] = ()
-    docstring: Docstring = Docstring(Text(""))
+    docstring: Docstring = Docstring(EscapedText(""))
 
 
 class EnumView(msgspec.Struct, frozen=True):
@@ -49,7 +49,7 @@ class GroupView(msgspec.Struct, frozen=True):
     """A service or action, which only groups classes: its name and that in the file."""
 
     name: Code
-    purpose: Text
+    purpose: EscapedText
     stem: Code
 
 
@@ -98,4 +98,4 @@ def group(interface: ir.Service | ir.Action) -> GroupView:
     """Return the view of a service or action."""
     name = interface.name
     purpose = f"The {'action' if isinstance(interface, ir.Action) else 'service'} {name}."
-    return GroupView(Code(python_names.class_(name)), Text(purpose), Code(name.name))
+    return GroupView(Code(python_names.class_(name)), EscapedText(purpose), Code(name.name))

@@ -12,15 +12,15 @@ from idlc.generate.python.imports import References
 from idlc.model import comments, ir, python_names
 from idlc.model.idl_text import idl_text
 from idlc.model.ir import spell
-from idlc.project.templates import Code, Text
+from idlc.project.templates import Code, EscapedText
 from idlc.wire.plan import LIST_PRIMITIVES
 
 
 class Docstring(msgspec.Struct, frozen=True):
     """A docstring: its first line, which may be empty for none at all, and those after a blank."""
 
-    line: Text
-    more: tuple[Text, ...] = ()
+    line: EscapedText
+    more: tuple[EscapedText, ...] = ()
 
 
 def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
@@ -53,7 +53,7 @@ def message(structure: ir.Message, purpose: str, file: str) -> Docstring:
     for paragraph in (hidden if names else [], [f"Defined in {place}"] if place else []):
         if paragraph:
             more += ["", *paragraph] if more else paragraph
-    return Docstring(literals.between_quotes(line), tuple(map(Text, more)))
+    return Docstring(literals.between_quotes(line), tuple(map(EscapedText, more)))
 
 
 def purposes(interface: ir.Interface) -> list[str]:
@@ -75,14 +75,14 @@ def attribute(described: ir.Field | ir.Constant, file: str) -> Docstring:
     fields that ROS 2 adds: their annotation says it all.
     """
     if described.name_span is None:
-        return Docstring(Text(""))
+        return Docstring(EscapedText(""))
     unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
     definition = f"{spell(described.type)} {described.name}{unit}"
     comment = _lines(described.comment)
     if len(comment) > 1:
-        return Docstring(Text(f"{definition} ({file})"), tuple(map(Text, comment)))
+        return Docstring(EscapedText(f"{definition} ({file})"), tuple(map(EscapedText, comment)))
     words = f". {comment[0]}" if comment else ""
-    return Docstring(Text(f"{definition}{words} ({file})"))
+    return Docstring(EscapedText(f"{definition}{words} ({file})"))
 
 
 def _lines(comment: tuple[str, ...]) -> list[str]:

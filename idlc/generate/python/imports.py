@@ -11,7 +11,7 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.model import derive, enums, ir, link, python_names
-from idlc.project.templates import Code, Text
+from idlc.project.templates import Code, EscapedText
 from idlc.wire.layout import Messages
 
 
@@ -168,7 +168,7 @@ class NameView(msgspec.Struct, frozen=True):
 class LazyPackageView(msgspec.Struct, frozen=True):
     """A package that imports its modules when a name is asked for."""
 
-    title: Text
+    title: EscapedText
     runtime: Code
     imports: tuple[Code, ...]
     names: tuple[NameView, ...]
@@ -215,7 +215,7 @@ def package(
         imports += statements(f".{module}", own, 4)
         names += [NameView(Code(name), Code(module), Code(value)) for name, value in values.items()]
     return LazyPackageView(
-        title=Text(f"{TITLES[kind]} of {model.package}, imported on first use."),
+        title=EscapedText(f"{TITLES[kind]} of {model.package}, imported on first use."),
         runtime=Code(surroundings.runtime),
         imports=tuple(map(Code, imports)),
         names=tuple(sorted(names, key=lambda view: natural(view.name))),

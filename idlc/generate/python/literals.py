@@ -6,7 +6,7 @@ import math
 import unicodedata
 
 from idlc.model import ir
-from idlc.project.templates import Text
+from idlc.project.templates import EscapedText
 
 
 def string_literal(value: str) -> str:
@@ -60,9 +60,9 @@ def prose(line: str) -> str:
     return shown.replace('"""', '\\"\\"\\"').rstrip()
 
 
-def between_quotes(line: str) -> Text:
+def between_quotes(line: str) -> EscapedText:
     """Return a line (see `prose`) that may stand between the quotes of a docstring."""
     shown = line.lstrip()
     if shown.endswith('"') and not shown.endswith('\\"'):
         shown = shown[:-1] + '\\"'  # would join the closing quotes
-    return Text("\\" + shown if shown.startswith('"') else shown)
+    return EscapedText("\\" + shown if shown.startswith('"') else shown)

@@ -27,7 +27,7 @@ from idlc.model.idl_text import idl_text
 from idlc.model.names import snake_case
 from idlc.model.type_data import content
 from idlc.project.lock import COPY_HEAD
-from idlc.project.templates import Code, RenderedFile, Text
+from idlc.project.templates import Code, EscapedText, RenderedFile
 from idlc.project.templates import code as code_environment
 from idlc.runtime import PROTOCOL
 from idlc.runtime.names import stamp
@@ -140,9 +140,9 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     `converts` says that classes convert values as Lyrical's do.
     """
 
-    origin: Text
+    origin: EscapedText
     pragmas: tuple[Code, ...]
-    title: Text
+    title: EscapedText
     runtime: Code
     imports: tuple[Code, ...] = ()
     type_imports: tuple[Code, ...] = ()
@@ -190,9 +190,9 @@ def module_views(
         classes.message(structure, references, purpose) for structure, purpose in purposes
     )
     view = ModuleView(
-        origin=Text(f"{name}.{name.kind}"),
+        origin=EscapedText(f"{name}.{name.kind}"),
         pragmas=(PRAGMAS if is_foreign else ()) + (HIDING_PRAGMAS if is_hiding else ()),
-        title=Text(f"The classes of {name}."),
+        title=EscapedText(f"The classes of {name}."),
         runtime=Code(surroundings.runtime),
         imports=_code(_imports(references, written, views)),
         type_imports=_code(_type_imports(views)),
@@ -205,9 +205,9 @@ def module_views(
     references = References(interface, sent, messages, names, surroundings)
     codecs = tuple(codec(structure, references, messages) for structure in sent)
     view = ModuleView(
-        origin=Text(f"{name}.{name.kind}"),
+        origin=EscapedText(f"{name}.{name.kind}"),
         pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
-        title=Text(f"The codecs of {name}."),
+        title=EscapedText(f"The codecs of {name}."),
         runtime=Code(surroundings.runtime),
         codecs=codecs,
         has_texts=any(codec.has_texts for codec in codecs),

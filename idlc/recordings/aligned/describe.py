@@ -16,7 +16,7 @@ from idlc.recordings.columns.plan import INSTANTS
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
 
-class Leaf(NamedTuple):
+class ColumnLeaf(NamedTuple):
     """A column without columns in it: its path, and the message and field that it comes from."""
 
     path: str
@@ -24,14 +24,14 @@ class Leaf(NamedTuple):
     field: FieldInfo
 
 
-def leaves(structure: Structure, prefix: str = "") -> Iterator[Leaf]:
+def leaves(structure: Structure, prefix: str = "") -> Iterator[ColumnLeaf]:
     """Yield the columns of a type's flat table."""
     for field in structure.fields:
         nested = None if field.is_list else field.nested
         if nested and nested.name not in INSTANTS:
             yield from leaves(nested, f"{prefix}{field.name}.")
         else:
-            yield Leaf(prefix + field.name, structure, field)
+            yield ColumnLeaf(prefix + field.name, structure, field)
 
 
 def metadata(structure: Structure) -> dict[str, dict[str, str]]:

@@ -18,8 +18,8 @@ from idlc.recordings.columns.values import needing
 from idlc.recordings.containers.messages import (
     ALWAYS,
     NO_TIME,
-    Messages,
     Ranges,
+    TopicMessages,
     Window,
     join_messages,
 )
@@ -85,7 +85,7 @@ class Times(NamedTuple):
         return Needed(window, rows, numbers, log, each.at(places))
 
 
-class Summary(NamedTuple):
+class ClockFit(NamedTuple):
     """How well a topic fits a clock: rates are in hertz, and the rest is in seconds.
 
     `missing` counts the ticks without a value, `unordered` the messages after a later one.
@@ -101,7 +101,7 @@ class Summary(NamedTuple):
     unordered: int
 
 
-class Source(NamedTuple):
+class AlignedTopic(NamedTuple):
     """A topic of an open recording."""
 
     track: Track
@@ -128,7 +128,7 @@ class AlignedPart:
     """
 
     def __init__(
-        self, sources: tuple[Source, ...], schema: pa.Schema, ticks: Any, needs: list[Needed]
+        self, sources: tuple[AlignedTopic, ...], schema: pa.Schema, ticks: Any, needs: list[Needed]
     ) -> None:
         self.schema = schema
         self._ticks = ticks
@@ -159,8 +159,8 @@ class Aligned:
 
     def __init__(
         self,
-        sources: tuple[Source, ...],
-        on: Source | None,
+        sources: tuple[AlignedTopic, ...],
+        on: AlignedTopic | None,
         period: Fraction | None,
         span: tuple[int | None, int | None],
     ) -> None:
@@ -264,7 +264,7 @@ class Aligned:
             parts.append(AlignedPart(self._sources, self.schema, ticks, needs))
         return parts
 
-    def summary(self) -> list[Summary]:
+    def summary(self) -> list[ClockFit]:
         """Return how well each topic fits the clock."""
         triples = zip(self._sources, self._times, self._matches, strict=True)
         return [_summary(source.track.topic, times, each) for source, times, each in triples]
@@ -318,7 +318,7 @@ def aligned(
         for name in option if isinstance(option, Mapping) else ():
             recording[name]
 
-    def source(name: str, fields: Any) -> Source:
+    def source(name: str, fields: Any) -> AlignedTopic:
         limit = _for(name, tolerance, None)
         way = _choice("how", _for(name, how, "last"), WAYS)
         way = "on" if name == on else way
@@ -339,7 +339,7 @@ def aligned(
             fields = (*fields, *dict.fromkeys(label for _, label in named))
         limit = None if limit is None else int(length(limit))
         track = Track(name, fields, way, limit, by, columns, schema(fields), turned, named)
-        return Source(track, selection)
+        return AlignedTopic(track, selection)
 
     sources = {name: source(name, fields) for name, fields in wanted.items()}
     base = None if on is None else sources.get(on) or source(on, ())
@@ -363,7 +363,7 @@ def _choice(option: str, value: Any, choices: tuple[str, ...]) -> str:
     return str(value)
 
 
-def _has_clock(source: Source) -> bool:
+def _has_clock(source: AlignedTopic) -> bool:
     """Return whether messages have the times that order them."""
     if source.track.clock == "log":
         return True
@@ -407,16 +407,16 @@ def _scan(track: Track, selection: Any) -> Times:
     return Times(times[order], order, log, np.concatenate(sizes), values)
 
 
-def _sizes(batch: Messages) -> Any:
+def _sizes(batch: TopicMessages) -> Any:
     if isinstance(batch, Ranges):
         return np.asarray(batch.stops - batch.starts, np.int64)
     return np.fromiter(map(len, batch.views()), np.int64, len(batch))
 
 
-def _summary(topic: str, times: Times, each: Match) -> Summary:
+def _summary(topic: str, times: Times, each: Match) -> ClockFit:
     count, steps = len(times.times), np.diff(times.times) / SECOND
     ages = np.abs(each.age[each.first >= 0]) / SECOND
-    return Summary(
+    return ClockFit(
         topic,
         count,
         len(steps) / steps.sum() if steps.any() else 0.0,

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from idlc.runtime.typeinfo import FieldInfo, Structure, least_element, spelling_hint
 
 
-class Leaf(NamedTuple):
+class SegmentLeaf(NamedTuple):
     """The place of the numbers of one column in a segment.
 
     `repeats` has the count and distance in bytes of the arrays around them, outermost first.
@@ -38,7 +38,7 @@ class Segment:
         self.key = key
         self.align = align
         self.size = 0
-        self.leaves: list[Leaf] = []
+        self.leaves: list[SegmentLeaf] = []
 
 
 class Text(NamedTuple):
@@ -58,10 +58,10 @@ class List(NamedTuple):
     size: int | None
     bound: int | None
     least: int
-    level: Level
+    level: PlanLevel
 
 
-class Level:
+class PlanLevel:
     """A structure, or what else a sequence repeats."""
 
     def __init__(self, key: int) -> None:
@@ -69,7 +69,7 @@ class Level:
         #: False if its last steps are left out, because nobody wants what they read.
         self.whole = True
         self.steps: list[Segment | Text | List] = []
-        self.node: Node
+        self.node: PlanNode
 
     @cached_property
     def fixed(self) -> bool:
@@ -114,7 +114,7 @@ class Numbers(NamedTuple):
 class Struct(NamedTuple):
     """Columns by name; `times` has numpy's code of those that are times or durations."""
 
-    fields: dict[str, Node]
+    fields: dict[str, PlanNode]
     times: dict[str, str]
 
 
@@ -127,10 +127,10 @@ class Lists(NamedTuple):
 
     size: int | None
     step: List | None
-    element: Node
+    element: PlanNode
 
 
-Node = Numbers | Text | Struct | Lists
+PlanNode = Numbers | Text | Struct | Lists
 
 
 # the plan of a type
@@ -155,7 +155,7 @@ def _code_of_time(structure: Structure) -> str | None:
 
 
 @lru_cache(maxsize=64)
-def plan_of(structure: Structure, fields: tuple[str, ...] | None) -> Level:
+def plan_of(structure: Structure, fields: tuple[str, ...] | None) -> PlanLevel:
     """Return the plan of a type; raise ValueError for a field that it does not have."""
     wanted = None if fields is None else _selection(structure, fields)
     builder = _Builder(count(), aligned=8)
@@ -208,7 +208,7 @@ class _Builder:
 
     def __init__(self, keys: Any, aligned: int = 1) -> None:
         self.keys = keys
-        self.level = Level(next(keys))
+        self.level = PlanLevel(next(keys))
         self.segment: Segment | None = None
         self.aligned = aligned
         self.at = 0
@@ -217,7 +217,7 @@ class _Builder:
         """Plan a structure."""
         if not structure.fields:
             self.place(1, 1)
-        nodes: dict[str, Node] = {}
+        nodes: dict[str, PlanNode] = {}
         times: dict[str, str] = {}
         for field in structure.fields:
             inner = None if wanted is None else wanted.get(field.name, NOTHING)
@@ -229,7 +229,7 @@ class _Builder:
                 times[field.name] = code
         return Struct(nodes, times)
 
-    def field(self, field: FieldInfo, wanted: Wanted) -> Node:
+    def field(self, field: FieldInfo, wanted: Wanted) -> PlanNode:
         """Plan a field."""
         if not field.is_list:
             return self.element(field, wanted)
@@ -251,7 +251,7 @@ class _Builder:
         self.add(step, min(4, packed.align) if packed else 1)
         return Lists(field.size, step, level.node)
 
-    def element(self, field: FieldInfo, wanted: Wanted) -> Node:
+    def element(self, field: FieldInfo, wanted: Wanted) -> PlanNode:
         """Plan a single value."""
         if field.nested:
             return self.structure(field.nested, wanted)
@@ -261,14 +261,16 @@ class _Builder:
         self.add(text, 4 if field.wide else 1)
         return text
 
-    def numbers(self, field: FieldInfo, wanted: Wanted, size: int | None = None) -> Node:
+    def numbers(self, field: FieldInfo, wanted: Wanted, size: int | None = None) -> PlanNode:
         """Plan a number, or an array of them."""
         assert field.primitive is not None
         kind, width, key = field.primitive.code, field.primitive.size, next(self.keys)
         segment, offset = self.place(width, width * (1 if size is None else size))
         code = _numpy_code(kind, width)
         if wanted is None:
-            segment.leaves.append(Leaf(key, offset, code, () if size is None else ((size, width),)))
+            segment.leaves.append(
+                SegmentLeaf(key, offset, code, () if size is None else ((size, width),))
+            )
         return Numbers(key, code, size)
 
     def place(self, align: int, size: int) -> tuple[Segment, int]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from idlc.recordings.columns.plan import Level, plan_of
+from idlc.recordings.columns.plan import PlanLevel, plan_of
 from idlc.recordings.columns.scan import (
     Cursors,
     ScanResult,
@@ -17,7 +17,7 @@ from idlc.recordings.columns.scan import (
     VectorScan,
     scan_uniform,
 )
-from idlc.recordings.columns.source import Flat, Pieces, Source
+from idlc.recordings.columns.source import BytesSource, Flat, Pieces
 from idlc.recordings.columns.table import Elements, Table
 from idlc.recordings.columns.values import Columns
 from idlc.runtime.cdr import order_of
@@ -28,19 +28,19 @@ from idlc.runtime.typeinfo import CarefulReader, Structure, structure_of
 LARGE = 1 << 15
 
 
-class Messages(NamedTuple):
+class MessageBytes(NamedTuple):
     """Serialized messages: where they begin and end in a source, as arrays."""
 
-    source: Source
+    source: BytesSource
     starts: Any
     stops: Any
 
-    def part(self, first: int, last: int) -> Messages:
+    def part(self, first: int, last: int) -> MessageBytes:
         """Return some of the messages."""
         return self._replace(starts=self.starts[first:last], stops=self.stops[first:last])
 
 
-def messages_of(messages: Any) -> Messages:
+def messages_of(messages: Any) -> MessageBytes:
     """Return the messages of a batch, or of an iterable; small ones of that are copied."""
     if all(hasattr(messages, name) for name in ("buffer", "starts", "stops")):
         array = np.frombuffer(memoryview(messages.buffer).cast("B"), np.uint8)
@@ -53,14 +53,14 @@ def messages_of(messages: Any) -> Messages:
             raise ValueError("starts and stops of a batch must be as many")
         if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
             raise ValueError("a message of the batch is not within its buffer")
-        return Messages(Flat(array), starts, stops)
+        return MessageBytes(Flat(array), starts, stops)
     raws = [raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages]
     sizes = np.fromiter(map(len, raws), np.int64, len(raws))
     stops = np.cumsum(sizes)
     starts = stops - sizes
     if len(raws) and stops[-1] >= LARGE * len(raws):
-        return Messages(Pieces(raws, starts), starts, stops)
-    return Messages(Flat(np.frombuffer(b"".join(raws), np.uint8)), starts, stops)
+        return MessageBytes(Pieces(raws, starts), starts, stops)
+    return MessageBytes(Flat(np.frombuffer(b"".join(raws), np.uint8)), starts, stops)
 
 
 def type_of(kind: type | Structure) -> Structure:
@@ -106,7 +106,7 @@ def unread_bytes(kind: type | Structure, messages: Any) -> Any:
         return None
 
 
-def _read(plan: Level, messages: Messages) -> tuple[Table, Elements, Any]:
+def _read(plan: PlanLevel, messages: MessageBytes) -> tuple[Table, Elements, Any]:
     source, result = messages.source, ScanResult()
     if (messages.stops - messages.starts < 4).any():
         raise UnreadableError
@@ -139,7 +139,7 @@ def _read(plan: Level, messages: Messages) -> tuple[Table, Elements, Any]:
     return table, Elements(plan, len(big), order_of_rows, big if mixed else None), unread
 
 
-def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
+def explain(kind: Any, plan: PlanLevel, messages: MessageBytes) -> NoReturn:
     """Raise the DecodeError of a class's package for the first message that is not one of it."""
     first, last = 0, len(messages.starts)
     while last - first > 1:  # the first one that cannot be read is in between

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from idlc.recordings.columns.plan import Level, List, Segment, Text
-from idlc.recordings.columns.source import Source, utf16_units
+from idlc.recordings.columns.plan import List, PlanLevel, Segment, Text
+from idlc.recordings.columns.source import BytesSource, utf16_units
 
 
 class UnreadableError(Exception):
@@ -39,7 +39,7 @@ class ScanResult:
         self.index: dict[int, list[Any]] = defaultdict(list)
         self.count: dict[int, int] = defaultdict(int)
 
-    def enter(self, level: Level, parent: Any, index: Any) -> int:
+    def enter(self, level: PlanLevel, parent: Any, index: Any) -> int:
         """Add elements of a level; return the number of the first."""
         first = self.count[level.key]
         self.count[level.key] += len(parent)
@@ -88,7 +88,7 @@ def aligned(at: Any, phase: Any, align: int) -> Any:
     return at + ((phase - at) & (align - 1))
 
 
-def placed(level: Level, at: Any, phase: Any) -> tuple[dict[int, Any], Any]:
+def placed(level: PlanLevel, at: Any, phase: Any) -> tuple[dict[int, Any], Any]:
     """Return where the segments of a level of fixed size are, and the position after it."""
     starts = {}
     for step in level.steps:
@@ -99,7 +99,7 @@ def placed(level: Level, at: Any, phase: Any) -> tuple[dict[int, Any], Any]:
 
 
 def repeat_fixed(
-    level: Level, cursors: Cursors, counts: Any, result: ScanResult, first: int
+    level: PlanLevel, cursors: Cursors, counts: Any, result: ScanResult, first: int
 ) -> None:
     """Scan elements of fixed size with gaps.
 
@@ -153,13 +153,13 @@ class SequentialScan:
         self.view: Any = b""
         self.sizes: list[tuple[int, int]] = []
 
-    def enter(self, source: Source, cursors: Cursors, row: int) -> None:
+    def enter(self, source: BytesSource, cursors: Cursors, row: int) -> None:
         """Start with the message at a cursor."""
         self.sizes = []
         self.end, self.phase = int(cursors.end[row]), int(cursors.phase[row])
         self.view, self.shift = source.around(int(cursors.at[row]))
 
-    def repeat(self, level: Level, at: int, parent: int, indices: range) -> int:
+    def repeat(self, level: PlanLevel, at: int, parent: int, indices: range) -> int:
         """Scan elements of a sequence; return the position after them."""
         first = self.result.count[level.key]
         self.result.count[level.key] += len(indices)
@@ -171,7 +171,7 @@ class SequentialScan:
             at = self.level(level, at, number)
         return at
 
-    def level(self, level: Level, at: int, number: int) -> int:
+    def level(self, level: PlanLevel, at: int, number: int) -> int:
         """Scan a structure, which has a number in its level."""
         for step in level.steps:
             if isinstance(step, Segment):
@@ -213,7 +213,7 @@ class SequentialScan:
                 raise UnreadableError
         return after
 
-    def strings(self, level: Level, at: int, count: int) -> int:
+    def strings(self, level: PlanLevel, at: int, count: int) -> int:
         """Scan elements that consist of strings, of which there may be very many."""
         unpack, view, shift, end = self.unpack, self.view, self.shift, self.end
         phase, starts, sizes = self.phase, [], []
@@ -269,13 +269,13 @@ FEW = 16
 class VectorScan:
     """Scans all messages of one byte order together."""
 
-    def __init__(self, source: Source, order: str, result: ScanResult) -> None:
+    def __init__(self, source: BytesSource, order: str, result: ScanResult) -> None:
         self.result = result
         self.source = source
         self.order = order
         self.sequential = SequentialScan(order, result)
 
-    def level(self, level: Level, cursors: Cursors, first: int) -> None:
+    def level(self, level: PlanLevel, cursors: Cursors, first: int) -> None:
         """Scan a structure at each cursor; in their level they are numbered from `first`."""
         for step in level.steps:
             if isinstance(step, Segment):
@@ -329,7 +329,7 @@ class VectorScan:
         else:
             self.varied(step.level, cursors, counts, first)
 
-    def varied(self, level: Level, cursors: Cursors, counts: Any, first: int) -> None:
+    def varied(self, level: PlanLevel, cursors: Cursors, counts: Any, first: int) -> None:
         """Scan elements of varying size: all first ones, all second ones, and so on."""
         order = np.argsort(-counts, kind="stable")
         descending = -counts[order]
@@ -359,7 +359,7 @@ LEAST_PART = 0.25
 
 
 def scan_uniform(
-    plan: Level, source: Source, order: str, cursors: Cursors, result: ScanResult
+    plan: PlanLevel, source: BytesSource, order: str, cursors: Cursors, result: ScanResult
 ) -> Iterator[tuple[Any, int]]:
     """Scan messages that share one layout; yield the indices of their cursors, layout by layout.
 
@@ -391,7 +391,7 @@ def scan_uniform(
         rest = rest[~same]
 
 
-def _replicate(plan: Level, first: ScanResult, starts: Any, result: ScanResult) -> None:
+def _replicate(plan: PlanLevel, first: ScanResult, starts: Any, result: ScanResult) -> None:
     """Add the locations in the first of some messages for all of them."""
     repeats = len(starts)
     for key, parts in first.at.items():
@@ -410,7 +410,7 @@ def _replicate(plan: Level, first: ScanResult, starts: Any, result: ScanResult) 
         result.count[key] += repeats * count
 
 
-def _levels(level: Level) -> Iterator[tuple[Level, Level]]:
+def _levels(level: PlanLevel) -> Iterator[tuple[PlanLevel, PlanLevel]]:
     """Yield all levels inside of one, each with the one around it."""
     for step in level.steps:
         if isinstance(step, List):

@@ -22,7 +22,7 @@ HEAD = 512
 PAGE = 1 << 21
 
 
-class Place(NamedTuple):
+class ArrayPlace(NamedTuple):
     """The place of an array in memory."""
 
     memory: Any
@@ -54,16 +54,16 @@ class Flat:
         first = int(starts[0])
         return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
 
-    def blocks(self, starts: Any, size: int) -> Place:
+    def blocks(self, starts: Any, size: int) -> ArrayPlace:
         """Return where the bytes from each start are: if they are regular, where they were."""
         distance = _regular(starts)
         if distance is not None:
-            return Place(self.array, int(starts[0]), (len(starts),), (distance,))
+            return ArrayPlace(self.array, int(starts[0]), (len(starts),), (distance,))
         if size > LARGEST_ITEM:
             rows = _copied(repeat(self.view), starts, np.full(len(starts), size))
         else:
             rows = self._windows(f"V{size}")[starts].view(np.uint8)
-        return Place(rows, 0, (len(starts),), (size,))
+        return ArrayPlace(rows, 0, (len(starts),), (size,))
 
     def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
         """Return bytes, so many from each start, one after the other.
@@ -119,10 +119,10 @@ class Pieces:
         item = np.dtype(dtype)
         return self.ranges(starts, np.full(len(starts), item.itemsize)).view(item)
 
-    def blocks(self, starts: Any, size: int) -> Place:
+    def blocks(self, starts: Any, size: int) -> ArrayPlace:
         """Return where copies of the bytes from each start are."""
         rows = self.ranges(starts, np.full(len(starts), size))
-        return Place(rows, 0, (len(starts),), (size,))
+        return ArrayPlace(rows, 0, (len(starts),), (size,))
 
     def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
         """Return bytes, so many from each start, one after the other."""
@@ -133,7 +133,7 @@ class Pieces:
         return _copied(map(self.raws.__getitem__, rows.tolist()), inside, sizes)
 
 
-Source = Flat | Pieces
+BytesSource = Flat | Pieces
 
 
 def _copied(views: Iterable[Any], starts: Any, sizes: Any) -> Any:
@@ -162,7 +162,7 @@ def _regular(starts: Any) -> int | None:
 # strings, as `deserialize` reads them: invalid UTF-8 and UTF-16 become U+FFFD
 
 
-def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
+def narrow_texts(source: BytesSource, starts: Any, sizes: Any) -> Texts:
     """Return the strings at some places, of so many bytes with their terminating zeros, if any."""
     last = np.maximum(starts + sizes, 1) - 1
     sizes = sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
@@ -170,7 +170,7 @@ def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
     return texts if _is_utf8(texts) else _valid(texts, "utf-8")
 
 
-def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
+def wide_texts(source: BytesSource, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
     """Return the strings at some places, of so many UTF-16 units of four bytes."""
     units = utf16_units(source, starts, sizes, order)
     if big is not None:
@@ -180,7 +180,7 @@ def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) ->
     return _valid(texts, "utf-16-le")
 
 
-def utf16_units(source: Source, starts: Any, sizes: Any, order: str) -> Any:
+def utf16_units(source: BytesSource, starts: Any, sizes: Any, order: str) -> Any:
     """Return the units of strings, one after the other, as numbers."""
     return source.ranges(starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
 

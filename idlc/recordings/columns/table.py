@@ -6,9 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from idlc.recordings.columns.plan import Level, List, Node, Numbers, Segment, Struct, Text
+from idlc.recordings.columns.plan import List, Numbers, PlanLevel, PlanNode, Segment, Struct, Text
 from idlc.recordings.columns.scan import ScanResult, joined
-from idlc.recordings.columns.source import Place, Source, narrow_texts, offsets_of, wide_texts
+from idlc.recordings.columns.source import (
+    ArrayPlace,
+    BytesSource,
+    narrow_texts,
+    offsets_of,
+    wide_texts,
+)
 from idlc.recordings.columns.values import Columns, Ragged
 
 
@@ -19,7 +25,7 @@ class Elements(NamedTuple):
     says which are big-endian, if only some are.
     """
 
-    level: Level
+    level: PlanLevel
     total: int
     order: Any
     big: Any
@@ -31,7 +37,7 @@ class Table:
     `order` is that of all messages; "<" if only some are big-endian.
     """
 
-    def __init__(self, source: Source, order: str, scanned: ScanResult) -> None:
+    def __init__(self, source: BytesSource, order: str, scanned: ScanResult) -> None:
         self.source = source
         self.order = order
         self.scanned = scanned
@@ -51,7 +57,12 @@ class Table:
         return columns
 
     def column(
-        self, node: Node, count: int, elements: Elements, numbers: dict[int, Any], depth: int = 0
+        self,
+        node: PlanNode,
+        count: int,
+        elements: Elements,
+        numbers: dict[int, Any],
+        depth: int = 0,
     ) -> Any:
         """Return a column of `count` values, which are in arrays of `depth` dimensions.
 
@@ -101,7 +112,7 @@ class Table:
         if packed and packed.leaves:
             starts, size = self.sorted(around, self.scanned.at[step.key]), packed.size
             content = self.source.ranges(starts, counts * size, size)
-            self.cut(packed, Place(content, 0, (elements.total,), (size,)), numbers)
+            self.cut(packed, ArrayPlace(content, 0, (elements.total,), (size,)), numbers)
         elif not packed:
             numbers = self.numbers(elements)
         return offsets, elements, numbers
@@ -129,7 +140,7 @@ class Table:
             result[big] = result[big].byteswap()
         return result
 
-    def cut(self, segment: Segment, place: Place, result: dict[int, Any]) -> None:
+    def cut(self, segment: Segment, place: ArrayPlace, result: dict[int, Any]) -> None:
         """Add the numbers of a segment at a place."""
         for leaf in segment.leaves:
             shape = (*place.shape, *(count for count, _ in leaf.repeats))

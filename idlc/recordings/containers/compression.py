@@ -27,7 +27,7 @@ _THREAD = threading.local()
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
-class Room:
+class DecompressionBudget:
     """The bytes and records that a file may still decompress to, so that reading stays linear."""
 
     def __init__(self, size: int) -> None:
@@ -102,7 +102,7 @@ def _zstd(data: memoryview, target: memoryview) -> int:
 def unpack(path: Path, target: Path) -> str | None:
     """Decompress a whole file; return why only its start can be, if that is so."""
     zstandard, decompressor = _zstandard()
-    room = Room(path.stat().st_size)
+    room = DecompressionBudget(path.stat().st_size)
     try:
         with path.open("rb") as source, target.open("xb") as file:
             reader = decompressor.stream_reader(source, read_across_frames=True)
@@ -116,7 +116,7 @@ def unpack(path: Path, target: Path) -> str | None:
     return None
 
 
-def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:
+def zstd_frame(data: bytes | memoryview, room: DecompressionBudget) -> bytes:
     """Decompress a message that is compressed by itself and declares its size."""
     zstandard, decompressor = _zstandard()
     try:

@@ -29,20 +29,20 @@ from idlc.recordings.containers.source import DamageError, RecordingError, first
 from idlc.recordings.damage import Damage
 
 if TYPE_CHECKING:
-    from idlc.recordings.containers.messages import Messages, Window
+    from idlc.recordings.containers.messages import TopicMessages, Window
 
 #: One file of a recording. Its `place` is what it was opened by. Its `topics` have with each topic
 #: the number by which messages name it; of several channels, each is a topic. Pieces of a file are
 #: chunks or rows, and `parts` are these divided, or together, where they take about some size.
-File: TypeAlias = McapFile | Db3File
-Opened = TypeVar("Opened", bound="File | Container")
+RecordingFile: TypeAlias = McapFile | Db3File
+Opened = TypeVar("Opened", bound="RecordingFile | Container")
 #: The first bytes of files that stand for a recording which was not downloaded.
 GIT_LFS, GIT_ANNEX = b"version https://git-lfs", b"/annex/objects/"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
 
-class Channel(NamedTuple):
+class FileChannel(NamedTuple):
     """A topic of one file, which is there by its index, and its number in it."""
 
     file: int
@@ -56,7 +56,7 @@ class Container(AbstractContextManager["Container"]):
     def __init__(
         self,
         name: str,
-        files: list[File],
+        files: list[RecordingFile],
         notes: Iterable[str] = (),
         damage: Iterable[Damage] = (),
     ) -> None:
@@ -88,7 +88,7 @@ class Container(AbstractContextManager["Container"]):
         ]
         return (*self.notes_of_bag, *of_files, *unproven, *late)
 
-    def places(self, topic: Topic) -> Iterator[tuple[File, list[int], int]]:
+    def places(self, topic: Topic) -> Iterator[tuple[RecordingFile, list[int], int]]:
         """Yield each file with messages of a topic, its numbers in the file, and their count."""
         counts: dict[int, dict[int, int]] = {}
         mine, bare = self._channels[topic]
@@ -108,7 +108,7 @@ class Container(AbstractContextManager["Container"]):
         self._channels[topic] = mine, bare
         return topic
 
-    def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
+    def messages(self, topic: Topic, window: Window) -> Iterator[TopicMessages]:
         """Yield the messages of a topic, many at a time, in the order of the recording.
 
         Raises RecordingError if damage has left none of them.
@@ -203,7 +203,7 @@ def open_recording(
     damage is an error.
     """
 
-    def opened(place: Path) -> File:
+    def opened(place: Path) -> RecordingFile:
         return _opened(place, index, check, strict)
 
     if isinstance(path, (list, tuple)):
@@ -228,7 +228,7 @@ def open_recording(
     return _opened_bag(path, opened, strict)
 
 
-def _opened_bag(path: Path, opened: Callable[[Path], File], strict: bool) -> Container:
+def _opened_bag(path: Path, opened: Callable[[Path], RecordingFile], strict: bool) -> Container:
     """Open the folder of a bag."""
     bag_files = bag.files_of(path)
     if strict and bag_files.missing:
@@ -243,14 +243,16 @@ def _opened_bag(path: Path, opened: Callable[[Path], File], strict: bool) -> Con
     return Container(str(path), files, bag_files.notes, [*bag_files.missing, *damage])
 
 
-def open_pieces(place: Any, check: bool | None = None, strict: bool = False) -> File:
+def open_pieces(place: Any, check: bool | None = None, strict: bool = False) -> RecordingFile:
     """Open a file to read pieces of it that are known: nothing else is read."""
     if is_local(place):
         return _opened(Path(place), True, check, strict, read=False)
     return McapFile(place, check=check, read=False, strict=strict)
 
 
-def _opened(place: Path, index: bool, check: bool | None, strict: bool, read: bool = True) -> File:
+def _opened(
+    place: Path, index: bool, check: bool | None, strict: bool, read: bool = True
+) -> RecordingFile:
     """Open a file; one that is compressed as a whole is decompressed to a temporary file."""
     if not first_bytes(place).startswith(ZSTD_MAGIC):
         if is_db3(place):
@@ -322,14 +324,16 @@ def is_db3(path: Path) -> bool:
     raise kind(f"`{path}` is not an MCAP or .db3 recording", hint)
 
 
-def _merged(files: list[File]) -> Iterator[tuple[Topic, tuple[list[Channel], list[Channel]]]]:
+def _merged(
+    files: list[RecordingFile],
+) -> Iterator[tuple[Topic, tuple[list[FileChannel], list[FileChannel]]]]:
     """Yield each topic once, with its channels: several of these and several files may have it."""
-    by_name: dict[tuple[str, str, str], dict[Schema | None, list[Channel]]] = {}
+    by_name: dict[tuple[str, str, str], dict[Schema | None, list[FileChannel]]] = {}
     for index, file in enumerate(files):
         for topic, number in file.topics:
             schema = None if topic.schema is None or topic.schema.is_blank else topic.schema
             by_schema = by_name.setdefault((topic.name, topic.type, topic.encoding), {})
-            by_schema.setdefault(schema, []).append(Channel(index, number, topic))
+            by_schema.setdefault(schema, []).append(FileChannel(index, number, topic))
     for by_schema in by_name.values():
         # without a definition, or with an empty one, a channel belongs to each of the others
         bare = sorted(by_schema.pop(None, []), key=lambda channel: channel.topic.schema is None)
@@ -340,7 +344,7 @@ def _merged(files: list[File]) -> Iterator[tuple[Topic, tuple[list[Channel], lis
             yield replace(topic, count=count + more, hash=digest or other), (mine, bare)
 
 
-def _counted(channels: list[Channel]) -> tuple[int, str | None]:
+def _counted(channels: list[FileChannel]) -> tuple[int, str | None]:
     """Return how many messages channels have, and their first hash."""
     count = sum(channel.topic.count for channel in channels)
     return count, next((channel.topic.hash for channel in channels if channel.topic.hash), None)

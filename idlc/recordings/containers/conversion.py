@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
-from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, compress, zstd_frame
+from idlc.recordings.containers.compression import (
+    ZSTD_MAGIC,
+    DecompressionBudget,
+    compress,
+    zstd_frame,
+)
 from idlc.recordings.containers.file import CDR, START, Schema, other_encoding, unread_reason
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
@@ -80,7 +85,11 @@ def check(
 
 
 def converted(
-    topic: str, conversion: Conversion, raws: Sequence[Raw], times: Sequence[int], room: Room
+    topic: str,
+    conversion: Conversion,
+    raws: Sequence[Raw],
+    times: Sequence[int],
+    room: DecompressionBudget,
 ) -> Iterator[bytes]:
     """Yield new payloads; those that are compressed by themselves remain so."""
     assert conversion.convert

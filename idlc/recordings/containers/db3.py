@@ -19,20 +19,20 @@ from urllib.parse import quote
 
 import msgspec
 
-from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, zstd_frame
+from idlc.recordings.containers.compression import ZSTD_MAGIC, DecompressionBudget, zstd_frame
 from idlc.recordings.containers.file import START, Schema, Topic, full_name, recorded_schema
 from idlc.recordings.containers.source import (
     DamageError,
+    FileSource,
     RecordingError,
-    Source,
     first_bytes,
     of_file,
 )
 from idlc.recordings.damage import DamageList
-from idlc.recordings.sqlite_pages import LARGEST, SMALLEST, Cell, Leaf, Pages
+from idlc.recordings.sqlite_pages import LARGEST, SMALLEST, Cell, Pages, RowSpan
 
 if TYPE_CHECKING:
-    from idlc.recordings.containers.messages import Messages, Window
+    from idlc.recordings.containers.messages import TopicMessages, Window
 
 MAGIC = b"SQLite format 3\0"
 #: Hidden columns of these kinds are computed by the file.
@@ -45,7 +45,7 @@ PATIENCE = 5.0
 GROUP = 1 << 25
 #: Those that are converted, until they have so many.
 BATCH = 1 << 22
-Group = TypeVar("Group")
+GroupT = TypeVar("GroupT")
 
 
 class Rows(NamedTuple):
@@ -312,14 +312,17 @@ class Db3File:
         from idlc.recordings.containers.messages import ALWAYS
 
         ((version,),) = self._rows("PRAGMA data_version")
-        numbers, room = {number for _, number in self.topics}, Room(self._state.st_size)
+        numbers, room = (
+            {number for _, number in self.topics},
+            DecompressionBudget(self._state.st_size),
+        )
         pieces = self.pieces(numbers, ALWAYS)
         yield from self._read_around_damage(pieces, lambda part: self._rows_of(part, numbers, room))
         if ((version,),) != tuple(self._rows("PRAGMA data_version")):
             raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
 
     def _rows_of(
-        self, part: Rows, topics: Collection[int], room: Room
+        self, part: Rows, topics: Collection[int], room: DecompressionBudget
     ) -> tuple[list[tuple[int, int, bytes]], int]:
         """Return the first messages of rows, and the row that is next."""
         group: list[tuple[int, int, bytes]] = []
@@ -372,7 +375,7 @@ class Db3File:
         ((page,),) = self._rows("PRAGMA page_size")
         query = "SELECT rootpage FROM sqlite_master WHERE type = 'table' AND name = 'messages'"
         ((root,),) = self._rows(query)
-        pages = Pages(Source(self._path), page, first_bytes(self._path, 21)[20])
+        pages = Pages(FileSource(self._path), page, first_bytes(self._path, 21)[20])
         surveyor = _Surveyor(self, pages)
         with pages.source.opened():
             for leaf in pages.leaves(root):
@@ -396,13 +399,13 @@ class Db3File:
 
     def messages(
         self, topics: Collection[int], pieces: Iterable[Any], window: Window
-    ) -> Iterator[Messages]:
+    ) -> Iterator[TopicMessages]:
         """Yield the messages of some topics in some rows."""
         import numpy as np
 
         from idlc.recordings.containers.messages import Separate
 
-        room = Room(self._state.st_size)
+        room = DecompressionBudget(self._state.st_size)
         groups = self._read_around_damage(
             pieces, lambda part: self._group(part, topics, window, room)
         )
@@ -411,8 +414,8 @@ class Db3File:
                 yield Separate(np.array(times, np.int64), None, raws)
 
     def _read_around_damage(
-        self, pieces: Iterable[Any], read: Callable[[Rows], tuple[Group, int]]
-    ) -> Iterator[Group]:
+        self, pieces: Iterable[Any], read: Callable[[Rows], tuple[GroupT, int]]
+    ) -> Iterator[GroupT]:
         """Yield what is read of rows; `read` returns a group and the row that is next."""
         for first, last in pieces:
             parts = deque([Rows(first, last)])
@@ -454,7 +457,7 @@ class Db3File:
                 yield Rows(max(rows.first, part.first), min(rows.last, part.last))
 
     def _group(
-        self, rows: Rows, topics: Collection[int], window: Window, room: Room
+        self, rows: Rows, topics: Collection[int], window: Window, room: DecompressionBudget
     ) -> tuple[tuple[list[int], list[Any]], int]:
         """Return times and contents of the first messages, and the row that is next.
 
@@ -488,7 +491,7 @@ class Db3File:
                         return (times, raws), row + 1
         return (times, raws), rows.last + 1
 
-    def _raw(self, row: int, time: Any, data: Any, room: Room) -> bytes | None:
+    def _raw(self, row: int, time: Any, data: Any, room: DecompressionBudget) -> bytes | None:
         """Return the message in a row, or None if the row is damaged."""
         times = (time, time) if isinstance(time, int) else (None, None)
         if not isinstance(time, int) or not isinstance(data, bytes):
@@ -523,11 +526,11 @@ class _Surveyor:
         self.runs: list[Rows] = []
         self.topics: dict[int, Counted] = {}
         self.time: int | None = None
-        self.gap: list[Leaf] = []
+        self.gap: list[RowSpan] = []
         #: So many numbers are tried where no page says which rows there are.
         self.trials = 10_000 + pages.source.size // 64
 
-    def leaf(self, leaf: Leaf) -> None:
+    def leaf(self, leaf: RowSpan) -> None:
         """Read the rows of a page."""
         cells = list(self.pages.rows(leaf.page))
         broken = {cell for cell in cells if self.is_cut and not self.pages.is_whole(cell)}
@@ -550,7 +553,7 @@ class _Surveyor:
         if is_missing:
             self.gap.append(leaf)
 
-    def all_rows(self, leaf: Leaf) -> tuple[int, bool]:
+    def all_rows(self, leaf: RowSpan) -> tuple[int, bool]:
         """Read the rows of a page; return the last that was read, and whether all were."""
         done = leaf.first - 1
         try:
@@ -563,7 +566,7 @@ class _Surveyor:
         # only a table without rows has a page without rows
         return done, done >= leaf.first or (leaf.first, leaf.last) == (SMALLEST, LARGEST)
 
-    def single(self, cell: Cell, leaf: Leaf) -> None:
+    def single(self, cell: Cell, leaf: RowSpan) -> None:
         """Read one row."""
         rows = self.row(cell.row)
         for row in rows:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import Room
+from idlc.recordings.containers.compression import DecompressionBudget
 from idlc.recordings.containers.conversion import (
     Conversion,
     Conversions,
@@ -76,14 +76,14 @@ class _Channels:
 
 
 #: Messages: their topics, times and contents.
-Rows: TypeAlias = list[tuple[int, int, bytes]]
+RowBatch: TypeAlias = list[tuple[int, int, bytes]]
 
 
 class _Conversion:
     """The conversion of a file, group by group."""
 
     def __init__(
-        self, file: Db3File, target: BinaryIO, conversions: Conversions, room: Room
+        self, file: Db3File, target: BinaryIO, conversions: Conversions, room: DecompressionBudget
     ) -> None:
         self.writer = ChunkWriter(target)
         self.channels = _Channels(file, self.writer, conversions)
@@ -91,7 +91,7 @@ class _Conversion:
         self.counts = dict.fromkeys(self.channels.topics, 0)
         self.sizes = dict.fromkeys(self.channels.topics, 0)
 
-    def add(self, rows: Rows) -> None:
+    def add(self, rows: RowBatch) -> None:
         """Write messages."""
         by_topic: dict[int, list[int]] = {}
         raws: list[bytes] = []
@@ -152,7 +152,7 @@ def convert_db3(
         for topic, _ in file.topics:
             if conversion := selected(conversions, topic.name, topic.schema):
                 check(topic.name, topic.encoding, (topic.type, topic.schema), conversion, recorded)
-        room = Room(path.stat().st_size)
+        room = DecompressionBudget(path.stat().st_size)
         conversion_of_file = _Conversion(file, target, conversions, room)
         total, done = sum(topic.count for topic, _ in file.topics), 0
         for rows in file.rows():

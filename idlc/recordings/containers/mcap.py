@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import msgspec
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import Room, decompress
+from idlc.recordings.containers.compression import DecompressionBudget, decompress
 from idlc.recordings.containers.file import (
     START,
     Schema,
@@ -40,11 +40,11 @@ from idlc.recordings.containers.records import (
     heads,
     sound_heads,
 )
-from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.containers.source import DamageError, FileSource, RecordingError, of_file
 from idlc.recordings.damage import DamageList
 
 if TYPE_CHECKING:
-    from idlc.recordings.containers.messages import Messages, Window
+    from idlc.recordings.containers.messages import TopicMessages, Window
 
 END_OF_TIME = (1 << 64) - 1
 #: The start of a message: its channel and time, with its sequence number between them.
@@ -62,7 +62,7 @@ class Channel(NamedTuple):
     metadata: dict[str, str]
 
 
-class Facts(msgspec.Struct):
+class FileStatistics(msgspec.Struct):
     """The content of a file; `start` and `end` are the times of the first and last message.
 
     `counts` is by channel; so is `loose`, of messages outside of chunks in a file with a summary.
@@ -113,8 +113,8 @@ class Facts(msgspec.Struct):
 
 
 def read_facts(
-    source: Source, damage: DamageList, index: bool = True, check: bool | None = None
-) -> Facts:
+    source: FileSource, damage: DamageList, index: bool = True, check: bool | None = None
+) -> FileStatistics:
     """Return the content of a file; without `index`, its summary is not used.
 
     Chunks with a wrong checksum are left out unless `check` is False.
@@ -130,7 +130,7 @@ def read_facts(
     return _walk(_Walk(source, damage, check), reason, index)
 
 
-def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
+def _starts(source: FileSource, chunk: Chunk, room: DecompressionBudget) -> Iterator[memoryview]:
     """Yield the start of each message of a chunk, or of a stretch outside of any."""
     most = MESSAGE_HEAD.size + START
     if chunk.compression is None:
@@ -144,7 +144,9 @@ def _starts(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
             yield data[:most]
 
 
-def _sizes(source: Source, chunk: Chunk, room: Room) -> Iterator[tuple[int, int]]:
+def _sizes(
+    source: FileSource, chunk: Chunk, room: DecompressionBudget
+) -> Iterator[tuple[int, int]]:
     """Yield channel and size of each message of a chunk, or of a stretch outside of any."""
     if chunk.compression is None:
         for op, at, size in heads(source, chunk.at, chunk.at + chunk.size):
@@ -158,7 +160,7 @@ def _sizes(source: Source, chunk: Chunk, room: Room) -> Iterator[tuple[int, int]
             yield int.from_bytes(data[:2], "little"), len(data) - MESSAGE_HEAD.size
 
 
-def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
+def _content(source: FileSource, head: ChunkHead, room: DecompressionBudget) -> memoryview:
     """Return the records of a chunk."""
     room.reserve(head.size)
     target = memoryview(bytearray(head.size))
@@ -166,7 +168,7 @@ def _content(source: Source, head: ChunkHead, room: Room) -> memoryview:
     return target
 
 
-def _summary(source: Source) -> Facts:
+def _summary(source: FileSource) -> FileStatistics:
     """Return the content by the summary; raise DamageError if that is not reliable."""
     end = source.size - FOOTER.size - len(MAGIC)
     if end < len(MAGIC) or source.view(source.size - len(MAGIC), len(MAGIC)) != MAGIC:
@@ -179,7 +181,7 @@ def _summary(source: Source) -> Facts:
     data = source.view(start, source.size - len(MAGIC) - 4 - start)
     if crc and zlib.crc32(data) != crc:
         raise DamageError("the checksum of its summary is wrong")
-    facts, statistics = Facts(is_proven=crc != 0), None
+    facts, statistics = FileStatistics(is_proven=crc != 0), None
     for op, _, content in records.read_records(data[: end - start]):
         facts.add(op, content)
         if op == records.CHUNK_INDEX_OP:
@@ -191,7 +193,7 @@ def _summary(source: Source) -> Facts:
     return facts
 
 
-def _check_summary(facts: Facts, statistics: memoryview | None) -> None:
+def _check_summary(facts: FileStatistics, statistics: memoryview | None) -> None:
     """Add the counts of the writer; raise DamageError if by these a summary is incomplete."""
     if statistics is None:
         raise DamageError("its summary has no statistics")
@@ -215,7 +217,7 @@ def _check_summary(facts: Facts, statistics: memoryview | None) -> None:
         raise DamageError("its summary contains two different message counts")
 
 
-def _add_loose(source: Source, facts: Facts, start: int) -> None:
+def _add_loose(source: FileSource, facts: FileStatistics, start: int) -> None:
     """Add the stretches that no chunk covers and that have messages, in a file with a summary.
 
     Raises DamageError if chunks overlap.
@@ -247,15 +249,15 @@ class _Walk:
     Nothing else says whether a chunk has more messages than its indexes name.
     """
 
-    def __init__(self, source: Source, damage: DamageList, check: bool | None) -> None:
+    def __init__(self, source: FileSource, damage: DamageList, check: bool | None) -> None:
         self.source = source
         self.damage = damage
         self.check = check
-        self.facts = Facts()
+        self.facts = FileStatistics()
         self.loose: tuple[int, int] | None = None
         self.chunk: tuple[int, int] | None = None
         self.indexes: list[tuple[int, int]] = []
-        self.room = Room(source.size)
+        self.room = DecompressionBudget(source.size)
         self.conflicts: list[tuple[RecordingError, int, int]] = []
 
     def content(self, at: int, size: int) -> memoryview:
@@ -367,7 +369,7 @@ class _Walk:
         return named, bytes(offsets)
 
 
-def _walk(walk: _Walk, reason: str, index: bool) -> Facts:
+def _walk(walk: _Walk, reason: str, index: bool) -> FileStatistics:
     """Return the content by the complete records; `reason` says why the summary is not used.
 
     Without `index`, the indexes of chunks are not used either.
@@ -425,12 +427,12 @@ class McapFile:
     ) -> None:
         self.place = place
         self.check = check
-        self.source = Source(place)
+        self.source = FileSource(place)
         self.name = self.source.name
         self.size = self.source.size
         self.damage = DamageList(self.name, strict)
         with of_file(self.name):
-            facts = read_facts(self.source, self.damage, index, check) if read else Facts()
+            facts = read_facts(self.source, self.damage, index, check) if read else FileStatistics()
         self.facts = facts
         self.start, self.end = facts.start, facts.end
         self.notes = [f"{Path(self.name).name}: {note}" for note in facts.notes]
@@ -446,7 +448,7 @@ class McapFile:
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
         """Yield channels with the start of their first messages; no chunk is opened twice."""
         waiting = {channel for channel in self.facts.channels if self.facts.counts.get(channel)}
-        room = Room(self.source.size)
+        room = DecompressionBudget(self.source.size)
         for chunk in self.facts.chunks:
             named = {channel for channel, _ in INDEX_OFFSET.iter_unpack(chunk.indexes or b"")}
             mine = waiting if chunk.indexes is None else waiting & named
@@ -471,7 +473,7 @@ class McapFile:
         """
         sizes: dict[int, int] = {}
         seen: set[int] = set()
-        room = Room(self.source.size)
+        room = DecompressionBudget(self.source.size)
         for chunk in self.facts.chunks:
             starts: list[tuple[int, int]] = []
             for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
@@ -554,7 +556,7 @@ class McapFile:
 
     def messages(
         self, topics: Collection[int], pieces: Iterable[Any], window: Window
-    ) -> Iterator[Messages]:
+    ) -> Iterator[TopicMessages]:
         """Yield the messages of some channels in some chunks, adjacent ones together."""
         from idlc.recordings.containers.mcap_messages import in_chunks
 

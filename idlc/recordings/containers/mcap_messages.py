@@ -11,10 +11,22 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import ZSTD_MAGIC, Room, decompress, zstd_frame
-from idlc.recordings.containers.messages import Messages, Ranges, Raw, Separate, Window, times_of
+from idlc.recordings.containers.compression import (
+    ZSTD_MAGIC,
+    DecompressionBudget,
+    decompress,
+    zstd_frame,
+)
+from idlc.recordings.containers.messages import (
+    Ranges,
+    Raw,
+    Separate,
+    TopicMessages,
+    Window,
+    times_of,
+)
 from idlc.recordings.containers.records import HEAD, INDEX_OFFSET, Chunk, ChunkHead
-from idlc.recordings.containers.source import DamageError, Source, of_file
+from idlc.recordings.containers.source import DamageError, FileSource, of_file
 from idlc.recordings.damage import DamageList
 
 #: The head of a message's record.
@@ -37,13 +49,13 @@ Headed: TypeAlias = tuple[Chunk, ChunkHead]
 
 
 def in_chunks(
-    source: Source,
+    source: FileSource,
     chunks: Iterable[Chunk],
     channels: Collection[int],
     window: Window,
     check: bool | None,
     damage: DamageList,
-) -> Iterator[Messages]:
+) -> Iterator[TopicMessages]:
     """Yield the messages of some channels in chunks, adjacent chunks together.
 
     Chunks and messages that cannot be read are added to the damage.
@@ -67,13 +79,13 @@ class _Reader:
     """Reads the messages of some channels from chunks."""
 
     def __init__(
-        self, source: Source, channels: Collection[int], check: bool | None, damage: DamageList
+        self, source: FileSource, channels: Collection[int], check: bool | None, damage: DamageList
     ) -> None:
         self.source = source
         self.channels = channels
         self.check = check
         self.damage = damage
-        self.room = Room(source.size)
+        self.room = DecompressionBudget(source.size)
 
     def heads(self, chunks: Iterable[Chunk]) -> Iterator[Headed]:
         """Yield each chunk with its head, if there is room for its records."""
@@ -145,7 +157,7 @@ class _Reader:
             with suppress(DamageError):
                 yield self._read([(chunk._replace(indexes=None), head)], False, partial=True)
 
-    def decompressed(self, ranges: Ranges) -> Messages:
+    def decompressed(self, ranges: Ranges) -> TopicMessages:
         """Return messages that may be compressed by themselves."""
         array = np.frombuffer(ranges.buffer, np.uint8)
         filled = ranges.starts[ranges.stops > ranges.starts]
@@ -167,10 +179,10 @@ class _Reader:
 
 
 def _read(
-    source: Source,
+    source: FileSource,
     group: list[Headed],
     channels: Collection[int],
-    room: Room,
+    room: DecompressionBudget,
     check: bool,
     partial: bool,
 ) -> Ranges:
@@ -200,7 +212,7 @@ def _read(
     return _messages(buffer, np.concatenate(starts), np.concatenate(ends), channels)
 
 
-def _read_some(source: Source, start: int, target: memoryview, places: Any) -> None:
+def _read_some(source: FileSource, start: int, target: memoryview, places: Any) -> None:
     """Read messages of a chunk that begins at `start`, adjacent ones together."""
     for near in np.split(places, np.flatnonzero(np.diff(places) > NEAR) + 1):
         if not len(near):
@@ -214,7 +226,7 @@ def _read_some(source: Source, start: int, target: memoryview, places: Any) -> N
             source.read(start + stop, target[stop:end])
 
 
-def _indexed(source: Source, chunk: Chunk, size: int, channels: Collection[int]) -> Any:
+def _indexed(source: FileSource, chunk: Chunk, size: int, channels: Collection[int]) -> Any:
     """Return where in a chunk messages of some channels begin; None without an index."""
     if chunk.indexes is None:
         return None
@@ -234,7 +246,7 @@ def _indexed(source: Source, chunk: Chunk, size: int, channels: Collection[int])
 
 
 def indexed_messages(
-    source: Source, chunk: Chunk, data: memoryview, channels: Iterable[int]
+    source: FileSource, chunk: Chunk, data: memoryview, channels: Iterable[int]
 ) -> Iterator[tuple[int, int]]:
     """Yield where in a chunk messages begin and end, for each channel whose index is sound."""
     for channel in channels:
@@ -248,7 +260,11 @@ def indexed_messages(
 
 
 def _walked(
-    view: memoryview, chunk: Chunk, channels: Collection[int], room: Room, partial: bool
+    view: memoryview,
+    chunk: Chunk,
+    channels: Collection[int],
+    room: DecompressionBudget,
+    partial: bool,
 ) -> list[int]:
     """Return where in a chunk messages begin, by a walk from record to record."""
     unpack, ahead, stop = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size, len(view)

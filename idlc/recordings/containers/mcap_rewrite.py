@@ -16,7 +16,12 @@ from typing import Any, BinaryIO, TypeAlias
 import numpy as np
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import MOST_IN_A_CHUNK, Room, compress, decompress
+from idlc.recordings.containers.compression import (
+    MOST_IN_A_CHUNK,
+    DecompressionBudget,
+    compress,
+    decompress,
+)
 from idlc.recordings.containers.conversion import (
     Conversion,
     Conversions,
@@ -27,7 +32,7 @@ from idlc.recordings.containers.conversion import (
     selected,
 )
 from idlc.recordings.containers.file import Schema, full_name, wrong_count
-from idlc.recordings.containers.mcap import Facts, read_facts
+from idlc.recordings.containers.mcap import FileStatistics, read_facts
 from idlc.recordings.containers.mcap_messages import MESSAGE, indexed_messages
 from idlc.recordings.containers.mcap_writer import (
     Content,
@@ -50,7 +55,7 @@ from idlc.recordings.containers.records import (
     heads,
     sound_heads,
 )
-from idlc.recordings.containers.source import DamageError, RecordingError, Source, of_file
+from idlc.recordings.containers.source import DamageError, FileSource, RecordingError, of_file
 from idlc.recordings.damage import DamageList
 
 #: Numbers of schemas end before.
@@ -71,11 +76,11 @@ class _UnlistedError(Exception):
     """A summary does not list all definitions."""
 
 
-class Plan:
+class RewritePlan:
     """The definitions that take the place of others."""
 
     def __init__(
-        self, facts: Facts, conversions: Conversions, recorded: dict[str, Recorded]
+        self, facts: FileStatistics, conversions: Conversions, recorded: dict[str, Recorded]
     ) -> None:
         self.changed: dict[int, Conversion] = {}
         for number, channel_ in facts.channels.items():
@@ -113,7 +118,7 @@ class Plan:
         #: The schemas that no channel refers to anymore.
         self.gone = {users[number] for number in new} - kept
 
-    def _check(self, facts: Facts, recorded: dict[str, Recorded]) -> None:
+    def _check(self, facts: FileStatistics, recorded: dict[str, Recorded]) -> None:
         for number, conversion in self.changed.items():
             own = facts.channels[number]
             definition = facts.schemas.get(own.schema)
@@ -137,7 +142,7 @@ def _retyped(raw: bytes, schema_number: int, digest: str) -> bytes:
 
 
 #: A part of records, from one offset to another, and what takes its place.
-Edit: TypeAlias = tuple[int, int, bytes]
+BytesEdit: TypeAlias = tuple[int, int, bytes]
 
 
 class Rewriting:
@@ -145,9 +150,9 @@ class Rewriting:
 
     def __init__(
         self,
-        source: Source,
-        facts: Facts,
-        plan: Plan,
+        source: FileSource,
+        facts: FileStatistics,
+        plan: RewritePlan,
         write: Callable[[Raw], object],
         damage: DamageList,
     ) -> None:
@@ -155,7 +160,7 @@ class Rewriting:
         self.facts = facts
         self.damage = damage
         self.plan = plan
-        self.room = Room(source.size)
+        self.room = DecompressionBudget(source.size)
         #: The schemas that are defined outside of chunks.
         self.known: set[int] = set()
         self.writer = McapWriter(write, _has_checksum(source))
@@ -192,7 +197,7 @@ class Rewriting:
         self.writer.close()
         progress(self.source.size)
 
-    def check(self, facts: Facts) -> None:
+    def check(self, facts: FileStatistics) -> None:
         """Add it to the damage if other numbers of messages were written than are counted."""
         if self.damage:
             return
@@ -349,9 +354,9 @@ class Rewriting:
             self.known.add(number)
         self.writer.add(Content(record(op, content)))
 
-    def _edits(self, content: Content, known: set[int]) -> list[Edit]:
+    def _edits(self, content: Content, known: set[int]) -> list[BytesEdit]:
         """Return the changes of records; `known` are the schemas that need no definition."""
-        edits: list[Edit] = []
+        edits: list[BytesEdit] = []
         for op, at, number, data in content.definitions:
             if (op, number) not in self.facts.raws:
                 if self.facts.loose is not None or not self.damage:
@@ -401,7 +406,7 @@ class Rewriting:
                 new = record(SCHEMA_OP, plan.contents[SCHEMA_OP, own]) + new
         return new
 
-    def _messages(self, content: Content) -> Iterator[Edit]:
+    def _messages(self, content: Content) -> Iterator[BytesEdit]:
         """Yield the messages with new payloads, and those of channels without a definition."""
         for number in content.by_channel.keys() - self.facts.channels.keys():
             mine = content.by_channel[number]
@@ -430,7 +435,7 @@ class Rewriting:
                 yield place, stop, b"".join((HEAD.pack(MESSAGE_OP, size), head, payload))
 
 
-def _edited(data: memoryview, edits: list[Edit]) -> bytes:
+def _edited(data: memoryview, edits: list[BytesEdit]) -> bytes:
     parts: list[Raw] = []
     at = 0
     for start, stop, new in edits:
@@ -439,7 +444,7 @@ def _edited(data: memoryview, edits: list[Edit]) -> bytes:
     return b"".join((*parts, data[at:]))
 
 
-def _has_checksum(source: Source) -> bool:
+def _has_checksum(source: FileSource) -> bool:
     """Return whether the data section of a file has a checksum."""
     end = source.size - FOOTER.size - len(MAGIC)
     if end < len(MAGIC):
@@ -466,15 +471,15 @@ def rewrite_mcap(
     `recorded` has what other files of the recording have of a topic, and is added to. What is
     damaged is left out.
     """
-    source = Source(place)
-    every: list[Facts] = []
+    source = FileSource(place)
+    every: list[FileStatistics] = []
     with of_file(source.name), source.opened():
         for use_index in dict.fromkeys((index, False)):
             facts = read_facts(source, damage, use_index)
             every.append(facts)
             file.seek(0)
             file.truncate()
-            plan = Plan(facts, conversions, recorded)
+            plan = RewritePlan(facts, conversions, recorded)
             rewriting = Rewriting(source, facts, plan, file.write, damage)
             try:
                 rewriting.run(lambda done: progress(done, source.size))

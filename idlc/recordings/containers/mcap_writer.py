@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import Room, compress
+from idlc.recordings.containers.compression import DecompressionBudget, compress
 from idlc.recordings.containers.mcap_messages import LEAST, MESSAGE
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.records import (
@@ -42,11 +42,15 @@ class Definition(NamedTuple):
 class Content:
     """Records that are together in a file: where messages begin, and what their heads say."""
 
-    def __init__(self, data: Raw, room: Room | None = None) -> None:
+    def __init__(self, data: Raw, room: DecompressionBudget | None = None) -> None:
         self.data = memoryview(data)
         self.definitions: list[Definition] = []
         places = []
-        every = zip(read_records(self.data), (room or Room(len(data))).records(), strict=False)
+        every = zip(
+            read_records(self.data),
+            (room or DecompressionBudget(len(data))).records(),
+            strict=False,
+        )
         for (op, at, content), _ in every:
             if op == MESSAGE_OP:
                 if len(content) < LEAST:

@@ -55,7 +55,7 @@ class Window(NamedTuple):
 ALWAYS = Window()
 
 
-class Messages(msgspec.Struct, frozen=True, eq=False):
+class TopicMessages(msgspec.Struct, frozen=True, eq=False):
     """Messages of one topic, in the order in which they were recorded, for `to_columns` to read.
 
     Times are int64, in nanoseconds, or NO_TIME; `publish_times` is None where a recording has none.
@@ -76,7 +76,7 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
         """Return the bytes of each message."""
         raise NotImplementedError
 
-    def selected(self, mask: Any) -> Messages:
+    def selected(self, mask: Any) -> TopicMessages:
         """Return the messages for which a mask is true."""
         publish = None if self.publish_times is None else self.publish_times[mask]
         raws = [raw for raw, chosen in zip(self.views(), mask, strict=True) if chosen]
@@ -87,7 +87,7 @@ class Messages(msgspec.Struct, frozen=True, eq=False):
         return self.views()[:count]
 
 
-class Ranges(Messages, frozen=True, eq=False):
+class Ranges(TopicMessages, frozen=True, eq=False):
     """Messages that are each a part of one buffer."""
 
     buffer: Any
@@ -118,7 +118,7 @@ class Ranges(Messages, frozen=True, eq=False):
         return [view[start:stop] for start, stop in pairs]
 
 
-class Separate(Messages, frozen=True, eq=False):
+class Separate(TopicMessages, frozen=True, eq=False):
     """Messages in buffers of their own: joining large ones would only copy them."""
 
     raws: list[Raw]
@@ -139,7 +139,7 @@ def times_of(values: Any) -> Any:
     return times
 
 
-def in_order(parts: Sequence[Messages]) -> Messages:
+def in_order(parts: Sequence[TopicMessages]) -> TopicMessages:
     """Return the messages of all parts in the order of their log times."""
     joined = join_messages(parts)
     order = np.argsort(joined.log_times, kind="stable")
@@ -148,7 +148,7 @@ def in_order(parts: Sequence[Messages]) -> Messages:
     return Separate(joined.log_times[order], publish, [raws[at] for at in order.tolist()])
 
 
-def join_messages(parts: Sequence[Messages]) -> Messages:
+def join_messages(parts: Sequence[TopicMessages]) -> TopicMessages:
     """Return the messages of all parts, in memory once more only if they are small."""
     if len(parts) == 1:
         return parts[0]

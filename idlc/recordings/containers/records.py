@@ -10,9 +10,9 @@ from struct import Struct
 from typing import NamedTuple, TypeVar
 
 from idlc.recordings.containers.compression import decompressed
-from idlc.recordings.containers.source import DamageError, Source
+from idlc.recordings.containers.source import DamageError, FileSource
 
-Item = TypeVar("Item")
+ItemT = TypeVar("ItemT")
 MAGIC = b"\x89MCAP0\r\n"
 #: What precedes the content of each record: opcode and length.
 HEAD = Struct("<BQ")
@@ -134,7 +134,7 @@ def sound_size(data: memoryview) -> int:
     return end
 
 
-def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
+def heads(source: FileSource, at: int, end: int) -> Iterator[tuple[int, int, int]]:
     """Yield kind, offset and size, with the head, of each complete record."""
     while (head := _head(source, at, end)) is not None:
         op, size = head
@@ -143,7 +143,7 @@ def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
 
 
 def sound_heads(
-    source: Source, at: int, end: int, skipped: Callable[[int, int], object]
+    source: FileSource, at: int, end: int, skipped: Callable[[int, int], object]
 ) -> Iterator[tuple[int, int, int]]:
     """Yield the same, and go on behind damage, whose range `skipped` is called with.
 
@@ -181,7 +181,7 @@ def sound_heads(
         yield before
 
 
-def resume(source: Source, at: int, end: int, is_loose: bool) -> int:
+def resume(source: FileSource, at: int, end: int, is_loose: bool) -> int:
     """Return where the next record begins, at or after an offset; `end` if none does."""
     while at < end:
         # a pattern looks ahead, so windows overlap
@@ -198,7 +198,7 @@ def resume(source: Source, at: int, end: int, is_loose: bool) -> int:
     return end
 
 
-def _head(source: Source, at: int, end: int) -> tuple[int, int] | None:
+def _head(source: FileSource, at: int, end: int) -> tuple[int, int] | None:
     """Return kind and size, with the head, of a record; None if none can be at an offset."""
     if at + HEAD.size > end:
         return None
@@ -208,7 +208,7 @@ def _head(source: Source, at: int, end: int) -> tuple[int, int] | None:
     return op, HEAD.size + size
 
 
-def _is_chunk(source: Source, at: int, size: int) -> bool:
+def _is_chunk(source: FileSource, at: int, size: int) -> bool:
     """Return whether the two sizes of a chunk agree."""
     try:
         head = read_chunk_head(source, at, size)
@@ -217,7 +217,7 @@ def _is_chunk(source: Source, at: int, size: int) -> bool:
     return head.start + head.stored == at + size
 
 
-def _is_record(source: Source, at: int, end: int) -> bool:
+def _is_record(source: FileSource, at: int, end: int) -> bool:
     """Return whether a record begins at an offset: a whole chunk, or several records in a row."""
     for _ in range(IN_A_ROW):
         if at == end:
@@ -234,10 +234,10 @@ def _is_record(source: Source, at: int, end: int) -> bool:
 
 
 def grouped(
-    items: Iterable[Item], size_of: Callable[[Item], int], most: int
-) -> Iterator[list[Item]]:
+    items: Iterable[ItemT], size_of: Callable[[ItemT], int], most: int
+) -> Iterator[list[ItemT]]:
     """Yield neighbours that together take at most so many bytes, or one that takes more."""
-    group: list[Item] = []
+    group: list[ItemT] = []
     total = 0
     for item in items:
         size = size_of(item)
@@ -273,7 +273,7 @@ class ChunkHead(NamedTuple):
     stored: int
 
 
-def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
+def read_chunk_head(source: FileSource, at: int, size: int) -> ChunkHead:
     """Read the head of a Chunk record."""
     data = source.view(at + HEAD.size, min(size - HEAD.size, LONGEST_HEAD))
     fields = Fields(data, "a chunk")
@@ -285,7 +285,7 @@ def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
     return ChunkHead(first, last, large, crc, compression, at + HEAD.size + fields.at, stored)
 
 
-def proven_head(source: Source, head: ChunkHead) -> ChunkHead | None:
+def proven_head(source: FileSource, head: ChunkHead) -> ChunkHead | None:
     """Return the head of a chunk with the size of its content, if the checksum proves that."""
     with suppress(DamageError):
         content = decompressed(source.view(head.start, head.stored), head.compression)
@@ -294,7 +294,7 @@ def proven_head(source: Source, head: ChunkHead) -> ChunkHead | None:
     return None
 
 
-def index_entries(source: Source, channel: int, at: int) -> int:
+def index_entries(source: FileSource, channel: int, at: int) -> int:
     """Return the number of bytes of entries in the MessageIndex at `at`, by its head."""
     op, size = HEAD.unpack(source.view(at, HEAD.size))
     if op != MESSAGE_INDEX_OP:

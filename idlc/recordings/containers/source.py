@@ -37,7 +37,7 @@ def of_file(name: str) -> Iterator[None]:
 BLOCK = 1 << 14
 
 
-class Source:
+class FileSource:
     """A file that may grow, and otherwise does not change.
 
     A local one is opened whenever it is read: a recording may have thousands of files. It is not

@@ -55,7 +55,7 @@ _HASH = re.compile(rb"(?:^|;)typehash=(RIHS\d{2}_[0-9a-f]{1,128});")
 _ENDED = struct.pack(">I", 3)
 
 
-class Participant(NamedTuple):
+class ParticipantData(NamedTuple):
     """A participant as it announces itself: its name, and ports; 0 if it offers no UDP."""
 
     prefix: bytes
@@ -64,7 +64,7 @@ class Participant(NamedTuple):
     lease: float
 
 
-class Endpoint(NamedTuple):
+class EndpointData(NamedTuple):
     """A writer or a reader as its participant announces it; `port` is 0 if it has no own one."""
 
     guid: bytes
@@ -88,25 +88,25 @@ class Endpoint(NamedTuple):
 class Peer:
     """Another participant; `is_known` after it has named this one."""
 
-    def __init__(self, about: Participant, host: str, now: float) -> None:
+    def __init__(self, about: ParticipantData, host: str, now: float) -> None:
         self.prefix = about.prefix
         self.about = about
         self.host = host
         self.seen = now
         self.is_known = False
-        self.endpoints: dict[bytes, Endpoint] = {}
+        self.endpoints: dict[bytes, EndpointData] = {}
 
     @property
     def meta(self) -> Address:
         """Where it receives announcements."""
         return self.host, self.about.meta_port
 
-    def address(self, end: Endpoint) -> Address:
+    def address(self, end: EndpointData) -> Address:
         """Return where an endpoint of it receives."""
         return self.host, end.port or self.about.default_port
 
 
-def fits(end: Endpoint, other: Endpoint) -> bool:
+def fits(end: EndpointData, other: EndpointData) -> bool:
     """Return whether two endpoints are connected."""
     writer, reader = (end, other) if end.is_writer else (other, end)
     if writer.is_writer == reader.is_writer or writer[1:3] != reader[1:3]:
@@ -176,7 +176,7 @@ def _profile(parameters: wire.Parameters, order: str, is_writer: bool) -> QoSPro
     )
 
 
-def parse_participant(payload: bytes) -> Participant:
+def parse_participant(payload: bytes) -> ParticipantData:
     """Return the participant of an announcement; raise WireError."""
     parameters, order = wire.parse_list(payload)
     guid = _first(parameters, _PARTICIPANT, wire.GUID)
@@ -185,10 +185,10 @@ def parse_participant(payload: bytes) -> Participant:
     lease = _duration(_first(parameters, _LEASE, 8), order) / 1e9
     meta, default = (_port(parameters, name, order) for name in (_META_ADDRESS, _DEFAULT_ADDRESS))
     bounded = min(max(lease, _LEASES[0]), _LEASES[1])
-    return Participant(guid[: wire.PREFIX], meta, default or meta, bounded)
+    return ParticipantData(guid[: wire.PREFIX], meta, default or meta, bounded)
 
 
-def parse_endpoint(payload: bytes) -> Endpoint:
+def parse_endpoint(payload: bytes) -> EndpointData:
     """Return the endpoint of an announcement; raise WireError."""
     parameters, order = wire.parse_list(payload)
     guid = _first(parameters, _ENDPOINT, wire.GUID) or _first(parameters, KEY, wire.GUID)
@@ -198,7 +198,7 @@ def parse_endpoint(payload: bytes) -> Endpoint:
     user = _first(parameters, _USER_DATA, 4) or b""
     match = _HASH.search(user[4 : 4 + _MOST_TEXT])
     is_writer = guid[-1] & 0x0F in (2, 3)
-    return Endpoint(
+    return EndpointData(
         guid,
         _text(parameters, _TOPIC, order),
         _text(parameters, _TYPE, order),
@@ -304,7 +304,7 @@ def format_participant(prefix: bytes, addresses: Iterable[Address]) -> bytes:
     return formats.LIST + formats.parameter_list(parameters())
 
 
-def format_endpoint(end: Endpoint) -> bytes:
+def format_endpoint(end: EndpointData) -> bytes:
     """Return the announcement of an own endpoint."""
     qos = end.qos
     reliability = 1 if qos.reliability is ReliabilityPolicy.BEST_EFFORT else 2

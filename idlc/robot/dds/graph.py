@@ -12,10 +12,10 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from idlc.robot.dds import wire
-from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import Received
 from idlc.robot.dds.wire import GUID, WireError
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
 
 #: The topic about nodes, its type, and what one message of it may contain.
@@ -38,10 +38,10 @@ _MOST_CACHED = 2**14
 _MOST_OF_ALL = 2**16
 #: The kinds of endpoints; a service and a client are shown as their readers.
 _KINDS = {
-    ("rt", True): Kind.PUBLISHER,
-    ("rt", False): Kind.SUBSCRIPTION,
-    ("rq", False): Kind.SERVICE,
-    ("rr", False): Kind.CLIENT,
+    ("rt", True): EntityKind.PUBLISHER,
+    ("rt", False): EntityKind.SUBSCRIPTION,
+    ("rq", False): EntityKind.SERVICE,
+    ("rr", False): EntityKind.CLIENT,
 }
 
 
@@ -145,9 +145,9 @@ def own_nodes(prefix: bytes, entities: Iterable[Entity]) -> Iterator[NodeInfo]:
     nodes: dict[tuple[str, str], tuple[list[bytes], list[bytes]]] = {}
     for entity in entities:
         readers, writers = nodes.setdefault((entity.namespace, entity.node), ([], []))
-        if entity.kind in (Kind.SUBSCRIPTION, Kind.SERVICE, Kind.CLIENT):
+        if entity.kind in (EntityKind.SUBSCRIPTION, EntityKind.SERVICE, EntityKind.CLIENT):
             readers.append(guid_of(prefix, entity.id + 1, READER))
-        if entity.kind in (Kind.PUBLISHER, Kind.SERVICE, Kind.CLIENT):
+        if entity.kind in (EntityKind.PUBLISHER, EntityKind.SERVICE, EntityKind.CLIENT):
             writers.append(guid_of(prefix, entity.id + 1, WRITER))
     for names, (readers, writers) in nodes.items():
         yield NodeInfo(*names, tuple(readers), tuple(writers))
@@ -177,7 +177,7 @@ class RemoteNodes:
     def entities(
         self,
         prefixes: Iterable[bytes],
-        endpoints: Iterable[Endpoint],
+        endpoints: Iterable[EndpointData],
         hashes: Mapping[tuple[str, str], str],
     ) -> Iterator[Entity]:
         """Yield the entities of the participants that exist; forget what others told.
@@ -189,7 +189,7 @@ class RemoteNodes:
         for prefix, nodes in self._nodes.items():
             for number, node in enumerate(nodes):
                 owner = _Owner(self._domain, number, node.namespace, node.name)
-                if entity := _entity(prefix, owner, number, Kind.NODE):
+                if entity := _entity(prefix, owner, number, EntityKind.NODE):
                     yield entity
                 owners |= dict.fromkeys((*node.readers, *node.writers), owner)
         unknown = _Owner(self._domain, 0, "/", _UNKNOWN)
@@ -211,7 +211,7 @@ class _Owner(NamedTuple):
     name: str
 
 
-def _names(end: Endpoint) -> tuple[str, str]:
+def _names(end: EndpointData) -> tuple[str, str]:
     """Return the names of an endpoint and of its type in ROS 2; the latter may be empty."""
     half, _, name = end.topic.partition("/")
     type_ = end.type
@@ -221,7 +221,7 @@ def _names(end: Endpoint) -> tuple[str, str]:
 
 
 @lru_cache(_MOST_CACHED)
-def _endpoint(end: Endpoint, owner: _Owner, service: str) -> Entity | None:
+def _endpoint(end: EndpointData, owner: _Owner, service: str) -> Entity | None:
     """Return what ROS 2 shows of an endpoint; `None` if it shows nothing.
 
     `service` is the hash of a service if the participant tells none.
@@ -238,10 +238,12 @@ def _endpoint(end: Endpoint, owner: _Owner, service: str) -> Entity | None:
     return _entity(end.guid[: wire.PREFIX], owner, number, kind, **more)
 
 
-def _entity(prefix: bytes, owner: _Owner, number: int, kind: Kind, **more: Any) -> Entity | None:
+def _entity(
+    prefix: bytes, owner: _Owner, number: int, kind: EntityKind, **more: Any
+) -> Entity | None:
     """Return an entity of another participant; `None` if a name or its type is not valid."""
     is_valid = is_namespace(owner.namespace) and is_node_name(owner.name)
-    if not is_valid or (kind is not Kind.NODE and not is_absolute(more["name"])):
+    if not is_valid or (kind is not EntityKind.NODE and not is_absolute(more["name"])):
         return None
     try:
         return Entity(

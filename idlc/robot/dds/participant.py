@@ -12,7 +12,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
-from idlc.robot.dds.discovery import Endpoint, Peer, fits
+from idlc.robot.dds.discovery import EndpointData, Peer, fits
 from idlc.robot.dds.formats import Address, Outgoing, Received, Remote, Shared
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.writer import Writer
@@ -61,7 +61,7 @@ class Participant:
         self._changed = changed
         #: The own ends by their ids, and what was announced of them by their GUIDs.
         self._ends: dict[bytes, Writer | Reader] = {}
-        self._local: dict[bytes, Endpoint] = {}
+        self._local: dict[bytes, EndpointData] = {}
         self._numbers: dict[bytes, int] = {}
         self._removed: deque[tuple[Writer, int]] = deque()
         self._periods = iter(_PERIODS)
@@ -84,19 +84,19 @@ class Participant:
 
     # own endpoints
 
-    def add_writer(self, end: Endpoint) -> Writer:
+    def add_writer(self, end: EndpointData) -> Writer:
         """Announce a writer."""
         writer = Writer(end.guid, end.qos, self.shared)
         self._add(end, writer)
         return writer
 
-    def add_reader(self, end: Endpoint, deliver: Callable[[Received], None]) -> Reader:
+    def add_reader(self, end: EndpointData, deliver: Callable[[Received], None]) -> Reader:
         """Announce a reader."""
         reader = Reader(end.guid, end.qos, deliver, self.shared)
         self._add(end, reader)
         return reader
 
-    def _add(self, end: Endpoint, own: Writer | Reader) -> None:
+    def _add(self, end: EndpointData, own: Writer | Reader) -> None:
         self._ends[own.id] = own
         announcer = self._announcers[end.is_writer]
         announcer.write(discovery.format_endpoint(end))
@@ -144,7 +144,7 @@ class Participant:
         self._edition += 1
         return True
 
-    def _match(self, own: Endpoint, other: Endpoint, peer: Peer) -> None:
+    def _match(self, own: EndpointData, other: EndpointData, peer: Peer) -> None:
         """Connect two ends if they fit."""
         if fits(own, other):
             self._ends[own.id].match(other.guid, peer.address(other), other.qos)
@@ -289,7 +289,7 @@ class Participant:
             self._pass(prefix, part)
         return self.shared.collect()
 
-    def _pass(self, prefix: bytes, part: wire.Part) -> None:
+    def _pass(self, prefix: bytes, part: wire.Submessage) -> None:
         """Pass a part on to the end that it is for; without a reader, to all of its writer."""
         if isinstance(part, (wire.AckNack, wire.NackFragment)):
             writer, guid = self._ends.get(part.writer), prefix + part.reader
@@ -340,7 +340,7 @@ class Participant:
         told = all(learner.is_complete for learner in self._learners.values())
         return told and all(peer.is_known for peer in self.peers.values())
 
-    def remote_endpoints(self) -> Iterator[Endpoint]:
+    def remote_endpoints(self) -> Iterator[EndpointData]:
         """Yield the endpoints of all peers."""
         for peer in self.peers.values():
             yield from peer.endpoints.values()

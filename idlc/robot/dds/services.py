@@ -13,12 +13,12 @@ import msgspec
 
 from idlc.robot.dds import discovery, wire
 from idlc.robot.dds.connection import Connection
-from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import Received, is_cyclone
 from idlc.robot.dds.graph import HALVES, READER, WRITER, guid_of
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.writer import Writer
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.names import dds_type
 from idlc.robot.transport import OnReply, Request, Sample
 
@@ -122,13 +122,13 @@ class Services:
     def _pair(self, entity: Entity, deliver: Callable[[Received], None]) -> Pair:
         """Declare the two ends of a service or a client."""
         qos = msgspec.structs.replace(entity.qos, depth=max(entity.qos.depth, _DEPTH))
-        is_service = entity.kind is Kind.SERVICE
+        is_service = entity.kind is EntityKind.SERVICE
         ends = {}
         for half, is_reader in (("rq", is_service), ("rr", not is_service)):
             topic, type_ = (f"{half}{entity.name}", dds_type(entity.type))
             guid = guid_of(self._connection.prefix, entity.id + 1, READER if is_reader else WRITER)
             names = topic + HALVES[half][0], type_ + HALVES[half][1]
-            ends[is_reader] = Endpoint(guid, *names, qos, entity.hash)
+            ends[is_reader] = EndpointData(guid, *names, qos, entity.hash)
         with self._connection.acting() as participant:
             writer = participant.add_writer(ends[False])
             return Pair(participant.add_reader(ends[True], deliver), writer)

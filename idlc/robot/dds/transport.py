@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator
 from idlc.robot.dds import graph
 from idlc.robot.dds.address import Place
 from idlc.robot.dds.connection import Connection
-from idlc.robot.dds.discovery import Endpoint
+from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import Received
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
 from idlc.robot.dds.services import Services
 from idlc.robot.dds.writer import Writer, unpadded
-from idlc.robot.keys import Entity, Kind, pack_attachment
+from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.names import dds_type
 from idlc.robot.qos import DurabilityPolicy, QoSProfile
 from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
@@ -78,7 +78,7 @@ class DdsTransport:
         self._started = time.monotonic()
         self.id = self._connection.prefix.hex()
         writer, reader = (
-            Endpoint(self._guid(_INFO_ID, kind), graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS)
+            EndpointData(self._guid(_INFO_ID, kind), graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS)
             for kind in (WRITER, READER)
         )
         with self._connection.acting() as participant:
@@ -91,14 +91,14 @@ class DdsTransport:
 
     def gid(self, entity: Entity) -> bytes:
         """Return the GUID of the writer, or of the reader of a subscription."""
-        is_reader = entity.kind is Kind.SUBSCRIPTION
+        is_reader = entity.kind is EntityKind.SUBSCRIPTION
         return self._guid(entity.id + 1, READER if is_reader else WRITER)
 
     # endpoints
 
-    def _topic(self, entity: Entity, kind: bytes) -> Endpoint:
+    def _topic(self, entity: Entity, kind: bytes) -> EndpointData:
         guid, type_ = self._guid(entity.id + 1, kind), dds_type(entity.type)
-        return Endpoint(guid, f"rt{entity.name}", type_, entity.qos, entity.hash)
+        return EndpointData(guid, f"rt{entity.name}", type_, entity.qos, entity.hash)
 
     def publisher(self, entity: Entity) -> Sender:
         """Declare a writer."""
@@ -153,7 +153,7 @@ class DdsTransport:
         """Tell the others about a node, or that an endpoint is of its node."""
         with self._connection.lock:
             self._own[entity.token] = entity
-            if entity.kind is Kind.CLIENT:
+            if entity.kind is EntityKind.CLIENT:
                 self._services.client(entity, is_announced=True)
             self._change()
         return _Closer(lambda: self._conceal(entity))
@@ -161,7 +161,7 @@ class DdsTransport:
     def _conceal(self, entity: Entity) -> None:
         with self._connection.lock:
             del self._own[entity.token]
-            if entity.kind is Kind.CLIENT:
+            if entity.kind is EntityKind.CLIENT:
                 self._services.withdraw_client(entity)
             self._change()
 

@@ -107,7 +107,7 @@ class NackFragment(NamedTuple):
     missing: tuple[int, ...]
 
 
-Part: TypeAlias = "Data | Fragment | Heartbeat | AckNack | Gap | NackFragment"
+Submessage: TypeAlias = "Data | Fragment | Heartbeat | AckNack | Gap | NackFragment"
 
 
 class Packet(NamedTuple):
@@ -115,14 +115,14 @@ class Packet(NamedTuple):
 
     prefix: bytes
     vendor: bytes
-    parts: tuple[tuple[bytes, Part], ...]
+    parts: tuple[tuple[bytes, Submessage], ...]
 
 
 def parse_packet(data: bytes) -> Packet:
     """Return the parts of a packet up to a malformed one; raise WireError if it is not RTPS."""
     if len(data) < 20 or data[:4] != b"RTPS" or data[4] != 2:
         raise WireError("not RTPS")
-    parts: list[tuple[bytes, Part]] = []
+    parts: list[tuple[bytes, Submessage]] = []
     destination, time, at = bytes(PREFIX), 0, 20
     while at + 4 <= len(data):
         kind, flags = data[at], data[at + 1]
@@ -243,7 +243,7 @@ def _nack_fragment(data: bytes, order: str, _flags: int, _time: int) -> NackFrag
     return NackFragment(reader, writer, _number(high, low), missing)
 
 
-_PARSERS: Mapping[int, Callable[[bytes, str, int, int], Part]] = {
+_PARSERS: Mapping[int, Callable[[bytes, str, int, int], Submessage]] = {
     DATA: _data,
     FRAGMENT: _fragment,
     HEARTBEAT: _heartbeat,

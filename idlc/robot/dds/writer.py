@@ -29,7 +29,7 @@ class RemoteReader(Remote):
         self.is_told = False
 
 
-class Sample(NamedTuple):
+class HistorySample(NamedTuple):
     """A sample in a history."""
 
     payload: bytes
@@ -59,7 +59,7 @@ class Writer:
         self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         self.readers: dict[bytes, RemoteReader] = {}
         self.local: list[Reader] = []
-        self.history: OrderedDict[int, Sample] = OrderedDict()
+        self.history: OrderedDict[int, HistorySample] = OrderedDict()
         self.last = 0
         self._shared = shared
         self._count = 0
@@ -103,7 +103,7 @@ class Writer:
         """Send a sample to all readers; it stays in the history."""
         payload = _padded(payload)
         self.last += 1
-        sample = self.history[self.last] = Sample(payload, inline, time)
+        sample = self.history[self.last] = HistorySample(payload, inline, time)
         self._bytes += len(payload)
         while self._bytes > MOST_HISTORY or len(self.history) == (self._depth or 0) + 1:
             if len(self.history) == 1:
@@ -126,7 +126,7 @@ class Writer:
         if (sample := self.history.pop(number, None)) is not None:
             self._bytes -= len(sample.payload)
 
-    def _deliver(self, reader: Reader, number: int, sample: Sample) -> None:
+    def _deliver(self, reader: Reader, number: int, sample: HistorySample) -> None:
         """Deliver a sample to a reader of the same participant."""
         payload, inline, time = sample
         parameters = wire.parse_parameters(inline, 0, "<")[0] if inline else wire.NONE

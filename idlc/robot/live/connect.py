@@ -18,8 +18,8 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import did_you_mean, one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, Kind, pack_attachment, parse_token
-from idlc.robot.live.graph import Entity as Noun
+from idlc.robot.keys import Entity, EntityKind, pack_attachment, parse_token
+from idlc.robot.live.graph import Communication as Noun
 from idlc.robot.names import action_part
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import Session, open_session
@@ -35,7 +35,7 @@ MOST_OPEN = 8
 DROPPED = 1.5
 #: Tokens of other domains that idlc looks at.
 MOST_TOKENS = 100_000
-TOPICS = (Kind.PUBLISHER, Kind.SUBSCRIPTION)
+TOPICS = (EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)
 #: Bytes of samples that wait to be read; more are lost.
 MOST_WAITING = 64 << 20
 #: Bytes that a sample takes besides its payload.
@@ -71,14 +71,14 @@ def where_nodes_are(session: Session) -> str:
     with suppress(TimeoutError):
         tokens = islice(session.transport.tokens(None, APPEARING), MOST_TOKENS)
         ends = (end for token in tokens if (end := parse_token(token)))
-        others.update(end.domain for end in ends if end.kind is Kind.NODE)
+        others.update(end.domain for end in ends if end.kind is EntityKind.NODE)
     del others[session.domain]
     has = [f"; domain {own} has {counted(number, 'node')}" for own, number in others.most_common(5)]
     advice = "; set ROS_DOMAIN_ID" if has else ""
     return f"there is no node in domain {session.domain}{''.join(has)}{advice}"
 
 
-def robot_entities(session: Session, *kinds: Kind) -> list[Entity]:
+def robot_entities(session: Session, *kinds: EntityKind) -> list[Entity]:
     """Return the entities of other sessions, sorted by name."""
     entities = (end for end in session.graph.entities() if end.session != session.id)
     chosen = [end for end in entities if not kinds or end.kind in kinds]
@@ -93,7 +93,7 @@ def place_of(end: Entity) -> tuple[Noun, str, str]:
 
 
 def find_endpoints(
-    session: Session, names: Sequence[str], kinds: Sequence[Kind], report: Report
+    session: Session, names: Sequence[str], kinds: Sequence[EntityKind], report: Report
 ) -> list[Entity]:
     """Return the endpoints of topics or services; reports IDL655 for each name without any."""
     names = [f"/{name.removeprefix('/')}" for name in names]
@@ -103,7 +103,7 @@ def find_endpoints(
 
     session.graph.wait_for(lambda _: all(map(is_there, names)), APPEARING)
     entities = robot_entities(session, *kinds)
-    noun = "topic" if Kind.PUBLISHER in kinds else "service"
+    noun = "topic" if EntityKind.PUBLISHER in kinds else "service"
     known = {end.name for end in entities}
     for name in sorted({*names} - known):
         hint = did_you_mean(name, known) or f"`idlc show` lists the {noun}s"
@@ -111,7 +111,7 @@ def find_endpoints(
     return [end for end in entities if end.name in names]
 
 
-def own_endpoint(session: Session, like: Entity, kind: Kind, qos: QoSProfile) -> Entity:
+def own_endpoint(session: Session, like: Entity, kind: EntityKind, qos: QoSProfile) -> Entity:
     """Return an endpoint of a hidden node of idlc's, for what another endpoint uses."""
     hidden = {"namespace": "/", "node": f"_idlc_{os.getpid()}", "node_id": 0}
     own = {"session": session.id, "id": session.next_id() + 1, "kind": kind, "qos": qos}
@@ -227,7 +227,7 @@ class _Calls:
         self._open[len(self.attempts)] = now
         receive = partial(self.inbox.put, len(self.attempts))
         self.attempts.append(number)
-        client = own_endpoint(self._session, service, Kind.CLIENT, QoSProfile(depth=10))
+        client = own_endpoint(self._session, service, EntityKind.CLIENT, QoSProfile(depth=10))
         transport = self._session.transport
         attachment = pack_attachment(1, time.time_ns(), transport.gid(client))
         payload = self._requests[number][1].serialize()

@@ -21,8 +21,8 @@ from idlc.versions.changes import Change, Level
 from idlc.versions.fields import Sides, constant_changes, field_changes, with_wire
 from idlc.wire.compatible import reads_alike
 
-Entity: TypeAlias = Literal["topic", "service", "action"]
-Role: TypeAlias = Literal["publisher", "subscription", "server", "client"]
+Communication: TypeAlias = Literal["topic", "service", "action"]
+EndpointRole: TypeAlias = Literal["publisher", "subscription", "server", "client"]
 
 #: The suffixes of structures that services and actions imply.
 _PART = re.compile(r"_((SendGoal|GetResult)_)?(Request|Response)$|_FeedbackMessage$")
@@ -34,7 +34,7 @@ NAMED = 2
 MOST_VERSIONS = 16
 
 
-class Endpoint(NamedTuple):
+class GraphEndpoint(NamedTuple):
     """One end of a topic, service or action, and the structure that it sends or reads.
 
     A service has two, of its request and of its response. `node` and `hash` are empty if they
@@ -42,9 +42,9 @@ class Endpoint(NamedTuple):
     """
 
     node: str
-    entity: Entity
+    entity: Communication
     name: str
-    role: Role
+    role: EndpointRole
     sends: bool
     structure: str
     hash: str = ""
@@ -78,12 +78,12 @@ class LocalType(NamedTuple):
         return "your files" if self.in_files else "the installed package"
 
 
-class Version(NamedTuple):
+class TypeVersion(NamedTuple):
     """One version of a type with its users; `local` if this machine has the same version."""
 
     type: str
     hash: str
-    endpoints: tuple[Endpoint, ...]
+    endpoints: tuple[GraphEndpoint, ...]
     local: LocalType | None = None
 
     @property
@@ -114,7 +114,7 @@ class Version(NamedTuple):
         return not self.endpoints or not all(endpoint.sends for endpoint in self.endpoints)
 
 
-class Question(NamedTuple):
+class TypeQuestion(NamedTuple):
     """A request to a node to describe a type that it uses, by name and hash."""
 
     node: str
@@ -156,13 +156,13 @@ def _plain(value: Any) -> Any:
 
 
 def several_versions(
-    endpoints: Iterable[Endpoint], local: Mapping[str, LocalType]
-) -> Iterator[tuple[Version, ...]]:
+    endpoints: Iterable[GraphEndpoint], local: Mapping[str, LocalType]
+) -> Iterator[tuple[TypeVersion, ...]]:
     """Yield the versions of each type that has more than one.
 
     The local version comes last, or else the version of the most endpoints.
     """
-    types: dict[str, dict[str, list[Endpoint]]] = {}
+    types: dict[str, dict[str, list[GraphEndpoint]]] = {}
     for endpoint in endpoints:
         if endpoint.hash:
             types.setdefault(endpoint.structure, {}).setdefault(endpoint.hash, []).append(endpoint)
@@ -171,7 +171,7 @@ def several_versions(
         if mine:
             hashes.setdefault(mine.hash, [])
         versions = [
-            Version(name, hash_, tuple(users), mine if mine and mine.hash == hash_ else None)
+            TypeVersion(name, hash_, tuple(users), mine if mine and mine.hash == hash_ else None)
             for hash_, users in hashes.items()
         ]
         if len(versions) > 1:
@@ -197,9 +197,9 @@ def event_of(name: str) -> str | None:
     return f"{service}_Event" if service else None
 
 
-def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
+def several_types(endpoints: Iterable[GraphEndpoint]) -> Iterator[Change]:
     """Yield a change for each topic, service and action whose ends differ in the type's name."""
-    places: dict[tuple[Entity, str], dict[str, list[Endpoint]]] = {}
+    places: dict[tuple[Communication, str], dict[str, list[GraphEndpoint]]] = {}
     for endpoint in endpoints:
         if endpoint.entity != "action" or not endpoint.structure.startswith(_SHARED):
             types = places.setdefault((endpoint.entity, endpoint.name), {})
@@ -221,7 +221,7 @@ def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
             )
 
 
-def activities(endpoints: Iterable[Endpoint]) -> Iterator[str]:
+def activities(endpoints: Iterable[GraphEndpoint]) -> Iterator[str]:
     """Yield a line for each activity of endpoints, with its nodes."""
     nodes: dict[str, list[str]] = {}
     for endpoint in endpoints:
@@ -231,14 +231,14 @@ def activities(endpoints: Iterable[Endpoint]) -> Iterator[str]:
 
 
 #: Models, and why there is none, by a structure's full name and type hash.
-Models: TypeAlias = Mapping[tuple[str, str], Model]
+GraphModels: TypeAlias = Mapping[tuple[str, str], Model]
 Problems: TypeAlias = Mapping[tuple[str, str], str]
 #: Structures of two versions, by name and both hashes.
 Reported: TypeAlias = set[tuple[str, str, str]]
 
 
 def version_changes(
-    versions: Sequence[Version], models: Models, problems: Problems, seen: Reported
+    versions: Sequence[TypeVersion], models: GraphModels, problems: Problems, seen: Reported
 ) -> Iterator[Change]:
     """Yield a change for a type with several versions, and the differences between them.
 
@@ -274,7 +274,7 @@ def version_changes(
                 yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
 
 
-def _effect(sender: Version, reader: Version, models: Models) -> str:
+def _effect(sender: TypeVersion, reader: TypeVersion, models: GraphModels) -> str:
     """Return the effect of a sent version on the readers of another one, in words."""
     effect = "misread" if _misreads(sender, reader, models) else "read right"
     if not {sender.key, reader.key} <= models.keys():
@@ -282,13 +282,13 @@ def _effect(sender: Version, reader: Version, models: Models) -> str:
     return f"{sender.label} → {reader.label}: {effect}, or not delivered"
 
 
-def _is_misread(old: Version, new: Version, models: Models) -> bool:
+def _is_misread(old: TypeVersion, new: TypeVersion, models: GraphModels) -> bool:
     """Return whether programs with one of two versions misread the bytes of the other."""
     met = [(a, b) for a, b in permutations((old, new)) if a.sends and b.reads]
     return any(_misreads(a, b, models) for a, b in met or [(old, new)])
 
 
-def _version(version: Version, models: Models, problems: Problems) -> Iterator[str]:
+def _version(version: TypeVersion, models: GraphModels, problems: Problems) -> Iterator[str]:
     where = f", as in {version.local.label}" if version.local else ""
     yield f"{version.hash}{where}:"
     yield from activities(version.endpoints) if version.endpoints else ["  no node"]
@@ -303,7 +303,7 @@ def _version(version: Version, models: Models, problems: Problems) -> Iterator[s
         yield f"  idlc compares no constants and default values of {which}: nodes sent only parts"
 
 
-def _misreads(sender: Version, reader: Version, models: Models) -> bool:
+def _misreads(sender: TypeVersion, reader: TypeVersion, models: GraphModels) -> bool:
     """Return whether `reader` certainly misreads the bytes of `sender`."""
     if not {sender.key, reader.key} <= models.keys():
         return False
@@ -313,8 +313,8 @@ def _misreads(sender: Version, reader: Version, models: Models) -> bool:
 
 
 def _all_sides(
-    left: Version, right: Version, models: Models
-) -> Iterator[tuple[Sides, list[Change], Version, Version]]:
+    left: TypeVersion, right: TypeVersion, models: GraphModels
+) -> Iterator[tuple[Sides, list[Change], TypeVersion, TypeVersion]]:
     """Yield the structures that differ between two versions of a type, nested ones included.
 
     Each comes with its changes, without those of nested types, which have their own. They are from

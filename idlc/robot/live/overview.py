@@ -9,21 +9,21 @@ from typing import NamedTuple
 from idlc.diagnostics.text import near_pairs
 from idlc.recordings.definitions import interface_of, type_name
 from idlc.recordings.types import LocalTypes
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.live.connect import place_of
-from idlc.robot.live.graph import Entity as Noun
+from idlc.robot.live.graph import Communication as Noun
 from idlc.robot.qos import QoSProfile, incompatible_policies
 
 #: What every node has; the table leaves these services out.
 _OF_EVERY_NODE = ("rcl_interfaces/srv/", "type_description_interfaces/srv/")
 #: Names of one type that are compared with each other.
 MOST_NAMES = 500
-_PAIRS = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.CLIENT: Kind.SERVICE}
+_PAIRS = {EntityKind.PUBLISHER: EntityKind.SUBSCRIPTION, EntityKind.CLIENT: EntityKind.SERVICE}
 #: A topic with more pairs than these is compared in part.
 MOST_PAIRS = 100_000
 
 
-class Connection(NamedTuple):
+class OverviewRow(NamedTuple):
     """A topic, service or action with one version of its type, and the nodes at both ends.
 
     `senders` publish or call, `receivers` subscribe or serve. `qos` has the profiles of the
@@ -46,15 +46,17 @@ class Connection(NamedTuple):
         return self.noun == "service" and self.type_name.startswith(_OF_EVERY_NODE)
 
 
-def connections(entities: Iterable[Entity], local: LocalTypes) -> list[Connection]:
+def connections(entities: Iterable[Entity], local: LocalTypes) -> list[OverviewRow]:
     """Return what endpoints have in common, sorted; an action is that of its feedback."""
     places: dict[tuple[Noun, str, str, str], tuple[list[Entity], list[Entity]]] = {}
     for end in entities:
         noun, name, part = place_of(end)
-        if end.kind is not Kind.NODE and part in ("", "feedback"):
+        if end.kind is not EntityKind.NODE and part in ("", "feedback"):
             sides = places.setdefault((noun, name, end.type, end.hash), ([], []))
             # a client of an action receives the feedback
-            is_receiver = (end.kind in (Kind.PUBLISHER, Kind.CLIENT)) == (noun == "action")
+            is_receiver = (end.kind in (EntityKind.PUBLISHER, EntityKind.CLIENT)) == (
+                noun == "action"
+            )
             sides[is_receiver].append(end)
     found = []
     for (noun, name, type_, hash_), sides in sorted(places.items(), key=lambda item: item[0]):
@@ -66,7 +68,9 @@ def connections(entities: Iterable[Entity], local: LocalTypes) -> list[Connectio
         shown = str(interface_of(parsed)) if parsed and noun == "action" else type_
         senders, receivers = (tuple(sorted({end.node_name for end in ends})) for ends in sides)
         qos, requested = (tuple(dict.fromkeys(end.qos for end in ends)) for ends in sides)
-        found.append(Connection(noun, name, shown, hash_, senders, receivers, qos, requested, here))
+        found.append(
+            OverviewRow(noun, name, shown, hash_, senders, receivers, qos, requested, here)
+        )
     return found
 
 
@@ -76,7 +80,7 @@ def mismatches(entities: Iterable[Entity]) -> Iterator[tuple[str, str, str, tupl
     The differences are `type`, or `hash`, or names of QoS policies. Endpoints without a hash fit
     every version.
     """
-    places: dict[tuple[Kind, str], list[Entity]] = {}
+    places: dict[tuple[EntityKind, str], list[Entity]] = {}
     for entity in entities:
         places.setdefault((entity.kind, entity.name), []).append(entity)
     for (kind, name), senders in sorted(places.items()):
@@ -94,7 +98,7 @@ def _differences(sender: Entity, receiver: Entity) -> tuple[str, ...]:
     return incompatible_policies(sender.qos, receiver.qos)
 
 
-def similar_names(found: Iterable[Connection]) -> Iterator[tuple[str, str]]:
+def similar_names(found: Iterable[OverviewRow]) -> Iterator[tuple[str, str]]:
     """Yield a name that nobody receives, and one that nobody sends, which differ in one letter."""
     kinds: dict[tuple[str, str], tuple[set[str], set[str]]] = {}
     for each in found:

@@ -23,10 +23,10 @@ from idlc.recordings.containers.file import MSG
 from idlc.recordings.containers.mcap_writer import ChunkWriter, channel, schema
 from idlc.recordings.containers.records import CHANNEL_OP, MESSAGE_OP, SCHEMA_OP
 from idlc.recordings.definitions import RecordedDefinition
-from idlc.robot.keys import Entity, Kind, parse_attachment
+from idlc.robot.keys import Entity, EntityKind, parse_attachment
 from idlc.robot.live.connect import TICK, Inbox, place_of, robot_entities
 from idlc.robot.live.traffic import subscribe
-from idlc.robot.live.types import Key, definitions
+from idlc.robot.live.types import TypeKey, definitions
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import Session
 
@@ -66,13 +66,13 @@ class Recorder:
         self._inbox = Inbox()
         #: The name, type and hash of each channel, and the type and hash of each schema.
         self._channels: dict[tuple[str, str, str], int] = {}
-        self._schemas: dict[Key, int] = {}
+        self._schemas: dict[TypeKey, int] = {}
         #: By type and hash, the channels whose definition is not there, each as its record.
-        self._undefined: dict[Key, dict[int, Callable[[int], bytes]]] = {}
+        self._undefined: dict[TypeKey, dict[int, Callable[[int], bytes]]] = {}
         #: Messages of these channels.
         self._held: dict[int, list[bytes]] = {}
         self._held_size = 0
-        self._replies: SimpleQueue[tuple[Key, RecordedDefinition | None]] = SimpleQueue()
+        self._replies: SimpleQueue[tuple[TypeKey, RecordedDefinition | None]] = SimpleQueue()
         self._declared = ExitStack()
         #: The time at which the robot disappeared, in ns.
         self._gone = 0
@@ -108,7 +108,7 @@ class Recorder:
 
     def _add_topics(self) -> None:
         new: dict[tuple[str, str, str], list[Entity]] = {}
-        publishers = robot_entities(self._session, Kind.PUBLISHER)
+        publishers = robot_entities(self._session, EntityKind.PUBLISHER)
         self._note_gap(bool(publishers))
         for end in publishers:
             key = end.name, end.type, end.hash
@@ -153,7 +153,7 @@ class Recorder:
                 self._add_schema(key, read)
                 key, read = self._replies.get(block=False)
 
-    def _add_schema(self, key: Key, read: RecordedDefinition | None) -> None:
+    def _add_schema(self, key: TypeKey, read: RecordedDefinition | None) -> None:
         """Add a schema with the channels and the messages that wait for it."""
         channels = self._undefined.pop(key, {})
         if not channels:

@@ -15,7 +15,7 @@ from idlc.diagnostics.report import Report, Severity
 from idlc.recordings.containers.file import START, unread_reason
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import type_of
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.live.connect import TICK, Inbox, find_endpoints, own_endpoint
 from idlc.robot.live.types import definitions
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
@@ -35,14 +35,14 @@ def subscribe(
 
     The subscription is announced, so that publishers that wait for subscriptions begin.
     """
-    offered = [end.qos for end in ends if end.kind is Kind.PUBLISHER] or [_DEFAULT]
+    offered = [end.qos for end in ends if end.kind is EntityKind.PUBLISHER] or [_DEFAULT]
     qos = QoSProfile(
         depth=max(qos.depth for qos in offered),
         # the stricter policy has the lower number
         reliability=min(qos.reliability for qos in offered),
         durability=min(qos.durability for qos in offered),
     )
-    own = own_endpoint(session, ends[0], Kind.SUBSCRIPTION, qos)
+    own = own_endpoint(session, ends[0], EntityKind.SUBSCRIPTION, qos)
     declared.callback(session.transport.subscriber(own, partial(inbox.put, number)).close)
     declared.callback(session.transport.announce(own).close)
 
@@ -50,7 +50,7 @@ def subscribe(
 def find_version(
     session: Session,
     name: str,
-    kinds: Sequence[Kind],
+    kinds: Sequence[EntityKind],
     report: Report,
     include: tuple[str, ...] = (),
 ) -> tuple[Any, list[Entity]]:
@@ -62,7 +62,9 @@ def find_version(
     ends = find_endpoints(session, [name], kinds, report)
     if not ends:
         return None, []
-    first = next((end for end in ends if end.kind in (Kind.PUBLISHER, Kind.SERVICE)), ends[0])
+    first = next(
+        (end for end in ends if end.kind in (EntityKind.PUBLISHER, EntityKind.SERVICE)), ends[0]
+    )
     chosen = [end for end in ends if (end.type, end.hash) == (first.type, first.hash)]
     version = f"the version of `{first.node_name}`, {first.type} {first.hash}"
     if len(chosen) < len(ends):

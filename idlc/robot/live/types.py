@@ -37,9 +37,9 @@ from idlc.recordings.definitions import (
     type_name,
 )
 from idlc.recordings.memory import class_in, home_of
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.live.connect import call, connected, place_of, robot_entities
-from idlc.robot.live.graph import Answer, Question, answer_of
+from idlc.robot.live.graph import Answer, TypeQuestion, answer_of
 from idlc.robot.session import Session
 
 #: Seconds that idlc waits for all replies of a robot.
@@ -53,7 +53,7 @@ MOST_OF_A_PART = 10
 MOST_REPLIES = 64 << 20
 DESCRIBE = "type_description_interfaces/srv/GetTypeDescription"
 #: The name of a type and its hash.
-Key: TypeAlias = tuple[str, str]
+TypeKey: TypeAlias = tuple[str, str]
 
 
 def _compiler(include: tuple[str, ...] = ()) -> Compiler:
@@ -70,8 +70,8 @@ def _describe_class() -> Any:
 
 
 def ask(
-    session: Session, questions: Iterable[Question], patience: float = PATIENCE
-) -> dict[Question, Answer]:
+    session: Session, questions: Iterable[TypeQuestion], patience: float = PATIENCE
+) -> dict[TypeQuestion, Answer]:
     """Return the nodes' answers within `patience` seconds; each question has one."""
     questions = list(dict.fromkeys(questions))
     services = _describers(session)
@@ -81,16 +81,16 @@ def ask(
 
 
 def _describers(session: Session) -> dict[str, Entity]:
-    servers = robot_entities(session, Kind.SERVICE)
+    servers = robot_entities(session, EntityKind.SERVICE)
     return {end.node_name: end for end in servers if end.type == DESCRIBE}
 
 
 def _replies(
     session: Session,
     services: Mapping[str, Entity],
-    questions: Iterable[Question],
+    questions: Iterable[TypeQuestion],
     patience: float = PATIENCE,
-) -> Iterator[tuple[Question, Answer]]:
+) -> Iterator[tuple[TypeQuestion, Answer]]:
     """Yield questions with the nodes' answers as these arrive, for `patience` seconds."""
     offered = [question for question in questions if question.node in services]
     requests = ((services[node], _request(name, hash_)) for node, name, hash_ in offered)
@@ -120,7 +120,7 @@ def read_robot(address: str, report: Report) -> tuple[RecordedDefinition, ...] |
     with connected(address, report) as session:
         if session is None:
             return None
-        ends = (end for end in robot_entities(session) if end.kind is not Kind.NODE)
+        ends = (end for end in robot_entities(session) if end.kind is not EntityKind.NODE)
         whole = [end for end in ends if place_of(end)[2] in ("", "feedback")]
         # in the order of the names, whoever answers first
         every = definitions(session, address, whole)
@@ -143,15 +143,15 @@ def definitions(
     the right hash have no definition of the robot's, unless `whole` asks for their own. Then local
     types also define what endpoints announce without a hash.
     """
-    users: dict[Key, list[Entity]] = {}
+    users: dict[TypeKey, list[Entity]] = {}
     for end in ends:
         users.setdefault((end.type, end.hash), []).append(end)
     parts = _parts_of_actions(session)
     compiler = _compiler(include)
     cache: TextCache = {}
-    asked: dict[Key, list[Question]] = {}
+    asked: dict[TypeKey, list[TypeQuestion]] = {}
 
-    def read(key: Key, text: str, problem: str) -> Iterator[RecordedDefinition]:
+    def read(key: TypeKey, text: str, problem: str) -> Iterator[RecordedDefinition]:
         schema = Schema(key[0], MSG, text) if text else None
         for name in dict.fromkeys(place_of(end)[1] for end in users[key]):
             topic = Topic(name, key[0], 0, key[1] or None, CDR, schema)
@@ -183,12 +183,12 @@ def _parts_of_actions(session: Session) -> dict[tuple[str, str], list[Entity]]:
 
 
 def _answered(
-    session: Session, asked: Mapping[Key, list[Question]]
-) -> Iterator[tuple[Key, str, str]]:
+    session: Session, asked: Mapping[TypeKey, list[TypeQuestion]]
+) -> Iterator[tuple[TypeKey, str, str]]:
     """Yield each type with its text, or the reason why there is none, as nodes answer."""
     services = _describers(session)
-    answers: dict[Key, dict[Question, Answer]] = {}
-    users: dict[Question, list[Key]] = {}
+    answers: dict[TypeKey, dict[TypeQuestion, Answer]] = {}
+    users: dict[TypeQuestion, list[TypeKey]] = {}
     for key, questions in asked.items():
         answers[key] = {each: answer_of(None, each.node in services) for each in questions}
         for question in answers[key]:
@@ -218,18 +218,18 @@ def _local_text(compiler: Compiler, name: ir.TypeName, hash_: str, *, unsure: bo
     return mcap_text(model.interfaces[interface], model) if is_sound else None
 
 
-def _questions(name: ir.TypeName, ends: Iterable[Entity]) -> Iterator[Question]:
+def _questions(name: ir.TypeName, ends: Iterable[Entity]) -> Iterator[TypeQuestion]:
     """Yield questions about the parts of an interface to the nodes that use them."""
     interface = interface_of(name)
-    asked: Counter[Key] = Counter()
+    asked: Counter[TypeKey] = Counter()
     for end in dict.fromkeys(ends):
         key, own = (end.type, end.hash), type_name(end.type)
         asked[key] += 1
         if end.hash and asked[key] <= ASKED and own and interface_of(own) == interface:
-            yield Question(end.node_name, *key)
+            yield TypeQuestion(end.node_name, *key)
 
 
-def _definition(key: Key, answers: Mapping[Question, Answer]) -> tuple[str, str]:
+def _definition(key: TypeKey, answers: Mapping[TypeQuestion, Answer]) -> tuple[str, str]:
     """Return the text of a type with all that it refers to, or else the reason why not."""
     name = ir.TypeName.parse(key[0])
     interface = interface_of(name)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import ATTACHMENT, GID_SIZE, Entity, Kind, parse_attachment
+from idlc.robot.keys import ATTACHMENT, GID_SIZE, Entity, EntityKind, parse_attachment
 from idlc.robot.nodes.clock import Timer
 from idlc.robot.nodes.events import EventCallbacks, Events
 from idlc.robot.nodes.executor import Ready
@@ -38,7 +38,7 @@ class Endpoint(Ready):
     an attachment, and what could not be decoded.
     """
 
-    kind: ClassVar[Kind]
+    kind: ClassVar[EntityKind]
     deadline: Timer | None = None
     events: Events | None = None
     _is_measured = False
@@ -84,7 +84,7 @@ class Endpoint(Ready):
             self.events = Events(self, callbacks)
             self.deadline = self.events.deadline
 
-    def count_others(self, kind: Kind) -> int:
+    def count_others(self, kind: EntityKind) -> int:
         """Return the number of endpoints with the same name, type and hash."""
         own = self.entity
         others = self.node.graph.entities(kind, own.name)
@@ -157,7 +157,7 @@ class Bounded(Generic[T]):
 class Publisher(Endpoint, Generic[M]):
     """Sends messages of a topic, from any thread."""
 
-    kind = Kind.PUBLISHER
+    kind = EntityKind.PUBLISHER
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the publisher."""
@@ -188,13 +188,13 @@ class Publisher(Endpoint, Generic[M]):
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions that receive the messages."""
-        return self.count_others(Kind.SUBSCRIPTION)
+        return self.count_others(EntityKind.SUBSCRIPTION)
 
 
 class Subscription(Endpoint, Generic[M]):
     """Receives messages of a topic: a queue that drops the oldest beyond the depth."""
 
-    kind = Kind.SUBSCRIPTION
+    kind = EntityKind.SUBSCRIPTION
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the subscriber."""
@@ -229,7 +229,7 @@ class Subscription(Endpoint, Generic[M]):
 
     def get_publisher_count(self) -> int:
         """Return the number of publishers whose messages arrive here."""
-        return self.count_others(Kind.PUBLISHER)
+        return self.count_others(EntityKind.PUBLISHER)
 
 
 class RawSubscription(Subscription[Any]):

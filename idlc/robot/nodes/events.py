@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import count
 from typing import Any, NamedTuple
 
-from idlc.robot.keys import Attachment, Entity, Kind
+from idlc.robot.keys import Attachment, Entity, EntityKind
 from idlc.robot.nodes.clock import Clock, ClockType, Timer
 from idlc.robot.nodes.executor import call
 from idlc.robot.qos import FOLLOWS, LivelinessPolicy, QoSPolicyKind, incompatible_policies
@@ -77,7 +77,7 @@ class Events:
     def __init__(self, endpoint: Any, callbacks: EventCallbacks) -> None:
         self._endpoint = endpoint
         self._callbacks = callbacks
-        self._is_publisher = endpoint.kind is Kind.PUBLISHER
+        self._is_publisher = endpoint.kind is EntityKind.PUBLISHER
         self._timers: list[Timer] = []
         self._graph = None
         profile, liveliness = endpoint.qos_profile, callbacks.liveliness
@@ -146,7 +146,7 @@ class Events:
     async def _compare(self) -> None:
         """Compare the other ends in the graph with those that were there before."""
         own = self._endpoint.entity
-        kind = Kind.SUBSCRIPTION if self._is_publisher else Kind.PUBLISHER
+        kind = EntityKind.SUBSCRIPTION if self._is_publisher else EntityKind.PUBLISHER
         matched, unfit, last = set(), set(), ""
         for other in self._endpoint.node.graph.entities(kind, own.name):
             if (other.type, other.hash) != (own.type, own.hash):

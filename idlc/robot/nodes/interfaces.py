@@ -41,7 +41,7 @@ ServiceLike: TypeAlias = (
 )
 
 
-class Interface:
+class InterfaceClass:
     """The name and hash of a type, and its class, which is loaded when it is first used."""
 
     def __init__(self, name: str, hash_: str, load: Callable[[], Any]) -> None:
@@ -55,9 +55,9 @@ class Interface:
         return self._load()
 
 
-def interface_of(kind: Any) -> Interface:
+def interface_of(kind: Any) -> InterfaceClass:
     """Return the type of a message or service class; raise RobotError for another class."""
-    if isinstance(kind, Interface):
+    if isinstance(kind, InterfaceClass):
         return kind
     metaclass = type(kind)
     owner: Any = getattr(metaclass, "_message", None) or getattr(metaclass, "_interface", None)
@@ -65,7 +65,7 @@ def interface_of(kind: Any) -> Interface:
         types = types_of(owner)
         folder = owner.__module__.rsplit(".", 2)[1]
         name = f"{types.package}/{folder}/{wire_name(owner.__name__)}"
-        return Interface(name, types.hashes[name], lambda: kind)
+        return InterfaceClass(name, types.hashes[name], lambda: kind)
     except (AttributeError, ImportError, KeyError, ValueError):
         raise RobotError(
             f"{kind!r} is not a message or service class of idlc",
@@ -90,11 +90,11 @@ _HASHES = dict(line.split("=") for line in _ANNOUNCED.split())
 
 
 @cache
-def standard(name: str) -> Interface:
+def standard(name: str) -> InterfaceClass:
     """Return a type of the catalogue of ROS 2's interfaces."""
     package = name.partition("/")[0]
     if name in _HASHES:
-        return Interface(name, f"RIHS01_{_HASHES[name]}", lambda: _package(package)[name])
+        return InterfaceClass(name, f"RIHS01_{_HASHES[name]}", lambda: _package(package)[name])
     return interface_of(_package(package)[name])
 
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, overload
 from idlc.robot import qos as profiles
 from idlc.robot.errors import RobotError
 from idlc.robot.graph import Graph
-from idlc.robot.keys import Entity, Kind
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.names import InvalidNameError, expand_namespace, is_node_name
 from idlc.robot.nodes.arguments import parse_arguments
 from idlc.robot.nodes.clock import Clock, ClockType, GuardCondition, Time, Timer
@@ -24,7 +24,14 @@ from idlc.robot.nodes.endpoints import (
 )
 from idlc.robot.nodes.events import EventCallbacks
 from idlc.robot.nodes.executor import CallbackGroup, Executor, MutuallyExclusiveCallbackGroup
-from idlc.robot.nodes.interfaces import Interface, M, RequestT, ResponseT, ServiceLike, standard
+from idlc.robot.nodes.interfaces import (
+    InterfaceClass,
+    M,
+    RequestT,
+    ResponseT,
+    ServiceLike,
+    standard,
+)
 from idlc.robot.nodes.logger import Logger, answer_levels, set_levels
 from idlc.robot.nodes.overrides import QoSOverridingOptions, overridden, overrides_of
 from idlc.robot.nodes.services import SERVICE, START_SERVICE, Client, DeepService, Service, describe
@@ -72,7 +79,7 @@ class Node(HasParameters):
             session=self.session.id,
             node_id=number,
             id=number,
-            kind=Kind.NODE,
+            kind=EntityKind.NODE,
             namespace=expand_namespace(place),
             node=name,
         )
@@ -199,7 +206,7 @@ class Node(HasParameters):
 
     def create_publisher(
         self,
-        msg_type: type[M] | Interface,
+        msg_type: type[M] | InterfaceClass,
         topic: str,
         qos_profile: QoSProfile | int,
         *,
@@ -219,7 +226,7 @@ class Node(HasParameters):
     @overload
     def create_subscription(
         self,
-        msg_type: type[M] | Interface,
+        msg_type: type[M] | InterfaceClass,
         topic: str,
         callback: Callable[[M], Any],
         qos_profile: QoSProfile | int,
@@ -233,7 +240,7 @@ class Node(HasParameters):
     @overload
     def create_subscription(
         self,
-        msg_type: type[Any] | Interface,
+        msg_type: type[Any] | InterfaceClass,
         topic: str,
         callback: Callable[[bytes], Any],
         qos_profile: QoSProfile | int,
@@ -246,7 +253,7 @@ class Node(HasParameters):
 
     def create_subscription(
         self,
-        msg_type: type[Any] | Interface,
+        msg_type: type[Any] | InterfaceClass,
         topic: str,
         callback: Callable[[Any], Any],
         qos_profile: QoSProfile | int,
@@ -273,7 +280,7 @@ class Node(HasParameters):
 
     def create_service(
         self,
-        srv_type: ServiceLike[RequestT, ResponseT] | Interface,
+        srv_type: ServiceLike[RequestT, ResponseT] | InterfaceClass,
         srv_name: str,
         callback: Callable[[RequestT, ResponseT], Any],
         *,
@@ -285,7 +292,7 @@ class Node(HasParameters):
 
     def create_client(
         self,
-        srv_type: ServiceLike[RequestT, ResponseT] | Interface,
+        srv_type: ServiceLike[RequestT, ResponseT] | InterfaceClass,
         srv_name: str,
         *,
         qos_profile: QoSProfile | int = 10,
@@ -325,32 +332,32 @@ class Node(HasParameters):
 
     def count_publishers(self, topic_name: str) -> int:
         """Return the number of publishers of a topic."""
-        return self.graph.count(Kind.PUBLISHER, self.resolve_topic_name(topic_name))
+        return self.graph.count(EntityKind.PUBLISHER, self.resolve_topic_name(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return the number of subscriptions of a topic."""
-        return self.graph.count(Kind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
+        return self.graph.count(EntityKind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
 
     def count_services(self, service_name: str) -> int:
         """Return the number of services with this name."""
-        return self.graph.count(Kind.SERVICE, self.resolve_service_name(service_name))
+        return self.graph.count(EntityKind.SERVICE, self.resolve_service_name(service_name))
 
     def count_clients(self, service_name: str) -> int:
         """Return the number of clients of a service."""
-        return self.graph.count(Kind.CLIENT, self.resolve_service_name(service_name))
+        return self.graph.count(EntityKind.CLIENT, self.resolve_service_name(service_name))
 
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Return the topics and their types, sorted."""
-        types = self.graph.types(Kind.PUBLISHER, Kind.SUBSCRIPTION)
+        types = self.graph.types(EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)
         return [(name, [*of]) for name, of in types.items()]
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Return the services and their types, sorted."""
-        return [(name, [*of]) for name, of in self.graph.types(Kind.SERVICE).items()]
+        return [(name, [*of]) for name, of in self.graph.types(EntityKind.SERVICE).items()]
 
     def get_node_names(self) -> list[str]:
         """Return the names of nodes without their namespaces."""
-        return [entity.node for entity in self.graph.entities(Kind.NODE)]
+        return [entity.node for entity in self.graph.entities(EntityKind.NODE)]
 
 
 create_node = Node

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Attachment, Kind, pack_attachment, parse_attachment
+from idlc.robot.keys import Attachment, EntityKind, pack_attachment, parse_attachment
 from idlc.robot.nodes.endpoints import Bounded, Endpoint
 from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
@@ -33,7 +33,7 @@ MOST_OPEN = 10_000
 class Service(Endpoint, Generic[RequestT, ResponseT]):
     """Answers requests: `callback` gets the request and an empty response, and returns it."""
 
-    kind = Kind.SERVICE
+    kind = EntityKind.SERVICE
     #: The requests that wait, if these are more than the announced depth.
     depth: ClassVar[int] = 0
 
@@ -101,7 +101,7 @@ class DeepService(Service[RequestT, ResponseT]):
 class Client(Endpoint, Generic[RequestT, ResponseT]):
     """Sends requests, from any thread; a thread of the transport completes their futures."""
 
-    kind = Kind.CLIENT
+    kind = EntityKind.CLIENT
 
     def open(self) -> tuple[Closeable, ...]:
         """Prepare calls."""
@@ -169,7 +169,7 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
 
     def service_is_ready(self) -> bool:
         """Return whether there is a service."""
-        return bool(self.count_others(Kind.SERVICE))
+        return bool(self.count_others(EntityKind.SERVICE))
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until there is a service; return whether there is one now."""

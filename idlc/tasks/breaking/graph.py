@@ -26,7 +26,7 @@ from idlc.project.find import is_address, list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.robot.keys import Entity as RobotEntity
-from idlc.robot.keys import Kind
+from idlc.robot.keys import EntityKind
 from idlc.robot.live.connect import (
     DROPPED,
     MOST_OPEN,
@@ -37,13 +37,13 @@ from idlc.robot.live.connect import (
 )
 from idlc.robot.live.graph import (
     Answer,
-    Endpoint,
-    Entity,
+    Communication,
+    EndpointRole,
+    GraphEndpoint,
     LocalType,
-    Question,
     Reported,
-    Role,
-    Version,
+    TypeQuestion,
+    TypeVersion,
     answer_of,
     event_of,
     interface_of,
@@ -74,13 +74,13 @@ _SERVICE = re.compile(r"r([qr])(/.+)(?:Request|Reply)")
 _TYPE = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
 _HASH = re.compile(r"RIHS01_[0-9a-f]{64}")
 _ACTION = "/_action/"
-Roles: TypeAlias = tuple[Role, Role]
+Roles: TypeAlias = tuple[EndpointRole, EndpointRole]
 _SERVER: Roles = ("server", "client")
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 
 
 @contextmanager
-def join_graph(report: Report) -> Iterator[Graph | None]:
+def join_graph(report: Report) -> Iterator[RunningGraph | None]:
     """Yield the graph that this process can see; reports IDL640 where it cannot have a node.
 
     While it lasts, a hidden node of idlc's own is part of the graph.
@@ -107,13 +107,13 @@ def join_graph(report: Report) -> Iterator[Graph | None]:
         yield None
         return
     try:
-        yield Graph(rclpy, node, context)
+        yield RunningGraph(rclpy, node, context)
     finally:
         node.destroy_node()
         context.try_shutdown()
 
 
-class Graph:
+class RunningGraph:
     """The running graph as one node sees it."""
 
     #: Endpoints of services announce the hashes of the structures that they send and read.
@@ -124,7 +124,7 @@ class Graph:
         self._node = node
         self._context = context
 
-    def endpoints(self, patience: float) -> tuple[Endpoint, ...]:
+    def endpoints(self, patience: float) -> tuple[GraphEndpoint, ...]:
         """Return all ends of topics, services and actions, after `patience` without a change."""
         endpoints = self._now()
         start = rest = time.monotonic()
@@ -135,8 +135,8 @@ class Graph:
                 endpoints, rest = latest, time.monotonic()
         return endpoints
 
-    def _now(self) -> tuple[Endpoint, ...]:
-        endpoints: set[Endpoint] = set()
+    def _now(self) -> tuple[GraphEndpoint, ...]:
+        endpoints: set[GraphEndpoint] = set()
         roles: Roles
         for name, _ in self._node.get_topic_names_and_types():
             roles = _SERVER if _ACTION in name else ("publisher", "subscription")
@@ -148,13 +148,15 @@ class Graph:
                 endpoints |= {*self._endpoints(topic, match[2], "service", roles)}
         return tuple(sorted(endpoints))
 
-    def _endpoints(self, topic: str, name: str, entity: Entity, roles: Roles) -> Iterator[Endpoint]:
+    def _endpoints(
+        self, topic: str, name: str, entity: Communication, roles: Roles
+    ) -> Iterator[GraphEndpoint]:
         """Yield the ends of a topic but idlc's own; the first of `roles` sends, the other reads."""
         node = self._node
         own = f"{node.get_namespace().rstrip('/')}/{node.get_name()}"
         looks = node.get_publishers_info_by_topic, node.get_subscriptions_info_by_topic
         place, is_action, _ = name.partition(_ACTION)
-        kind: Entity = "action" if is_action else entity
+        kind: Communication = "action" if is_action else entity
         for role, look in zip(roles, looks, strict=True):
             for info in look(topic, no_mangle=entity == "service"):
                 owner = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
@@ -164,9 +166,9 @@ class Graph:
                     type_hash = _HASH.fullmatch(str(getattr(info, "topic_type_hash", "")))
                     hash_ = type_hash[0] if type_hash else ""
                     owner = "" if _UNKNOWN in owner else owner
-                    yield Endpoint(owner, kind, place, role, role == roles[0], type_, hash_)
+                    yield GraphEndpoint(owner, kind, place, role, role == roles[0], type_, hash_)
 
-    def ask(self, questions: Iterable[Question], patience: float) -> dict[Question, Answer]:
+    def ask(self, questions: Iterable[TypeQuestion], patience: float) -> dict[TypeQuestion, Answer]:
         """Return the nodes' answers within `patience` seconds; each question has one."""
         questions = list(dict.fromkeys(questions))
         try:
@@ -209,13 +211,13 @@ class _Calls:
     """Calls of the services that answer questions, few of each node at a time."""
 
     def __init__(
-        self, service: Any, clients: Mapping[str, Any], questions: Sequence[Question]
+        self, service: Any, clients: Mapping[str, Any], questions: Sequence[TypeQuestion]
     ) -> None:
         self._service = service
         self._clients = clients
         self._questions = questions
-        self._open: dict[Question, tuple[Any, float]] = {}
-        self.results: dict[Question, Any] = {}
+        self._open: dict[TypeQuestion, tuple[Any, float]] = {}
+        self.results: dict[TypeQuestion, Any] = {}
 
     def collect(self, now: float) -> None:
         """Take the results that arrived, and give up calls that are open for too long."""
@@ -250,29 +252,31 @@ class RobotGraph:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def endpoints(self, patience: float) -> tuple[Endpoint, ...]:
+    def endpoints(self, patience: float) -> tuple[GraphEndpoint, ...]:
         """Return all ends of topics, services and actions, after waiting for the first one."""
         self._session.graph.wait_for(lambda graph: graph.entities(), patience)
         entities = robot_entities(self._session)
         return tuple(sorted({each for end in entities for each in _robot_endpoints(end)}))
 
-    def ask(self, questions: Iterable[Question], patience: float) -> dict[Question, Answer]:
+    def ask(self, questions: Iterable[TypeQuestion], patience: float) -> dict[TypeQuestion, Answer]:
         """Return the nodes' answers within `patience` seconds; each question has one."""
         return ask(self._session, questions, patience)
 
 
-def _robot_endpoints(end: RobotEntity) -> Iterator[Endpoint]:
+def _robot_endpoints(end: RobotEntity) -> Iterator[GraphEndpoint]:
     noun, name, _ = place_of(end)
-    sends = end.kind in (Kind.PUBLISHER, Kind.CLIENT)
-    role: Role = "server" if end.kind in (Kind.PUBLISHER, Kind.SERVICE) else "client"
+    sends = end.kind in (EntityKind.PUBLISHER, EntityKind.CLIENT)
+    role: EndpointRole = (
+        "server" if end.kind in (EntityKind.PUBLISHER, EntityKind.SERVICE) else "client"
+    )
     if noun == "topic":
         role = "publisher" if sends else "subscription"
     if end.kind in TOPICS:
-        yield Endpoint(end.node_name, noun, name, role, sends, end.type, end.hash)
-    elif end.kind is not Kind.NODE:
+        yield GraphEndpoint(end.node_name, noun, name, role, sends, end.type, end.hash)
+    elif end.kind is not EntityKind.NODE:
         for suffix, direction in (("_Request", sends), ("_Response", not sends)):
             structure = f"{end.type}{suffix}"
-            yield Endpoint(end.node_name, noun, name, role, direction, structure, end.hash)
+            yield GraphEndpoint(end.node_name, noun, name, role, direction, structure, end.hash)
 
 
 #: A structure's full name and type hash.
@@ -301,7 +305,7 @@ class GraphVerdict(NamedTuple):
     allowed: int
     seen: dict[str, int]
     silent: int
-    endpoints: tuple[Endpoint, ...]
+    endpoints: tuple[GraphEndpoint, ...]
     hidden: int
     not_compared: tuple[str, ...]
 
@@ -360,7 +364,7 @@ def compare_with_graph(
     return GraphVerdict(judged.levels, judged.allowed, _counts(endpoints), *facts)
 
 
-def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
+def _counts(endpoints: Iterable[GraphEndpoint]) -> dict[str, int]:
     """Return the number of nodes, topics, services and actions."""
     named: set[tuple[str, str]] = set()
     for endpoint in endpoints:
@@ -368,11 +372,11 @@ def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
         if endpoint.node:
             named.add(("node", endpoint.node))
     numbers = Counter(kind for kind, _ in named)
-    return {kind: numbers[kind] for kind in ("node", *get_args(Entity))}
+    return {kind: numbers[kind] for kind in ("node", *get_args(Communication))}
 
 
 def _local_versions(
-    local_models: Iterable[Model], endpoints: Iterable[Endpoint], scope: Scope, whole: bool
+    local_models: Iterable[Model], endpoints: Iterable[GraphEndpoint], scope: Scope, whole: bool
 ) -> tuple[dict[Key, Model], dict[str, LocalType]]:
     """Return all versions of types on this machine, and the one in use of each type."""
     models: dict[Key, Model] = {}
@@ -416,17 +420,17 @@ def _installed(names: Iterable[str], scope: Scope) -> Iterator[Model]:
 
 
 def _questions(
-    versions: Iterable[Sequence[Version]],
-    endpoints: Iterable[Endpoint],
+    versions: Iterable[Sequence[TypeVersion]],
+    endpoints: Iterable[GraphEndpoint],
     models: Mapping[Key, Model],
     whole: bool,
-) -> Iterator[tuple[Key, list[Question]]]:
+) -> Iterator[tuple[Key, list[TypeQuestion]]]:
     """Yield the questions about each version without a model.
 
     A node knows a service by the hash of the whole, which only service introspection announces:
     the description of its events holds request and response.
     """
-    events: dict[str, list[Endpoint]] = {}
+    events: dict[str, list[GraphEndpoint]] = {}
     for endpoint in endpoints:
         if endpoint.structure.endswith("_Event") and endpoint.hash:
             events.setdefault(endpoint.structure, []).append(endpoint)
@@ -434,16 +438,16 @@ def _questions(
         nodes = version.nodes
         if version.key not in models:
             type_ = (whole and service_of(version.type)) or version.type
-            questions = [Question(node, type_, version.hash) for node in nodes[:ASKED]]
+            questions = [TypeQuestion(node, type_, version.hash) for node in nodes[:ASKED]]
             if not whole and (event := event_of(version.type)):
                 ends = [end for end in events.get(event, ()) if end.node in nodes]
-                questions = [Question(end.node, event, end.hash) for end in ends]
+                questions = [TypeQuestion(end.node, event, end.hash) for end in ends]
             yield version.key, questions
 
 
 def _add_described(
-    questions: Mapping[Key, Sequence[Question]],
-    answers: Mapping[Question, Answer],
+    questions: Mapping[Key, Sequence[TypeQuestion]],
+    answers: Mapping[TypeQuestion, Answer],
     models: dict[Key, Model],
     whole: bool,
 ) -> dict[Key, str]:

@@ -25,7 +25,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.templates import RenderedFile, html, verbatim
 from idlc.project.write import apply, owned_files, plan
-from idlc.tasks.docs.view import KINDS, Home, Pages, Paragraph, blocks, page, prefix, words
+from idlc.tasks.docs.view import KINDS, Home, PagePaths, Paragraph, blocks, page, prefix, words
 from idlc.tasks.gen import is_name, named_packages
 
 
@@ -61,7 +61,7 @@ class ListingPage(NamedTuple):
 
 
 def _package_page(
-    name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
+    name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: PagePaths
 ) -> ListingPage:
     entries = [
         ListingEntry(
@@ -166,7 +166,7 @@ def _package_entry(
 
 
 def _index(
-    packages: InterfacesByPackage, home: Mapping[str, str], pages: Pages, about: Abouts
+    packages: InterfacesByPackage, home: Mapping[str, str], pages: PagePaths, about: Abouts
 ) -> str:
     """Return the search index: names, pages, descriptions and the items of each, as JSON."""
     entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []

@@ -109,7 +109,7 @@ KINDS = {"msg": "message", "srv": "service", "action": "action"}
 _SECTIONS = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
 
 #: The pages by interface; a link from one page to another goes up one folder.
-Pages = Mapping[ir.TypeName, str]
+PagePaths = Mapping[ir.TypeName, str]
 
 #: Whitespace of a drawing: at the start of a line, or repeated without punctuation before it.
 _DRAWING = re.compile(r"(?m)^[ \t]|[^\s.,;:!?]([ ]{2,}|\t)\S")
@@ -192,7 +192,11 @@ class InterfacePage(NamedTuple):
 
 
 def page(
-    interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pages: Pages, home: Home
+    interface: ir.Interface,
+    model: Model,
+    users: Iterable[ir.TypeName],
+    pages: PagePaths,
+    home: Home,
 ) -> InterfacePage:
     """Return the page of an interface; `users` are the interfaces that refer to it."""
     own = interface.name
@@ -236,11 +240,11 @@ def blocks(lines: Sequence[str]) -> list[Paragraph]:
     ]
 
 
-def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
+def _link(target: ir.TypeName, text: str, pages: PagePaths) -> Link:
     return Link(pages.get(target, ""), str(target), words(text))
 
 
-def _section(title: str, message: ir.Message, before: str, pages: Pages) -> StructureView:
+def _section(title: str, message: ir.Message, before: str, pages: PagePaths) -> StructureView:
     package = message.name.package
     own = (message.constants, message.fields)
     named = {
@@ -256,7 +260,7 @@ def _table(
     elements: Sequence[ir.Field | ir.Constant],
     package: str,
     before: str,
-    pages: Pages,
+    pages: PagePaths,
     named: Mapping[str, str],
 ) -> FieldTable:
     rows = []

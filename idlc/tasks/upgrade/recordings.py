@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from idlc.api.upgrade import Runner, UpgradeError
 from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
+from idlc.diagnostics.terminal import Progress
 from idlc.model import ir
 from idlc.project.files import is_folder
 from idlc.project.find import RULES, is_address
@@ -43,17 +44,14 @@ from idlc.recordings.types import (
     versions,
 )
 from idlc.runtime.typeinfo import Structure
-from idlc.tasks.upgrade.targets import Target, compiled, target_of
-from idlc.versions.conversion import Finding, Plan, Version, make_plan
+from idlc.tasks.upgrade.targets import UpgradeTarget, compiled, target_of
+from idlc.versions.conversion import FieldFate, Plan, Version, make_plan
 from idlc.versions.converters import RunRules
 from idlc.versions.distribution import PREFIX
 from idlc.versions.exact import Payloads
 from idlc.versions.meanings import renumbered
 from idlc.versions.revision import GIT
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
-
-#: Called with a recording, and how much of it is done.
-Progress = Callable[[str, int, int], None]
 
 
 class UpgradeOptions(msgspec.Struct, frozen=True):
@@ -87,11 +85,11 @@ class TopicPlan(NamedTuple):
     several: bool = False
 
     @property
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[FieldFate]:
         """The fate of each field that changed."""
         if self.plan is None:
             reason = f"type `{self.type}` was removed: its messages do not change"
-            return [Finding("lost", "", self.type, "", reason)]
+            return [FieldFate("lost", "", self.type, "", reason)]
         return self.plan.findings()
 
     @property
@@ -100,7 +98,7 @@ class TopicPlan(NamedTuple):
         return "lost" if self.plan is None else self.plan.fate
 
 
-class Result(NamedTuple):
+class UpgradeResult(NamedTuple):
     """The plans of changed topics, the recordings that were written, and new files of rules.
 
     `undefined` are unchanged topics whose definitions the recording lacks, by its path.
@@ -112,9 +110,11 @@ class Result(NamedTuple):
     undefined: dict[str, list[tuple[str, Version]]]
 
 
-def upgrade_recordings(options: UpgradeOptions, report: Report, progress: Progress) -> Result:
+def upgrade_recordings(
+    options: UpgradeOptions, report: Report, progress: Progress
+) -> UpgradeResult:
     """Plan the upgrade of recordings, and write them unless something is in the way of it."""
-    result = Result([], [], [], {})
+    result = UpgradeResult([], [], [], {})
     with ExitStack() as opened:
         target = opened.enter_context(target_of(options.to, options.scope, report))
         local = _local(options, opened, report)
@@ -168,7 +168,7 @@ def _read(files: Iterable[Path], root: Root, report: Report) -> list[Rules]:
     return rules
 
 
-def _found(target: Target, named: Sequence[Rules], root: Root) -> list[Rules]:
+def _found(target: UpgradeTarget, named: Sequence[Rules], root: Root) -> list[Rules]:
     """Return the rules beside the target's messages that were not named."""
     folders = [str(home / RULES) for home in target.homes.values() if is_folder(home / RULES)]
     used = {rules.file.resolve() for rules in named}
@@ -179,7 +179,7 @@ def _found(target: Target, named: Sequence[Rules], root: Root) -> list[Rules]:
 def _plans(
     recording: str,
     options: UpgradeOptions,
-    target: Target,
+    target: UpgradeTarget,
     local: LocalTypes,
     rules: Known,
     report: Report,
@@ -241,7 +241,7 @@ def _check_lengths(
 def _of_types(
     recording: str,
     types: RecordedTypes,
-    target: Target,
+    target: UpgradeTarget,
     rules: Known,
     report: Report,
     undefined: list[tuple[str, Version]],
@@ -289,7 +289,7 @@ def _name_in(library: Any, old: Version, rules: Known) -> ir.TypeName | None:
     return None
 
 
-def _differs(old: Version, new: Version, target: Target) -> bool:
+def _differs(old: Version, new: Version, target: UpgradeTarget) -> bool:
     """Return whether types of one hash differ in comments or constants that the user wrote.
 
     The definitions of other packages stay as they were recorded.
@@ -317,7 +317,7 @@ def _renumbers(old: Version, new: Version) -> bool:
 def _judge(
     plans: Sequence[TopicPlan],
     options: UpgradeOptions,
-    target: Target,
+    target: UpgradeTarget,
     rules: Known,
     found: Sequence[Rules],
     report: Report,
@@ -365,7 +365,11 @@ def definition_of(version: Version) -> str:
 
 
 def _write(
-    result: Result, options: UpgradeOptions, run: RunRules, report: Report, progress: Progress
+    result: UpgradeResult,
+    options: UpgradeOptions,
+    run: RunRules,
+    report: Report,
+    progress: Progress,
 ) -> None:
     """Write each recording; report those that cannot be, and go on with the others."""
     from idlc.recordings.rewrite import mcap_name, rewrite

@@ -30,7 +30,7 @@ class _NewTypes(Library):
     """The types of a target, and of a recording for the packages that the target lacks."""
 
     def __init__(
-        self, target: Target, recorded: InterfaceTexts, *place: Any, **options: Any
+        self, target: UpgradeTarget, recorded: InterfaceTexts, *place: Any, **options: Any
     ) -> None:
         super().__init__(*place, **options)
         self._target = target
@@ -50,7 +50,7 @@ class _NewTypes(Library):
         return super().source(name) or self._recorded.get(name)
 
 
-class Target:
+class UpgradeTarget:
     """The types to upgrade to.
 
     `texts` are those of its own packages, whose folders are `homes`; `distro` is the distribution
@@ -97,18 +97,18 @@ class Target:
 
 
 @contextmanager
-def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[Target | None]:
+def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[UpgradeTarget | None]:
     """Give the types that `--to` means, such as those of a recording; `None` after an error."""
     if to is None:
         folders = inputs.nearby_packages(scope.root)
         homes = {package: places[0] for package, places in folders.items() if places}
-        yield Target(scope, {}, homes)
+        yield UpgradeTarget(scope, {}, homes)
     elif is_distro(to):
         name = to.removeprefix(PREFIX)
         if name not in BY_NAME:
             message = f"no such distribution: `{name}`"
             report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
-        yield Target(scope, {}, {}, distro=BY_NAME[name]) if name in BY_NAME else None
+        yield UpgradeTarget(scope, {}, {}, distro=BY_NAME[name]) if name in BY_NAME else None
     elif to.startswith(GIT):
         paths = scope.paths or (".",)
         with checked_out(to.removeprefix(GIT), paths[0], scope.root, report) as revision:
@@ -120,22 +120,24 @@ def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[Target |
         yield _of_files(find([to], scope.root, report, scope.exclude), scope, report)
 
 
-def _of_recording(path: str, scope: Scope, report: Report) -> Target | None:
+def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
     groups = versions(topics_of(read_source, [path], (), scope.root, report) or ())
     check_versions(groups, report)
     if report.had_errors:
         return None
-    return Target(scope, groups[0].texts if groups else {}, {})
+    return UpgradeTarget(scope, groups[0].texts if groups else {}, {})
 
 
-def _of_files(files: tuple[InterfaceFile, ...], scope: Scope, report: Report) -> Target | None:
+def _of_files(
+    files: tuple[InterfaceFile, ...], scope: Scope, report: Report
+) -> UpgradeTarget | None:
     packages = inputs.packages(files, scope, report)
     texts = {name: source for package in packages for name, source in sources_of(package, report)}
     if report.had_errors:
         return None
     whole = frozenset(package.package for package in packages if package.is_whole(scope.root))
     homes = {package.package: (package.folders or (package.home,))[0] for package in packages}
-    return Target(scope, texts, homes, whole)
+    return UpgradeTarget(scope, texts, homes, whole)
 
 
 def compiled(compiler: Compiler, names: set[ir.TypeName], report: Report) -> Any:
