@@ -99,7 +99,7 @@ def lsp_command(check: bool) -> int:
     The server implements the Language Server Protocol 3.17. It reads [tool.idlc] and the editor's
     settings. The language id of .msg, .srv and .action files is `rosmsg`.
     """
-    from idlc.cli.run.check import serve_editor, show_capabilities
+    from idlc.cli.run.lsp import serve_editor, show_capabilities
 
     return show_capabilities() if check else serve_editor()
 

@@ -46,7 +46,7 @@ def _dispatch(words: list[str]) -> int:
     if words[:1] == ["lsp"]:
         words = [word for word in words if not _is_added_by_editor(word)]
     if words == ["lsp"]:
-        from idlc.cli.run.check import serve_editor
+        from idlc.cli.run.lsp import serve_editor
 
         return status_of(serve_editor)
     from idlc.cli.app import run

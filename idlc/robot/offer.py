@@ -63,7 +63,7 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
 #: The modules of idlc that provide the names.
 _HOMES = (
     "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.node"
-    " robot.nodes.overriding robot.parameters robot.qos"
+    " robot.nodes.overrides robot.parameters robot.qos"
 ).split()
 #: The names that idlc gives to what has other names in rclpy.
 _ALIASES = {

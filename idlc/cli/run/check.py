@@ -1,4 +1,4 @@
-"""`idlc check` and `idlc lsp`, free of click."""
+"""`idlc check`, free of click."""
 
 from __future__ import annotations
 
@@ -96,29 +96,3 @@ def _show(checked: CheckResult, report: Report, *, diff: bool) -> None:
         star = paint("hint", "[*]")
         stream.write(f"{star} {counted(fixable, 'problem')} fixable with `--fix`\n")
     sys.stderr.writelines(f"note: {one_line(note)}\n" for note in checked.notes)
-
-
-def serve_editor() -> int:
-    """Serve the client at the other end of standard input and output; return the exit status."""
-    from idlc.editor.server import serve
-
-    if sys.stdin.isatty():
-        sys.stderr.write(
-            "the language server waits for an editor on standard input; press Ctrl-C to stop it\n"
-        )
-    # a thread may still read when the program ends, so it is not sys.stdin that it waits in, and
-    # what it waits in is never closed
-    reader = open(sys.stdin.fileno(), "rb", closefd=False)  # noqa: SIM115
-    # nor does anything stay in sys.stdout that cannot be written when the program ends
-    writer = open(sys.stdout.fileno(), "wb", closefd=False)  # noqa: SIM115
-    return serve(reader, writer)
-
-
-def show_capabilities() -> int:
-    """Write what the server can do; return the exit status."""
-    import json
-
-    from idlc.editor.protocol import initialize_result
-
-    sys.stdout.write(json.dumps(initialize_result({}), indent=2) + "\n")
-    return 0
