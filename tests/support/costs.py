@@ -134,14 +134,21 @@ def _of_children(process: int) -> float:
     """Return the CPU-seconds of processes that run, and of the children that they waited for."""
     total = 0.0
     for path in Path(f"/proc/{process}/task").glob("*/children"):
-        for child in path.read_text(encoding="ascii").split():
-            try:
-                stat = Path(f"/proc/{child}/stat").read_text(encoding="utf-8")
-            except FileNotFoundError:  # it ended meanwhile
+        for child in _read(path).split():
+            stat = _read(Path(f"/proc/{child}/stat"))
+            if not stat:
                 continue
             ticks = stat.rpartition(")")[2].split()[11:15]
             total += sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") + _of_children(int(child))
     return total
+
+
+def _read(path: Path) -> str:
+    """Return a file of /proc, empty if its process or thread ended meanwhile."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return ""
 
 
 def measured(folder: Path) -> dict[str, float]:

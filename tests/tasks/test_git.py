@@ -201,7 +201,7 @@ WAYS = {
     "half an answer": "head -c $((size / 2)) {folder}/answer",
     "all but the last bytes": "head -c $((size - 2)) {folder}/answer",
     "missing": f"printf '%s missing\\n' {' '.join(['0' * 40] * 9)}",
-    "another": "tr a0 b1 <{folder}/answer",
+    "another": "tr 0-9a-f 1-9a-f0 <{folder}/answer",
 }
 
 
