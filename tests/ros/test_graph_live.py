@@ -167,10 +167,12 @@ def test_who_does_not_answer_is_known_by_hash(start, look):
 
 def test_a_service_without_events_is_told_by_files(start, look, packages):
     start("one", "server", f"server:{GO}")
-    status, said = look(packages / "sources/two/demo_msgs")
+    status, said = look(packages / "sources/two/demo_msgs", patience="4")
     assert status == 1
     assert "service introspection" in said
-    status, said = look(packages / "sources/two/demo_msgs", "-I", packages / "sources/one")
+    status, said = look(
+        packages / "sources/two/demo_msgs", "-I", packages / "sources/one", patience="4"
+    )
     assert status == 1
     assert "field `to` changed from `float32` to `float64` (your files → `/server`)" in said
 
