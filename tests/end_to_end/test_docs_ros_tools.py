@@ -14,7 +14,10 @@ from tests.support.paths import DOCS, ROOT
 from tests.support.programs import ended
 
 TOOLS = (DOCS / "ros-tools.md").read_text(encoding="utf-8")
-PACKAGES = (DOCS / "ship-messages.md").read_text(encoding="utf-8").partition("## A package for")[2]
+PACKAGES = (
+    (DOCS / "ship-messages.md").read_text(encoding="utf-8").partition("\n## A package for")[2]
+)
+PACKAGES = PACKAGES.partition("\n## ")[0]
 #: Where pip and uv install for a test, with the idlc and hatchling of this environment.
 OFFLINE = {"PIP_NO_INDEX": "1", "PIP_NO_DEPS": "1", "PIP_NO_BUILD_ISOLATION": "0"}
 

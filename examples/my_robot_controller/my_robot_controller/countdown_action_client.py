@@ -1,4 +1,4 @@
-"""Sends goals to countdown."""
+"""Sends countdown goals."""
 
 import sys
 from typing import Any

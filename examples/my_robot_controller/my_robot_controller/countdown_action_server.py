@@ -1,4 +1,4 @@
-"""Executes goals of countdown."""
+"""Executes countdown goals."""
 
 from my_robot_controller.action import Countdown
 import rclpy

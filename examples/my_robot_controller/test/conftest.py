@@ -33,8 +33,8 @@ def observer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Observe
     rclpy.init()
     request.addfinalizer(rclpy.shutdown)
     node = Observer('observer')
+    request.addfinalizer(lambda: node.process.kill())
     node.start(request.module.NODE, tmp_path / 'log')
-    request.addfinalizer(node.process.kill)
     yield node
     node.process.send_signal(request.param)
     node.until(lambda: node.process.poll() == 0)
