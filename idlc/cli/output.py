@@ -36,7 +36,7 @@ def program() -> str:
 WIDTH = 30
 #: Characters of a type hash that people compare.
 SHORT = len("RIHS01_") + 8
-#: How text says whether the type of this machine is that of the recording or robot.
+#: The words of the column `installed`: is the installed type that of the recording or robot?
 INSTALLED = {"same": "same", "differs": "different", "unknown": "-"}
 #: The titles of columns that are aligned at the right.
 NUMBERS = frozenset({"messages", "rate", "size"})

@@ -53,7 +53,7 @@ class NumberStatistics:
 
     @property
     def is_constant(self) -> bool:
-        """Whether there are several numbers, and all of them are the same one."""
+        """True if there are several numbers, and all are equal."""
         same = self.least == self.greatest and abs(self.least) < EXACT
         return same and self.count > 1 and not self.others
 

@@ -105,10 +105,18 @@ def test_the_commands_shown_install_the_folder(tmp_path):
     assert len(list((tmp_path / "my_msgs" / "dist").iterdir())) == 2
 
 
+REPORT = """\
+error[IDL201]: unknown type `flot32`
+ --> msg/Drive.msg:1:1
+  |
+1 | flot32 speed
+  | ^^^^^^
+  = hint: did you mean `float32`?
+"""
+
+
 def test_a_build_reports_what_is_wrong(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(write(tmp_path / "my_msgs", {**FILES, "msg/Drive.msg": "flot32 speed\n"}))
     with pytest.raises(SystemExit):
         built(tmp_path)
-    assert (
-        "error[IDL201]: unknown type `flot32`\n --> msg/Drive.msg:1:1\n" in capfd.readouterr().err
-    )
+    assert REPORT in capfd.readouterr().err

@@ -255,7 +255,7 @@ def test_mutated_containers_are_rewritten_or_an_error(tmp_path):
                     assert Counter(written) <= Counter(wanted), number
                 else:
                     assert written == sorted(wanted), number
-                assert sum(one.messages for one in rewritten.topics.values()) == len(written)
+                assert sum(topic.messages for topic in rewritten.topics.values()) == len(written)
             target.unlink()
         assert path.read_bytes() == before
         assert sorted(one.name for one in tmp_path.iterdir()) == ["mutated", "sound"]

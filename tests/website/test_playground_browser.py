@@ -218,15 +218,22 @@ def test_a_link_of_another_form_is_not_used(playground):
 def test_it_starts_and_answers_quickly(playground, record_property):
     playground.open()
     playground.page.until("document.body.dataset.offline")
-    ratios = []
-    while not ratios or min(ratios) >= MOST_STARTS:
-        assert len(ratios) < MEASUREMENTS, ratios
-        playground.open()
-        bare, first = (
-            float(playground.page.run(f"document.body.dataset.{name}"))
-            for name in ("bare", "first")
-        )
-        ratios.append(first / bare)
+    for left in reversed(range(MEASUREMENTS)):
+        bare, first, key = measured(playground)
+        print(f"Python {bare:.0f} ms, first problem {first:.0f} ms, key to problem {key:.0f} ms")
+        # 100 ms on a machine that starts Python in two seconds
+        if not left or (first < MOST_STARTS * bare and key < bare / 20):
+            break
+    record_property("milliseconds", {"python": bare, "first problem": first, "key": key})
+    assert first < MOST_STARTS * bare
+    assert key < bare / 20
+
+
+def measured(playground):
+    """Return the milliseconds of a start of Python, up to the first problem, and after a key."""
+    playground.open()
+    bare = float(playground.page.run("document.body.dataset.bare"))
+    first = float(playground.page.run("document.body.dataset.first"))
     playground.at_end()
     times = []
     for number in range(KEYS):
@@ -236,8 +243,4 @@ def test_it_starts_and_answers_quickly(playground, record_property):
         times.append(
             playground.page.until("performance.getEntriesByName('problems')[0]?.startTime") - before
         )
-    key = statistics.median(times)
-    record_property("milliseconds", {"python": bare, "first problem": first, "key": key})
-    print(f"Python {bare:.0f} ms, first problem {first:.0f} ms, key to problem {key:.0f} ms")
-    # 100 ms on a machine that starts Python in two seconds
-    assert min(times) < bare / 20
+    return bare, first, statistics.median(times)

@@ -173,15 +173,9 @@ def router(listen: tuple[str, ...], connect: tuple[str, ...]) -> int:
 
 
 ROBOT_HEAD = ("", "name", "type", "hash", "installed", "from", "to", "QoS")
-
-
-#: Nodes, profiles and mismatches that text lists.
+#: Nodes and profiles that a row of the table lists, and mismatches that text lists.
 LISTED = 3
-
-
 MISMATCHES = 20
-
-
 #: Pairs of endpoints that JSON lists.
 MOST_MISMATCHES = 1000
 

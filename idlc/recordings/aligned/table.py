@@ -487,7 +487,7 @@ def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
         for places in (each.first, each.second)
     )
     blended = pa.array(np.flatnonzero((each.first >= 0) & (each.weight != 0)))
-    for name, label in track.labels:
+    for label, name in {label: name for name, label in track.labels}.items():
         at = names.index(label)
         if not first[at].take(blended).equals(second[at].take(blended)):
             what = f"the elements of `{track.topic}.{name}` change: `{label}` names others"

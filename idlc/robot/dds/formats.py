@@ -146,7 +146,7 @@ class Remote:
 
 
 class Shared:
-    """What the ends of a participant share: the time, packets to send, and room for samples.
+    """The state that the endpoints of a participant share: time, packets to send, room for samples.
 
     `fragment` returns the most bytes of a fragment for a host. Of the room, a participant gets at
     most as much as is left for the others.

@@ -18,7 +18,7 @@ _OVERHEAD = 256
 _AHEAD = 256
 _MOST_PARTIAL = 8
 _MOST_REMEMBERED = 256
-#: Seconds until a writer is told that nothing is missing, and between two answers.
+#: Seconds until a reader acknowledges samples, and between two acknowledgements.
 _ANSWER = 0.01
 
 

@@ -77,7 +77,7 @@ class _Client:
 
 
 class _Waiting(NamedTuple):
-    """What is sent as soon as the other side is matched, or given up."""
+    """A message to send as soon as the other side is matched; it is given up at `end`."""
 
     is_matched: Callable[[], bool]
     send: Callable[[], None]

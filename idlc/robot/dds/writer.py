@@ -18,7 +18,7 @@ MOST_HISTORY = 256 << 20
 
 
 class RemoteReader(Remote):
-    """What a writer knows of a reader: the size of fragments, and the first number it lacks."""
+    """A matched reader: the size of its fragments, and the first number that it lacks."""
 
     def __init__(self, guid: bytes, address: Address, reliable: bool, size: int, base: int) -> None:
         super().__init__(guid, address, reliable)
