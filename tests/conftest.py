@@ -1,3 +1,4 @@
+import faulthandler
 import gc
 import json
 import os
@@ -24,6 +25,11 @@ waiting.limit_programs()
 CACHE = tempfile.TemporaryDirectory(prefix="idlc-cache-")
 os.environ["IDLC_CACHE"] = CACHE.name
 
+# Seconds until a process is ended whose test hangs in machine code: pytest-timeout cannot end it.
+HANG = 400
+# A copy of the standard error, which pytest replaces while a test runs.
+STDERR = pytest.StashKey[int]()
+
 # Where pytest keeps the names of the tests that passed in the last run, for --left-out.
 PASSED = "idlc/passed"
 
@@ -40,6 +46,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    config.stash[STDERR] = os.dup(2)
     if config.getoption("tier") == "long":
         os.environ.setdefault("IDLC_ROUNDS", "1")
     runs_tests = hasattr(config, "workerinput") or not config.getoption("numprocesses", None)
@@ -69,6 +76,17 @@ def pytest_collection_modifyitems(config, items):
     if selected is not items:
         config.hook.pytest_deselected(items=list(set(items).difference(selected)))
         items[:] = selected
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item):
+    """Print where the threads of a test that hangs are, and end this process."""
+    if item.config.getoption("timeout") != 0 and not item.get_closest_marker("timeout"):
+        faulthandler.dump_traceback_later(HANG, exit=True, file=item.config.stash[STDERR])
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def pytest_collection_finish():
