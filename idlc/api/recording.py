@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from idlc.model.distros import BY_NAME, unknown_distro
 from idlc.recordings.columns.arrow import arrow
+from idlc.recordings.columns.elements import ElementError
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
@@ -460,6 +461,10 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: Any = 0) -> Iterator
     """
     try:
         yield
+    except ElementError as unclear:
+        place = done + unclear.row if isinstance(done, int) else done[unclear.row]
+        what = f"message {place} of `{topic.name}`: {unclear.problem}"
+        raise RecordingError(what, "select elements by index, such as `position[0]`") from unclear
     except ValueError as caught:
         error: Any = caught
         if not hasattr(error, "problem"):  # each package has a DecodeError of its own
@@ -678,7 +683,8 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         >>> topics = {"/camera/image": None, "/joint_states": ["position", "velocity"]}
         >>> recording.aligned(topics, on="/camera/image", tolerance="50ms").to_arrow()
 
-        `topics` has the fields of each topic, None for all. The value of a tick is that of the
+        `topics` has the fields of each topic, None for all, or elements of lists, such as
+        `position.elbow` by name or `covariance[0]` by index. The value of a tick is that of the
         `last` message until then, or of the `nearest`, or `linear` between two. It is null without
         a message within `tolerance`. The `clock` of messages is `log`, or `header` for the stamp of
         their header. These three are for all topics, or a mapping has them by topic. Lengths of

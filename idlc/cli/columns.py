@@ -42,7 +42,7 @@ from idlc.cli import completion, options
 @click.option(
     "--fields",
     metavar="FIELD,...",
-    help="Select fields, such as `header.stamp,linear_acceleration`.",
+    help="Select fields, such as `header.stamp,position.elbow`.",
 )
 @click.option(
     "--from",

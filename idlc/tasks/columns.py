@@ -26,6 +26,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model.ir import DUMMY_FIELD
+from idlc.recordings.columns.elements import MissingElementWarning
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.recordings.types import BORROWED, NAMED, damage_problems
@@ -280,6 +281,8 @@ def columns(
         for message in (warning.message for warning in caught):
             if isinstance(message, OtherDefinitionWarning):
                 report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
+            if isinstance(message, MissingElementWarning):
+                report.notes += (str(message),)
             if isinstance(message, MissingDefinitionWarning):
                 missing.setdefault(message.message, []).append(f"`{message.topic}`")
         for problem, topics in missing.items():

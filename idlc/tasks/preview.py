@@ -117,7 +117,8 @@ class Preview:
             first = _texts(column.slice(0, missing), plain)
             self.firsts[name] += ["" if text is None else f"{mark}{text}{mark}" for text in first]
             if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
-                values = column.to_numpy(zero_copy_only=False).astype(np.float64)
+                numbers = column.cast(pa.float64(), safe=False)
+                values = numbers.to_numpy(zero_copy_only=False)
                 with np.errstate(over="ignore", invalid="ignore"):
                     self.numbers.setdefault(name, NumberStatistics()).add(values, intervals)
 

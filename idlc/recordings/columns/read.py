@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from idlc.recordings.columns.elements import selected
 from idlc.recordings.columns.plan import PlanLevel, plan_of
 from idlc.recordings.columns.scan import (
     Cursors,
@@ -77,13 +78,18 @@ def to_columns(
 ) -> Columns:
     """Return the columns of messages, which may have a way of their own; raise DecodeError.
 
+    Elements of lists, such as `position.elbow` or `covariance[0]`, can be among the fields.
     `on_unread` gets the number of bytes that are left in each message, where all fields are read.
     """
     wanted = (fields,) if isinstance(fields, str) else fields
+    selection = None
+    if wanted is not None:
+        selection = selected(type_of(kind), tuple(wanted))
+        wanted = selection.needed
     if hasattr(messages, "columns"):
         columns: Columns = messages.columns(kind, wanted)
     else:
-        plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted))
+        plan = plan_of(type_of(kind), wanted)
         located = messages_of(messages)
         try:
             table, top, unread = _read(plan, located)
@@ -92,6 +98,8 @@ def to_columns(
         if on_unread is not None and plan.whole:
             on_unread(unread)
         columns = table.columns(top)
+    if selection is not None and selection.elements:
+        columns = selection.columns(columns)
     return columns.dated() if datetimes else columns
 
 
