@@ -374,6 +374,7 @@ class Selection:
         """Return a table of Arrow: log_time, publish_time and the fields of the messages.
 
         Options are those of `to_arrow` of messages: `fields`, `flat`, `datetimes`, `dictionary`.
+        With `each`, a list of messages such as `transforms`, the rows are its elements.
         """
         pa = arrow()
         source = self._source(kind)
@@ -407,17 +408,23 @@ def _names(fields: list[str]) -> list[str]:
 
 def _table(source: Any, options: Any, batch: TopicMessages | None = None) -> pa.Table:
     """Return the table of some messages, or of none, with their times in front."""
-    from idlc.recordings.columns import to_arrow
+    from idlc.recordings.columns import to_arrow, to_rows
 
-    pa = arrow()
+    pa, kind, rows = arrow(), arrow().timestamp("ns"), None
     batch = join_messages([]) if batch is None else batch
-    table, kind = to_arrow(source, batch, **options), pa.timestamp("ns")
+    options = dict(options)
+    each = options.pop("each", None)
+    if each is None:
+        table = to_arrow(source, batch, **options)
+    else:
+        table, rows = to_rows(source, batch, each, **options)
     names = _names(table.column_names)
     for name, times in zip(names[::-1], (batch.publish_times, batch.log_times), strict=True):
         if times is None:
             column = pa.nulls(len(batch), kind)
         else:
             column = pa.Array.from_buffers(kind, len(batch), [_known(times), pa.py_buffer(times)])
+        column = column if rows is None else column.take(rows)
         table = table.add_column(0, pa.field(name, kind), column)
     return table
 

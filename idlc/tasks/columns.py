@@ -225,6 +225,7 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
     start: str | None = None
     end: str | None = None
     conditions: tuple[Condition, ...] = ()
+    each: str | None = None
     nested: bool = False
     datetimes: bool = True
     check: bool | None = None
@@ -418,7 +419,9 @@ def _written(
     try:
         for condition in options.conditions:
             topic = topic.where(*condition)
-        reader = topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
+        reader = topic.to_reader(
+            fields=options.fields, flat=flat, datetimes=options.datetimes, each=options.each
+        )
     except ValueError as error:
         hint = f"`idlc show {options.recordings[0]} {name}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
@@ -434,7 +437,8 @@ def _written(
             report.notes += (f"{name}: {topic.absent:,} messages do not have a field of --where",)
 
     if job.style == TEXT:
-        preview = Preview(f"{name}  {job.topic.topic.type}", reader.schema.names)
+        title = f"{name}  {job.topic.topic.type}"
+        preview = Preview(title, reader.schema.names, "row" if options.each else "message")
         for batch in counted():
             preview.add(batch, plain)
         yield WrittenFile(name, job.path, rows, preview)

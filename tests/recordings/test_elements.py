@@ -177,3 +177,37 @@ def test_a_name_that_no_message_has_is_noted(here, capfd):
     grid = ["columns", "a.mcap", "/joints:position.wrist,position[0]", "--grid", "/joints"]
     assert main([*grid, "-o", "b.csv"]) == 0
     assert (here / "b.csv").read_text(encoding="utf-8").splitlines()[1].endswith(",2,1,0")
+
+
+def test_each_element_of_a_list_of_messages_is_a_row(here, capfd):
+    found = [message for message in made.varied(30) if message.topic in ("/TFMessage", "/Path")]
+    made.by_mcap(here / "a.mcap", found, chunk_size=800)
+    fields = ["child_frame_id", "transform.rotation"]
+    wanted = []
+    for message in (message for message in found if message.topic == "/TFMessage"):
+        for each in made.STORE.deserialize_cdr(message.data, message.type).transforms:
+            turn = made.plain(each.transform.rotation)
+            row = {"log_time": message.log_time, "child_frame_id": each.child_frame_id}
+            wanted.append(row | {f"transform.rotation.{axis}": turn[axis] for axis in "xyzw"})
+    assert len(wanted) > 20
+    with idlc.Recording("a.mcap") as recording:
+        tf = recording["/TFMessage"]
+        options = {"each": "transforms", "flat": True, "datetimes": True}
+        table = tf.to_arrow(fields=fields, **options)
+        table = table.set_column(0, "log_time", table["log_time"].cast(pa.int64()))
+        assert table.drop_columns("publish_time").to_pylist() == wanted
+        whole = tf.to_reader(**options).read_all()
+        nested = tf.to_arrow(each="transforms")
+        assert nested["transform"].type.field("rotation").type.field("x").type == pa.float64()
+        for name in ("header", "transforms.header", "x"):
+            with pytest.raises(ValueError, match=f"`{name}`|no field '{name}'"):
+                tf.to_arrow(each=name)
+        assert recording["/Path"].to_arrow(each="poses", fields="pose").num_rows > 20
+    words = ["columns", "a.mcap", "/TFMessage", "--each", "transforms"]
+    assert main([*words, "-o", "tf.parquet"]) == 0
+    assert f"/TFMessage: {len(wanted)} rows → tf.parquet" in capfd.readouterr().err
+    assert parquet.read_table("tf.parquet").equals(whole)
+    assert main([*words, "--format", "text"]) == 0
+    assert f"tf2_msgs/msg/TFMessage  {len(wanted)} rows in " in capfd.readouterr().out
+    assert main([*words[:3], "--each", "transform", "-o", "b.parquet"])
+    assert "has no field 'transform'; did you mean 'transforms'" in capfd.readouterr().err

@@ -6,7 +6,7 @@ structured arrays of what is there (`source.py`), and `arrow.py` tables of Arrow
 takes elements of lists, and `values.py` has the types that are returned.
 """
 
-from idlc.recordings.columns.arrow import to_arrow
+from idlc.recordings.columns.arrow import to_arrow, to_rows
 from idlc.recordings.columns.read import to_columns, unread_bytes
 
-__all__ = ["to_arrow", "to_columns", "unread_bytes"]
+__all__ = ["to_arrow", "to_columns", "to_rows", "unread_bytes"]
