@@ -20,6 +20,7 @@ from idlc.recordings.containers.container import Container, Topic, open_pieces, 
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
+    END_OF_TIME,
     NO_TIME,
     Raw,
     TopicMessages,
@@ -735,7 +736,15 @@ class RecordedTopic(Selection):
         self.window = window
 
     def __repr__(self) -> str:
-        return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
+        topic, name = self.topic, self._container.name
+        if self.window != ALWAYS or self.options.conditions:
+            return f"<part of {topic.name} in {name}: {topic.type}>"
+        text = f"<{topic.name} in {name}: {topic.type}, {topic.count:,} messages"
+        start, end = self._container.span() or (0, 0)
+        if start < end < END_OF_TIME and topic.count > 1:
+            seconds = (end - start) / 1e9
+            text += f" in {seconds:,.1f} s, {(topic.count - 1) / seconds:,.1f} per second"
+        return f"{text}>"
 
     def between(self, start: Any = None, end: Any = None, *, by: str = "") -> RecordedTopic:
         """Return those of a time: from `start`, until before `end`.
