@@ -241,10 +241,12 @@ class Selection:
             warnings.warn(problem, OtherDefinitionWarning, stacklevel=4)
 
     def _on_unread(self, kind: Any, batch: TopicMessages) -> Callable[[Any], None]:
-        """Return what judges messages whose lengths were compared as they were read."""
-        self.compare_lengths(batch, kind)
+        """Return what judges messages by the bytes that reading them left, if that is known."""
 
         def judge(unread: Any) -> None:
+            if unread is None:
+                self.compare_lengths(batch, kind)
+                return
             longer = np.flatnonzero(unread > MOST_PADDING)[:SAMPLE].tolist()
             if longer and not self._differs:
                 views = batch.views()

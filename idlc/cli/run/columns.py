@@ -17,7 +17,6 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.root import Root
 from idlc.recordings.find import expand, in_order, split_recordings
-from idlc.tasks.aligned import Grid, write_aligned
 from idlc.tasks.columns import ColumnsOptions, Work, columns
 
 if TYPE_CHECKING:
@@ -69,6 +68,8 @@ def _table_of(
     grid: str, ways: tuple[tuple[str, ...], ...], has_others: bool, arguments: dict[str, Any]
 ) -> Work:
     """Return what writes the table of --grid, or report options that it does not have."""
+    from idlc.tasks.aligned import Grid, write_aligned  # other tables do not need it
+
     if has_others or not arguments["datetimes"]:
         hint = "select fields after a colon: `/imu:orientation`"
         raise click.UsageError(
