@@ -215,19 +215,27 @@ def _sort_imports(old: str, new: str) -> str:
     imports = [node for node in nodes if _module(node) != "__future__"]
     if not imports:
         return new
+    _insert_imports(rest, imports, sorted(added), line_end(Source("", new)))
+    return "".join(rest)
+
+
+def _insert_imports(
+    lines: list[str], imports: Sequence[ast.Import | ast.ImportFrom], added: list[str], end: str
+) -> None:
+    """Insert sorted imports of the standard library into lines that have others."""
     block = [*takewhile(lambda node: _module(node).partition(".")[0] in _STANDARD, imports)]
     if not block:
-        at = imports[0].lineno - 1
-        return "".join([*rest[:at], *sorted(added), line_end(Source("", new)), *rest[at:]])
+        first = imports[0].lineno - 1
+        lines[first:first] = [*added, end]
+        return
     plain = [*takewhile(lambda node: isinstance(node, ast.Import), block)]
     rivals = block[len(plain) :]
     if any(isinstance(node, ast.Import) for node in rivals):
         rivals = block  # the linters of ROS 2 sort both forms of imports together
-    for line in sorted(added, reverse=True):
+    for line in reversed(added):
         name = line.split()[1]
         later = (node.lineno - 1 for node in rivals if _module(node) > name)
-        rest.insert(next(later, block[-1].end_lineno or 0), line)
-    return "".join(rest)
+        lines.insert(next(later, block[-1].end_lineno or 0), line)
 
 
 def _imports_standard(line: str) -> bool:
