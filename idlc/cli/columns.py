@@ -71,7 +71,8 @@ from idlc.cli import completion, options
     metavar="WAY",
     multiple=True,
     help="With --grid: take the `last` message before a row, the `nearest`, or a value between two "
-    "(`linear`). For one topic only, write `/imu=linear`. --tolerance and --clock accept this, too.",
+    "(`linear`). For one topic only, write `/imu=linear`. --tolerance and --clock accept this, "
+    "too.",
 )
 @click.option(
     "--tolerance",
