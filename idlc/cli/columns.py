@@ -42,7 +42,7 @@ from idlc.cli import completion, options
 @click.option(
     "--fields",
     metavar="FIELD,...",
-    help="Select fields, such as `header.stamp,linear_acceleration`.",
+    help="Select fields, such as `header.stamp,position.elbow`.",
 )
 @click.option(
     "--from",
@@ -84,6 +84,12 @@ from idlc.cli import completion, options
     metavar="CLOCK",
     multiple=True,
     help="With --grid: use the time of recording (`log`) or of `header.stamp` (`header`).",
+)
+@click.option(
+    "--each",
+    metavar="FIELD",
+    help="Write a row for each element of a list of messages, such as `transforms`, instead of for "
+    "each message. --fields are those of an element.",
 )
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(

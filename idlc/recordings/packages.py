@@ -15,7 +15,7 @@ from idlc.diagnostics.text import including
 from idlc.model import ir
 from idlc.model.link import Model, own_sections
 from idlc.model.lowering.lower_types import constant_name, field_name
-from idlc.project import inputs, prefixes, write
+from idlc.project import inputs, prefixes
 from idlc.project.library import InterfaceTexts
 from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
@@ -139,6 +139,8 @@ def write_definitions(
 
     Files that exist with another content are an error, and nothing is written.
     """
+    from idlc.project import write  # all readers of recordings import this module
+
     groups = versions(topics_of(read, [recording], topics, scope.root, report) or ())
     check_versions(groups, report)
     if report.had_errors:

@@ -34,8 +34,10 @@ from idlc.recordings.containers.conversion import (
     Conversions,
     Recorded,
     RewrittenTopic,
+    RewrittenTopics,
 )
 from idlc.recordings.containers.db3_to_mcap import as_mcap
+from idlc.recordings.containers.file import full_name
 from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes
 from idlc.recordings.damage import Damage, DamageList
 
@@ -46,10 +48,18 @@ ATTEMPTS = 3
 
 
 class Rewritten(NamedTuple):
-    """The fate of each topic of a recording, and the parts that are damaged."""
+    """The fate of each definition of a recording's topics, and the parts that are damaged."""
 
-    topics: dict[str, RewrittenTopic]
+    definitions: RewrittenTopics
     damage: tuple[Damage, ...]
+
+    @property
+    def topics(self) -> dict[str, RewrittenTopic]:
+        """The fate of each topic."""
+        topics: dict[str, RewrittenTopic] = {}
+        for (name, _), fate in self.definitions.items():
+            topics[name] = topics.get(name, RewrittenTopic()).plus(*fate)
+        return topics
 
 
 #: The files that SQLite has beside a database, whose content is in the copy of that.
@@ -95,7 +105,7 @@ def rewrite(
                     os.fsync(file.fileno())
         with uninterrupted():
             move_new(draft, end)
-    return Rewritten(rewriting.topics, tuple(rewriting.damage))
+    return rewriting.result
 
 
 @contextmanager
@@ -137,7 +147,7 @@ def _remove_abandoned(target: Path) -> None:
 
 
 class _Rewriting:
-    """The files of one recording; `topics` sums up what was written."""
+    """The files of one recording; `definitions` sums up what was written."""
 
     def __init__(
         self, conversions: Conversions, index: bool, progress: Progress, strict: bool
@@ -147,13 +157,18 @@ class _Rewriting:
         self.progress = progress
         self.recorded: dict[str, Recorded] = {}
         self.strict = strict
-        self.topics: dict[str, RewrittenTopic] = {}
+        self.definitions: RewrittenTopics = {}
         self.damage: list[Damage] = []
+
+    @property
+    def result(self) -> Rewritten:
+        """What was written until now."""
+        return Rewritten(self.definitions, tuple(self.damage))
 
     @property
     def messages(self) -> int:
         """The number of messages that were written."""
-        return sum(topic.messages for topic in self.topics.values())
+        return sum(topic.messages for topic in self.definitions.values())
 
     def file(self, path: Path, target: Path) -> None:
         """Write a file."""
@@ -175,11 +190,16 @@ class _Rewriting:
                     path, file, self.conversions, self.recorded, self.index, progress, damage
                 )
         self.damage += damage
-        for name, own in topics.items():
-            before = self.topics.get(name, RewrittenTopic(0, 0, own.converted))
-            count, size = before.messages + own.messages, before.size + own.size
-            is_converted = own.converted or before.converted
-            self.topics[name] = RewrittenTopic(count, size, is_converted)
+        for key, fate in topics.items():
+            self.definitions[key] = self.definitions.get(key, RewrittenTopic()).plus(*fate)
+
+    def _new_type(self, topic: str, kind: str) -> tuple[str, str] | None:
+        """Return the new name and hash of a topic's type, and `None` if it does not change."""
+        found = self.conversions.get(topic, ())
+        for each in reversed((found,) if isinstance(found, Conversion) else found):
+            if each.old is None or each.old[0] == full_name(kind):
+                return each.type, each.type_hash
+        return None
 
     def packed(self, path: Path, target: Path) -> None:
         """Write a file that is compressed as a whole; the new one is not."""
@@ -213,10 +233,6 @@ class _Rewriting:
         paths = bag_files.paths
         self.damage += bag_files.missing
         beside = {f"{path.name}{suffix}" for path in paths for suffix in BESIDE}
-        types: dict[str, tuple[str, str]] = {}
-        for name, new in self.conversions.items():
-            last = new if isinstance(new, Conversion) else new[-1]
-            types[name] = last.type, last.type_hash
         target.mkdir()
         counts: dict[str, int] = {}
         for path in sorted(folder.iterdir()):
@@ -230,12 +246,12 @@ class _Rewriting:
         metadata = folder / bag.METADATA
         if not metadata.is_file():
             return
-        data = bag.retyped(metadata, types)
+        data = bag.retyped(metadata, self._new_type)
         if data is None:
             _copy(metadata, target / bag.METADATA)
             return
         if self.damage:
-            by_topic = {name: topic.messages for name, topic in self.topics.items()}
+            by_topic = {name: topic.messages for name, topic in self.result.topics.items()}
             data = bag.recounted(data, by_topic, counts)
         is_mcap = all(path.suffix == ".mcap" for path in paths)
         data = data if is_mcap else as_mcap(data.decode()).encode()

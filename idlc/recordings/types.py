@@ -26,7 +26,7 @@ from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.file import CDR, UnreadTopic
+from idlc.recordings.containers.file import CDR, Topic, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.damage import Damage
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
@@ -51,7 +51,7 @@ class RecordingSummary(NamedTuple):
 
     span: tuple[int, int] | None
     size: int
-    sizes: dict[str, int]
+    sizes: dict[Topic, int]
 
 
 #: Reports list so much damage of a recording.

@@ -240,7 +240,7 @@ def recording(
         for recorded in version.topics:
             topic, compiled = recorded.topic, hashes.get(id(recorded))
             rate = (topic.count - 1) / seconds if seconds and topic.count > 1 else None
-            size_of_topic = sizes.get(topic.name)
+            size_of_topic = sizes.get(topic)
             facts.append(_topic_facts(recorded, compiled, local, rate, size_of_topic))
     facts.sort(key=lambda row: (row.name, row.type_name))
     if recording.summary is None:

@@ -100,6 +100,16 @@ def test_unread_bytes_are_an_error_where_another_version_fits(name, tmp_path, mo
     assert "fits" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("way", ["to_columns", "to_arrow", "between", "parts"])
+def test_messages_are_judged_as_they_are_read(way, tmp_path, monkeypatch):
+    """Those of which all fields are read are not read twice."""
+    path = write(tmp_path / "a.mcap", [(("demo_msgs/msg/W", "uint8 a\n"), 0, cdr("<B", 1))])
+    twice = []
+    monkeypatch.setattr("idlc.recordings.columns.unread_bytes", lambda *_: twice.append(way))
+    read(path, way)
+    assert not twice
+
+
 def test_a_message_of_another_version_among_others_is_a_warning(tmp_path):
     text = "demo_msgs/msg/W", "uint8 a\n"
     channels = [(text, n, cdr("<B", 1)) for n in range(200)]

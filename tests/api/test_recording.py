@@ -384,7 +384,11 @@ def test_messages_show_the_names_of_generated_ones(tmp_path):
             "/joints        sensor_msgs/msg/JointState  20",
             "/camera/image  sensor_msgs/msg/Image       20",
         ]
-        assert repr(recording["/imu"]) == f"</imu of {path}, sensor_msgs/msg/Imu>"
+        topic = recording["/imu"]
+        rate = "20 messages in 5.9 s, 3.2 per second"
+        assert repr(topic) == f"</imu in {path}: sensor_msgs/msg/Imu, {rate}>"
+        for part in (topic.between("1", "2"), topic.where("linear_acceleration.z", ">", 0)):
+            assert repr(part) == f"<part of /imu in {path}: sensor_msgs/msg/Imu>"
     assert repr(message).startswith("sensor_msgs.msg.Imu(header=std_msgs.msg.Header(stamp=builtin")
     assert "loaded" not in repr(message)
     assert "loaded" not in pretty(message)

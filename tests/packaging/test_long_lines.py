@@ -5,7 +5,7 @@ import ast
 import pytest
 
 from idlc.cli.main import main
-from idlc.packaging.setup_edits import wrap_lines
+from idlc.packaging.setup_edits import arrange
 
 LONG = ", ".join(f"'name_{n} = demo.module_{n}:main'" for n in range(6))
 LINES = {
@@ -24,7 +24,7 @@ LINES = {
 @pytest.mark.parametrize("name", LINES)
 def test_long_lists_are_wrapped(name):
     text = LINES[name]
-    new = wrap_lines("", text)
+    new = arrange("", text)
     bare = [one.removeprefix("\ufeff") for one in (text, new)]
     assert ast.dump(ast.parse(bare[0])) == ast.dump(ast.parse(bare[1]))
     assert new.count("#") == text.count("#")
@@ -32,14 +32,14 @@ def test_long_lists_are_wrapped(name):
     assert new.replace("\r\n", "\n").count("\r") == 0
     if name != "parentheses":
         assert all(len(line) <= 99 for line in new.splitlines())
-    assert wrap_lines("", new) == new
+    assert arrange("", new) == new
 
 
 @pytest.mark.parametrize(
     "text", [f"x = f(y for y in [{'1' * 99}])\n", f"x = '{'1' * 99}'\n", f"x = [{LONG}\n", "", "\f"]
 )
 def test_what_cannot_be_wrapped_stays(text):
-    new = wrap_lines("", text)
+    new = arrange("", text)
     assert new == text or ast.dump(ast.parse(new)) == ast.dump(ast.parse(text))
 
 
@@ -47,13 +47,13 @@ def test_what_cannot_be_wrapped_stays(text):
 def test_deep_code_stays_or_is_wrapped(depth):
     """Python compares as deep as its recursion limit allows, which libraries may have raised."""
     text = f"x = [{'1+' * depth}1]\n"
-    new = wrap_lines("", text)
+    new = arrange("", text)
     assert new in (text, f"x = [\n    {'1+' * depth}1,\n]\n")
 
 
 @pytest.mark.parametrize("text", LINES.values())
 def test_lines_of_the_user_stay(text):
-    assert wrap_lines(text, f"import os\n{text}") == f"import os\n{text}"
+    assert arrange(text, f"import os\n{text}") == f"import os\n{text}"
 
 
 @pytest.mark.parametrize("command", ["check", "node"])
@@ -79,3 +79,39 @@ def test_commands_write_no_long_lines(command, tmp_path, monkeypatch):
         assert name in setup.read_text()
     assert all(len(line) <= 99 for line in setup.read_text().splitlines())
     ast.parse(setup.read_text())
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("", "from glob import glob\nfrom runpy import run_path\n\n"),
+        ("# words\n\n", "# words\n\nfrom glob import glob\nfrom runpy import run_path\n\n"),
+        ("import os\n\n", "import os\nfrom glob import glob\nfrom runpy import run_path\n\n"),
+        (
+            "import abc\nfrom os import path\nimport sys\n\n",
+            """import abc
+from glob import glob
+from os import path
+from runpy import run_path
+import sys
+
+""",
+        ),
+        (
+            "from __future__ import annotations\n\nimport sys\nfrom os import path\n\n",
+            """from __future__ import annotations
+
+import sys
+from glob import glob
+from os import path
+from runpy import run_path
+
+""",
+        ),
+    ],
+)
+def test_new_imports_stand_where_a_formatter_has_them(old, new):
+    rest = "from setuptools import setup\n\nsetup()\n"
+    added = "from runpy import run_path\nfrom glob import glob\n"
+    assert arrange(old + rest, f"{old}{added}{rest}") == new + rest
+    assert arrange(old + rest, old + rest) == old + rest

@@ -183,6 +183,7 @@ def test_parameters_of_the_command_line(start, tmp_path):
 
 #: A node of each kind that ROS 2's examples have, in one program; it prints what rclpy lets it.
 KINDS = """\
+import sys
 import time
 
 import rclpy
@@ -196,6 +197,11 @@ from rclpy.lifecycle import Node, Publisher, State, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos_overriding_options import QosCallbackResult, QoSOverridingOptions
 from std_msgs.msg import String
+
+
+def print(*words):
+    # lines of several threads stay whole
+    sys.stdout.write(" ".join(map(str, words)) + "\\n")
 
 
 class Managed(Node):

@@ -1,10 +1,13 @@
 """Upgrades of recordings with several versions, without definitions, and to another recording."""
 
+import json
+import re
+
 import pytest
 
 import idlc
 from idlc.cli.main import main
-from tests.api.test_lengths import humble_range, write_db3
+from tests.api.test_lengths import cdr, humble_range, write_db3
 from tests.api.test_versions_together import P1, P2, SAME, body, new, old, same, write
 from tests.tasks.test_upgrade import write_package
 
@@ -48,6 +51,47 @@ def test_what_did_not_change_is_said(files, capsys):
     write_package(files / "other", {"X": "uint8 x\n"}, "other_msgs")
     assert main(["upgrade", "2023.mcap", "--to", "other/other_msgs", "-o", "up"]) == 0
     assert capsys.readouterr().out == "2023.mcap → up/2023.mcap\n  no types changed\n"
+
+
+#: Texts of two types on one topic, and those of the target: one type changes, or both do.
+TWO_TYPES = {
+    "one": ("int32 v\n", "float64 v\n", "int32 v\n"),
+    "both": ("int32 v\n", "float64 v\n", "int64 v\n"),
+    "one of equal texts": ("float32 v\n", "float64 v\n", "float32 v\n"),
+    "both of equal texts": ("float32 v\n", "float64 v\n", "float32 v\nuint8 more\n"),
+}
+
+
+@pytest.mark.parametrize("storage", ["mcap", "db3"])
+@pytest.mark.parametrize("case", TWO_TYPES)
+def test_each_type_of_a_topic_is_converted_by_itself(case, storage, tmp_path, monkeypatch, capsys):
+    """The file has the definitions of both, or of none."""
+    monkeypatch.chdir(tmp_path)
+    text, new_a, new_b = TWO_TYPES[case]
+    form = "<i" if "int32" in text else "<f"
+    first = [cdr("<f", value) for value in (1, 2, 3)]
+    second = [cdr(form, value) for value in (4, 5)]
+    write_package(tmp_path / "old", {"A": "float32 v\n", "B": text}, "demo_msgs")
+    write_package(tmp_path / "new", {"A": new_a, "B": new_b}, "demo_msgs")
+    a, b = "demo_msgs/msg/A", "demo_msgs/msg/B"
+    if storage == "mcap":
+        rows = [((a, "float32 v\n"), at, data) for at, data in enumerate(first)]
+        write(tmp_path / "r.mcap", [*rows, *(((b, text), 9, data) for data in second)])
+    else:
+        write_db3(tmp_path / "r.db3", [("/t", a, first), ("/t", b, second)])
+    words = ["--from", "old/demo_msgs", "--to", "new/demo_msgs", "-o", "up"]
+    assert main(["upgrade", f"r.{storage}", *words]) == 0
+    lines = [f"  /t ({a}): 3 messages converted", f"  /t ({b}): 2 messages converted"]
+    changed = lines if case.startswith("both") else lines[:1]
+    assert capsys.readouterr().out.splitlines()[1:] == changed
+    with idlc.Recording("up/r.mcap") as recording:
+        assert recording.topic("/t", a).to_columns()["v"].tolist() == [1.0, 2.0, 3.0]
+        assert recording.topic("/t", b).to_columns()["v"].tolist() == [4, 5]
+        assert {topic.type: topic.schema.text for topic in recording.topics} == {a: new_a, b: new_b}
+    main(["show", "up/r.mcap", "--format", "json"])
+    facts = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    sizes = {each["type_name"]: each["size"] for each in facts if each["type"] == "topic"}
+    assert sizes == {a: 36, b: 2 * (4 + sum(map(int, re.findall(r"\d+", new_b))) // 8)}
 
 
 def test_a_database_of_humble_is_converted_once(tmp_path, monkeypatch, capsys):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,6 +24,7 @@ from idlc.tasks.upgrade.recordings import (
 )
 
 if TYPE_CHECKING:
+    from idlc.recordings.rewrite import Rewritten
     from idlc.versions.conversion import FieldFate
 
 
@@ -109,9 +112,9 @@ def _show(result: UpgradeResult, request: UpgradeOptions, style: str, *, failed:
     if style == "json":
         for entry in result.plans:
             output.fact(sys.stdout, "topic", **_facts(entry))
-        for recording, path, topics in result.written:
-            written = {name: topic._asdict() for name, topic in topics.items()}
-            output.fact(sys.stdout, "recording", recording=recording, path=path, topics=written)
+        for recording, path, written in result.written:
+            topics = {name: topic._asdict() for name, topic in written.topics.items()}
+            output.fact(sys.stdout, "recording", recording=recording, path=path, topics=topics)
         return
     if request.dry_run and result.plans:
         output.texts(("".join(f"{line}\n" for line in _lines(result.plans)),), "text", sys.stdout)
@@ -119,15 +122,22 @@ def _show(result: UpgradeResult, request: UpgradeOptions, style: str, *, failed:
         sys.stdout.write("no types changed\n")
     for path in result.stubs:
         sys.stdout.write(f"{path}\n")
-    for recording, path, topics in result.written:
-        lines = [f"{recording} → {path}"]
-        for entry in result.plans:
-            if entry.recording == recording and entry.topic in topics:
-                topic = topics[entry.topic]
-                fate = "converted" if topic.converted else "copied under the new definition"
-                fate = fate if entry.plan else "kept under the old type"
-                line = f"  {entry.topic}: {counted(topic.messages, 'message')} {fate}"
-                lines += [line] if line not in lines else []
+    for recording, path, written in result.written:
+        plans = [entry for entry in result.plans if entry.recording == recording]
+        lines = [f"{recording} → {path}", *_fates(plans, written)]
         if len(lines) == 1:
             lines.append("  no types changed")
         output.texts(("".join(f"{one_line(line)}\n" for line in lines),), "text", sys.stdout)
+
+
+def _fates(plans: Iterable[TopicPlan], written: Rewritten) -> Iterator[str]:
+    """Yield a line for each topic that was changed, or each of its types if it has several."""
+    messages: Counter[tuple[str, str]] = Counter()
+    for entry in plans:
+        topic = entry.rewritten(written)
+        if topic is not None:
+            name = f"{entry.topic} ({entry.type})" if entry.several else entry.topic
+            fate = "converted" if topic.converted else "copied under the new definition"
+            messages[name, fate if entry.plan else "kept under the old type"] += topic.messages
+    for (name, fate), count in messages.items():
+        yield f"  {name}: {counted(count, 'message')} {fate}"

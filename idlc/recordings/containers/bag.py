@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -83,10 +83,11 @@ def _listing(metadata: Path, present: Container[str]) -> tuple[list[str], list[s
     return list(dict.fromkeys(names)), [], counted
 
 
-def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | None:
-    """Return a metadata.yaml with the types and type hashes of some topics, by their names.
+def retyped(metadata: Path, new_type: Callable[[str, str], tuple[str, str] | None]) -> bytes | None:
+    """Return a metadata.yaml with the new types and type hashes of topics.
 
-    The rest stays as it is. Returns None if idlc cannot read the file.
+    `new_type` gets the name and type of each topic. The rest stays as it is. Returns None if idlc
+    cannot read the file.
     """
     try:
         data = _read(metadata)
@@ -97,8 +98,8 @@ def retyped(metadata: Path, types: Mapping[str, tuple[str, str]]) -> bytes | Non
     expected = []
     for topic in _topics(root):
         own = _type_of(topic)
-        name = own.get("name", "")
-        new = dict(zip(TYPE_KEYS, types[name], strict=True)) if name in types else {}
+        changed = new_type(own.get("name", ""), own.get("type", ""))
+        new = dict(zip(TYPE_KEYS, changed, strict=True)) if changed else {}
         expected.append({key: new.get(key, value) for key, value in own.items()})
         for key in new.keys() & own.keys():
             (old, *_) = _values([topic], key)

@@ -128,20 +128,25 @@ class Container(AbstractContextManager["Container"]):
         if topic.count and not read and window == (None, None) and self.damage:
             raise DamageError(f"`{topic.name}` has no readable messages: {self.damage[0]}")
 
-    def sizes(self) -> dict[str, int]:
+    def sizes(self) -> dict[Topic, int]:
         """Return the bytes of the messages of each topic, as far as they are known."""
-        sizes: dict[str, int] = {}
-        unknown: set[str] = set()
+        files: list[dict[int, int] | None] = []
         for file in self.files:
             by_number = None
             with suppress(DamageError):
                 by_number = file.sizes()
-            for topic, number in file.topics:
+            files.append(by_number)
+        sizes: dict[Topic, int] = {}
+        for topic, (mine, bare) in self._channels.items():
+            size = 0
+            for channel in (*mine, *bare):
+                by_number = files[channel.file]
                 if by_number is None:
-                    unknown.add(topic.name)
-                else:
-                    sizes[topic.name] = sizes.get(topic.name, 0) + by_number.get(number, 0)
-        return {name: size for name, size in sizes.items() if name not in unknown}
+                    break
+                size += by_number.get(channel.number, 0)
+            else:
+                sizes[topic] = size
+        return sizes
 
     def verify(self) -> None:
         """Read all messages once, so that all damage is known."""

@@ -11,12 +11,28 @@ from idlc.recordings.containers.compression import (
     compress,
     zstd_frame,
 )
-from idlc.recordings.containers.file import CDR, START, Schema, other_encoding, unread_reason
+from idlc.recordings.containers.file import (
+    CDR,
+    START,
+    Schema,
+    full_name,
+    other_encoding,
+    unread_reason,
+)
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
 
 #: Payloads are converted together until they have so many bytes.
 BATCH = 1 << 24
+
+
+#: The full name of a recorded type, and the text of its definition, which may be empty.
+DefinitionKey: TypeAlias = tuple[str, str]
+
+
+def definition_key(kind: str, schema: Schema | None) -> DefinitionKey:
+    """Return the key of a definition of a type."""
+    return full_name(kind), "" if schema is None else schema.text
 
 
 class Conversion(NamedTuple):
@@ -25,7 +41,7 @@ class Conversion(NamedTuple):
     `definition` is the schema's text with all dependencies, `encoding` its encoding, and
     `type_hash` the RIHS01 hash. `convert` takes payloads of a topic and their log times in
     nanoseconds, and returns as many payloads; without it, payloads are copied as they are. `old` is
-    the text of the definition that it is for, if a topic has several.
+    the definition that it is for, if a topic has several.
     """
 
     type: str
@@ -33,28 +49,37 @@ class Conversion(NamedTuple):
     definition: str
     type_hash: str
     convert: Callable[[Sequence[Raw], Sequence[int]], Sequence[bytes]] | None = None
-    old: str | None = None
+    old: DefinitionKey | None = None
 
 
 #: By the name of a topic, its conversion, or those of its several definitions.
 Conversions: TypeAlias = "Mapping[str, Conversion | tuple[Conversion, ...]]"
 
 
-def selected(conversions: Conversions, topic: str, schema: Schema | None) -> Conversion | None:
-    """Return the conversion for the messages of a topic that have a definition, or have none."""
+def selected(conversions: Conversions, topic: str, key: DefinitionKey) -> Conversion | None:
+    """Return the conversion for the messages of a topic that have a definition."""
     found = conversions.get(topic)
     if found is None or isinstance(found, Conversion):
         return found
-    text = "" if schema is None else schema.text
-    return next((each for each in found if each.old == text), None)
+    return next((each for each in found if each.old == key), None)
 
 
 class RewrittenTopic(NamedTuple):
     """The number of messages of a topic, the bytes of their payloads, and their fate."""
 
-    messages: int
-    size: int
-    converted: bool
+    messages: int = 0
+    size: int = 0
+    converted: bool = False
+
+    def plus(self, messages: int, size: int, converted: bool) -> RewrittenTopic:
+        """Return the sum of this topic and other messages."""
+        return RewrittenTopic(
+            self.messages + messages, self.size + size, self.converted or converted
+        )
+
+
+#: The messages of each definition of each topic.
+RewrittenTopics: TypeAlias = dict[tuple[str, DefinitionKey], RewrittenTopic]
 
 
 #: A type's name, and its definition where a recording has one.
@@ -74,12 +99,13 @@ def check(
     """
     if conversion.convert and encoding != CDR:
         raise RecordingError(*other_encoding(topic, encoding))
+    if conversion.old is not None:
+        return
     kind, schema = definition
     if schema is not None and schema.is_blank:
         schema = None
     other_kind, other = recorded.get(topic, definition)
-    several = conversion.old is not None
-    if kind != other_kind or (schema and other and schema != other and not several):
+    if kind != other_kind or (schema and other and schema != other):
         raise RecordingError(f"`{topic}` is recorded with two different definitions")
     recorded[topic] = kind, schema or other
 

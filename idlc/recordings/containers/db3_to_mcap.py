@@ -15,8 +15,10 @@ from idlc.recordings.containers.conversion import (
     Conversions,
     Recorded,
     RewrittenTopic,
+    RewrittenTopics,
     check,
     converted,
+    definition_key,
     selected,
 )
 from idlc.recordings.containers.db3 import Db3File
@@ -51,7 +53,8 @@ class _Channels:
         if len(file.topics) > MOST_CHANNELS:
             raise RecordingError(f"it has more than {MOST_CHANNELS:,} topics")
         for topic, number in file.topics:
-            conversion = selected(conversions, topic.name, topic.schema)
+            key = definition_key(topic.type, topic.schema)
+            conversion = selected(conversions, topic.name, key)
             self.topics[number] = topic, conversion
             # from 1: rosbags 0.11 reads no message of channel 0
             self.numbers[number] = len(self.numbers) + 1
@@ -123,14 +126,14 @@ class _Conversion:
             self.writer.write(record(records.METADATA_OP, content))
         self.writer.close()
 
-    def topics(self) -> dict[str, RewrittenTopic]:
-        """Return the fate of each topic."""
-        result: dict[str, RewrittenTopic] = {}
+    def topics(self) -> RewrittenTopics:
+        """Return the fate of each definition of each topic."""
+        result: RewrittenTopics = {}
         for number, (topic, conversion) in self.channels.topics.items():
-            before = result.get(topic.name, RewrittenTopic(0, 0, False))
-            count, size = before.messages + self.counts[number], before.size + self.sizes[number]
-            is_converted = bool(conversion and conversion.convert) or before.converted
-            result[topic.name] = RewrittenTopic(count, size, is_converted)
+            key = topic.name, definition_key(topic.type, topic.schema)
+            count, size = self.counts[number], self.sizes[number]
+            is_converted = bool(conversion and conversion.convert)
+            result[key] = result.get(key, RewrittenTopic()).plus(count, size, is_converted)
         return result
 
 
@@ -141,7 +144,7 @@ def convert_db3(
     recorded: dict[str, Recorded],
     progress: Callable[[int, int], object],
     strict: bool = False,
-) -> tuple[dict[str, RewrittenTopic], DamageList]:
+) -> tuple[RewrittenTopics, DamageList]:
     """Write a .db3 file as MCAP, with conversions of topics.
 
     `recorded` has what other files of the recording have of a topic, and is added to. Messages that
@@ -150,7 +153,8 @@ def convert_db3(
     """
     with closing(Db3File(path, strict=strict)) as file, of_file(file.name):
         for topic, _ in file.topics:
-            if conversion := selected(conversions, topic.name, topic.schema):
+            key = definition_key(topic.type, topic.schema)
+            if conversion := selected(conversions, topic.name, key):
                 check(topic.name, topic.encoding, (topic.type, topic.schema), conversion, recorded)
         room = DecompressionBudget(path.stat().st_size)
         conversion_of_file = _Conversion(file, target, conversions, room)

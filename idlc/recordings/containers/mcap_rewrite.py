@@ -25,10 +25,13 @@ from idlc.recordings.containers.compression import (
 from idlc.recordings.containers.conversion import (
     Conversion,
     Conversions,
+    DefinitionKey,
     Recorded,
     RewrittenTopic,
+    RewrittenTopics,
     check,
     converted,
+    definition_key,
     selected,
 )
 from idlc.recordings.containers.file import Schema, full_name, wrong_count
@@ -85,7 +88,7 @@ class RewritePlan:
         self.changed: dict[int, Conversion] = {}
         for number, channel_ in facts.channels.items():
             definition = facts.schemas.get(channel_.schema)
-            conversion = selected(conversions, channel_.topic, definition)
+            conversion = selected(conversions, channel_.topic, _key(definition))
             if conversion is not None:
                 self.changed[number] = conversion
         self._check(facts, recorded)
@@ -124,6 +127,11 @@ class RewritePlan:
             definition = facts.schemas.get(own.schema)
             kind = definition.name if definition else ""
             check(own.topic, own.encoding, (kind, definition), conversion, recorded)
+
+
+def _key(definition: Schema | None) -> DefinitionKey:
+    """Return the key of a channel's definition."""
+    return definition_key(definition.name if definition else "", definition)
 
 
 def _retyped(raw: bytes, schema_number: int, digest: str) -> bytes:
@@ -206,15 +214,15 @@ class Rewriting:
             if counted != count:
                 self.damage.add(wrong_count(own.topic, counted, count))
 
-    def topics(self) -> dict[str, RewrittenTopic]:
-        """Return the fate of each topic."""
-        topics: dict[str, RewrittenTopic] = {}
+    def topics(self) -> RewrittenTopics:
+        """Return the fate of each definition of each topic."""
+        topics: RewrittenTopics = {}
         for number, own in self.facts.channels.items():
             count, size = (by.get(number, 0) for by in (self.writer.counts, self.writer.sizes))
-            before = topics.get(own.topic, RewrittenTopic(0, 0, False))
+            key = own.topic, _key(self.facts.schemas.get(own.schema))
             change = self.plan.changed.get(number)
-            done = bool(change and change.convert) or before.converted
-            topics[own.topic] = RewrittenTopic(before.messages + count, before.size + size, done)
+            is_converted = bool(change and change.convert)
+            topics[key] = topics.get(key, RewrittenTopic()).plus(count, size, is_converted)
         return topics
 
     def _record(self, op: int, at: int, size: int) -> None:
@@ -414,7 +422,7 @@ class Rewriting:
             stops = starts + HEAD.size + content.heads["size"][mine].astype(np.int64)
             for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
                 yield start, stop, b""
-        by_topic: dict[tuple[str, str | None], list[Any]] = {}
+        by_topic: dict[tuple[str, DefinitionKey | None], list[Any]] = {}
         for number, mine in content.by_channel.items():
             change = self.plan.changed.get(number)
             if change is not None and change.convert:
@@ -465,7 +473,7 @@ def rewrite_mcap(
     index: bool,
     progress: Callable[[int, int], object],
     damage: DamageList,
-) -> dict[str, RewrittenTopic]:
+) -> RewrittenTopics:
     """Write an MCAP file with conversions of topics; `index` is that of `read_facts`.
 
     `recorded` has what other files of the recording have of a topic, and is added to. What is

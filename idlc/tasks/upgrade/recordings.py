@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
@@ -26,7 +26,13 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.columns import unread_bytes
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.conversion import Conversion
+from idlc.recordings.containers.conversion import (
+    Conversion,
+    Conversions,
+    DefinitionKey,
+    RewrittenTopic,
+    definition_key,
+)
 from idlc.recordings.containers.file import CDR, MSG
 from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
@@ -53,6 +59,9 @@ from idlc.versions.meanings import renumbered
 from idlc.versions.revision import GIT
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
+if TYPE_CHECKING:
+    from idlc.recordings.rewrite import Rewritten
+
 
 class UpgradeOptions(msgspec.Struct, frozen=True):
     """The options of `idlc upgrade`; `again` is the command without those of rules and output."""
@@ -74,14 +83,14 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
 class TopicPlan(NamedTuple):
     """A recorded topic, and the plan of its messages; without a plan, the type was removed.
 
-    `definition` is the recorded one, and `several` says that the topic has others, too.
+    `definition` is that of the recorded type, and `several` says that the topic has others, too.
     """
 
     recording: str
     topic: str
     type: str
     plan: Plan | None
-    definition: str = ""
+    definition: DefinitionKey = ("", "")
     several: bool = False
 
     @property
@@ -97,6 +106,21 @@ class TopicPlan(NamedTuple):
         """The worst fate of any field."""
         return "lost" if self.plan is None else self.plan.fate
 
+    def rewritten(self, written: Rewritten) -> RewrittenTopic | None:
+        """Return the fate of these messages in a recording that was written."""
+        if self.several:
+            return written.definitions.get((self.topic, self.definition))
+        return written.topics.get(self.topic)
+
+
+class UndefinedTopic(NamedTuple):
+    """An unchanged topic whose definition its recording lacks, and the version that it has."""
+
+    topic: str
+    version: Version
+    definition: DefinitionKey
+    several: bool = False
+
 
 class UpgradeResult(NamedTuple):
     """The plans of changed topics, the recordings that were written, and new files of rules.
@@ -105,9 +129,9 @@ class UpgradeResult(NamedTuple):
     """
 
     plans: list[TopicPlan]
-    written: list[tuple[str, str, Any]]
+    written: list[tuple[str, str, Rewritten]]
     stubs: list[str]
-    undefined: dict[str, list[tuple[str, Version]]]
+    undefined: dict[str, list[UndefinedTopic]]
 
 
 def upgrade_recordings(
@@ -183,7 +207,7 @@ def _plans(
     local: LocalTypes,
     rules: Known,
     report: Report,
-    undefined: list[tuple[str, Version]],
+    undefined: list[UndefinedTopic],
 ) -> Iterator[TopicPlan]:
     """Yield the plan of each topic of a recording whose type is another one in the target.
 
@@ -208,6 +232,7 @@ def _plans(
         with stage("plan", recording):
             for each in _of_types(recording, types, target, rules, report, undefined):
                 yield each._replace(several=definitions[each.topic] > 1)
+    undefined[:] = [each._replace(several=definitions[each.topic] > 1) for each in undefined]
 
 
 def _check_lengths(
@@ -244,7 +269,7 @@ def _of_types(
     target: UpgradeTarget,
     rules: Known,
     report: Report,
-    undefined: list[tuple[str, Version]],
+    undefined: list[UndefinedTopic],
 ) -> Iterator[TopicPlan]:
     compiler = target.compiler(types.texts)
     known: list[tuple[DefinedTopic, Version, ir.TypeName]] = []
@@ -256,7 +281,9 @@ def _of_types(
         if name is not None:
             known.append((topic, old, name))
         elif target.defines(topic.name.package):
-            yield TopicPlan(recording, topic.recorded.topic.name, str(topic.name), None)
+            recorded = topic.recorded.topic
+            key = definition_key(recorded.type, recorded.schema)
+            yield TopicPlan(recording, recorded.name, str(topic.name), None, key)
     models = compiled(compiler, {interface_of(name) for *_, name in known}, report)
     if models is None:
         return
@@ -268,11 +295,11 @@ def _of_types(
             is_same = is_same and not _renumbers(old, new)
             plans[topic.name, name] = None if is_same else make_plan(old, new, rules)
         plan, recorded = plans[topic.name, name], topic.recorded.topic
+        key = definition_key(recorded.type, recorded.schema)
         if plan is not None:
-            definition = recorded.schema.text if recorded.schema else ""
-            yield TopicPlan(recording, recorded.name, str(topic.name), plan, definition)
+            yield TopicPlan(recording, recorded.name, str(topic.name), plan, key)
         elif recorded.schema is None:
-            undefined.append((recorded.name, old))
+            undefined.append(UndefinedTopic(recorded.name, old, key))
 
 
 def _name_in(library: Any, old: Version, rules: Known) -> ir.TypeName | None:
@@ -390,14 +417,14 @@ def _write(
     for recording, shown in targets.items():
         plans = [each for each in result.plans if each.recording == recording]
         try:
-            conversions = _definitions(result.undefined[recording]) | _conversions(plans, run)
+            conversions = _conversions(plans, result.undefined[recording], run)
             source, to = root.path(recording), root.path(shown)
             summary = rewrite(source, to, conversions, progress, strict=options.strict)
         except (RecordingError, UpgradeError) as error:
             advice = getattr(error, "hint", None)
             report.add(codes.CONVERSION_FAILED.of(recording, str(error), hint=advice))
         else:
-            result.written.append((recording, shown, summary.topics))
+            result.written.append((recording, shown, summary))
             report.extend(damage_problems(recording, summary.damage))
             if _has_db3(Path(root.path(recording))):
                 report.notes.append(PLUGIN)
@@ -415,17 +442,23 @@ def _has_db3(path: Path) -> bool:
     return path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3")))
 
 
-def _definitions(topics: Iterable[tuple[str, Version]]) -> dict[str, Any]:
-    """Return what adds the definitions of topics that do not change."""
-    return {
-        topic: Conversion(version.key.type, MSG, definition_of(version), version.key.hash)
-        for topic, version in topics
-    }
-
-
-def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Any]:
+def _conversions(
+    plans: Iterable[TopicPlan], undefined: Iterable[UndefinedTopic], run: RunRules
+) -> Conversions:
     """Return the conversions of each topic; raise UpgradeError if rules cannot be run."""
-    conversions: dict[str, Any] = {}
+    conversions: dict[str, Conversion | tuple[Conversion, ...]] = {}
+
+    def add(entry: TopicPlan | UndefinedTopic, own: Conversion) -> None:
+        if not entry.several:
+            conversions[entry.topic] = own
+            return
+        others = conversions.get(entry.topic, ())
+        assert isinstance(others, tuple)
+        conversions[entry.topic] = (*others, own._replace(old=entry.definition))
+
+    for topic in undefined:
+        key, text = topic.version.key, definition_of(topic.version)
+        add(topic, Conversion(key.type, MSG, text, key.hash))
     ways: dict[int, Payloads] = {}
     for entry in plans:
         plan = entry.plan
@@ -437,12 +470,7 @@ def _conversions(plans: Iterable[TopicPlan], run: RunRules) -> dict[str, Any]:
             structure = TopicType(dict(plan.old.models), plan.old.name).structure
             convert = partial(converted, way, structure, entry.topic)
         definition, new = definition_of(plan.new), plan.new.key
-        own = Conversion(new.type, MSG, definition, new.hash, convert)
-        if entry.several:
-            others = conversions.get(entry.topic, ())
-            conversions[entry.topic] = (*others, own._replace(old=entry.definition))
-        else:
-            conversions[entry.topic] = own
+        add(entry, Conversion(new.type, MSG, definition, new.hash, convert))
     return conversions
 
 
