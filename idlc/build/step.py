@@ -52,19 +52,20 @@ def problem(home: Path) -> str:
 
 
 def _project_of(home: Path) -> Path:
-    for folder in home.parents:
-        if (folder / "setup.py").is_file() or (folder / "pyproject.toml").is_file():
-            return folder
-    return home.parent
+    """Return the folder of the setup.py or pyproject.toml that has this file run."""
+    files = [folder / name for folder in home.parents for name in ("setup.py", "pyproject.toml")]
+    files = [file for file in files if file.is_file()]
+    running = [file for file in files if b"_idlc_build.py" in file.read_bytes()]
+    return next(iter(running or files), home).parent
 
 
 def _places(project: Path) -> list[Path]:
-    """Return the folders with the interfaces of a project: those that a library's settings name."""
+    """Return the folders with the interfaces of a project, or those that its settings name."""
     table = _table(_settings(project))
     paths = re.search(r"^[ \t]*paths[ \t]*=[ \t]*\[([^\]]*)\]", table, re.MULTILINE)
-    if not paths or (project / "package.xml").is_file():
-        return [project]
-    return [project / path for path in re.findall(r"""["']([^"']+)["']""", paths[1])]
+    named = re.findall(r"""["']([^"']+)["']""", paths[1]) if paths else []
+    is_whole = not named or (project / "package.xml").is_file()
+    return list(dict.fromkeys(project / path for path in [*["."] * is_whole, *named]))
 
 
 def _settings(folder: Path) -> str:

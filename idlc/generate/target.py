@@ -133,14 +133,14 @@ class Target:
         return {BUILD_STEP: build_step()} if is_run else {}
 
     def _is_step_named(self) -> bool:
-        """Return whether the nearest setup.py or pyproject.toml names the file."""
+        """Return whether a setup.py or pyproject.toml above the package names the file."""
         root = self._output.root
         for folder in self.path.parents:
+            named = f"{self.path.relative_to(folder).as_posix()}/{BUILD_STEP}"
             files = [folder / name for name in ("setup.py", SETTINGS_FILE)]
             sources = [root.read_source(file, "", Report()) for file in files if is_file(file)]
-            if sources:
-                named = f"{self.path.relative_to(folder).as_posix()}/{BUILD_STEP}"
-                return any(named in source.text for source in sources if source)
+            if any(named in source.text for source in sources if source):
+                return True
         return False
 
     def usable(self) -> bool:

@@ -141,6 +141,10 @@ CURRENT = {
     "an excluded interface": lambda: write_all(
         {"msg/Old.msg": "bad", "pyproject.toml": '[tool.idlc]\nexclude = ["Old.msg"]\n'}
     ),
+    "interfaces beside the package": lambda: (
+        write_all({"pyproject.toml": '[tool.idlc]\npaths = ["../all"]\n', ".git": ""}),
+        [rename(path, f"../all/{path}") for path in FILES],
+    ),
     "results of a build": lambda: write_all({"build/x/msg/Drive.msg": "int8 a\n"}),
 }
 
@@ -256,6 +260,11 @@ LIBRARIES = {
         "../track_msgs",
         lambda: Path("../track_msgs/msg/Track.msg").write_text("int8 a\n"),
         "`msg/Track.msg` changed",
+    ),
+    "another project around the classes": (
+        "interfaces",
+        lambda: write_all({"src/pyproject.toml": "", ".git": ""}),
+        "",
     ),
     "another package beside it": (
         "interfaces/msg/Track.msg",
