@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from idlc.model.distros import BY_NAME, unknown_distro
 from idlc.recordings.columns.arrow import arrow
+from idlc.recordings.columns.elements import ElementError
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
@@ -376,6 +377,7 @@ class Selection:
         """Return a table of Arrow: log_time, publish_time and the fields of the messages.
 
         Options are those of `to_arrow` of messages: `fields`, `flat`, `datetimes`, `dictionary`.
+        With `each`, a list of messages such as `transforms`, the rows are its elements.
         """
         pa = arrow()
         source = self._source(kind)
@@ -409,17 +411,23 @@ def _names(fields: list[str]) -> list[str]:
 
 def _table(source: Any, options: Any, batch: TopicMessages | None = None) -> pa.Table:
     """Return the table of some messages, or of none, with their times in front."""
-    from idlc.recordings.columns import to_arrow
+    from idlc.recordings.columns import to_arrow, to_rows
 
-    pa = arrow()
+    pa, kind, rows = arrow(), arrow().timestamp("ns"), None
     batch = join_messages([]) if batch is None else batch
-    table, kind = to_arrow(source, batch, **options), pa.timestamp("ns")
+    options = dict(options)
+    each = options.pop("each", None)
+    if each is None:
+        table = to_arrow(source, batch, **options)
+    else:
+        table, rows = to_rows(source, batch, each, **options)
     names = _names(table.column_names)
     for name, times in zip(names[::-1], (batch.publish_times, batch.log_times), strict=True):
         if times is None:
             column = pa.nulls(len(batch), kind)
         else:
             column = pa.Array.from_buffers(kind, len(batch), [_known(times), pa.py_buffer(times)])
+        column = column if rows is None else column.take(rows)
         table = table.add_column(0, pa.field(name, kind), column)
     return table
 
@@ -463,6 +471,10 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: Any = 0) -> Iterator
     """
     try:
         yield
+    except ElementError as unclear:
+        place = done + unclear.row if isinstance(done, int) else done[unclear.row]
+        what = f"message {place} of `{topic.name}`: {unclear.problem}"
+        raise RecordingError(what, "select elements by index, such as `position[0]`") from unclear
     except ValueError as caught:
         error: Any = caught
         if not hasattr(error, "problem"):  # each package has a DecodeError of its own
@@ -681,7 +693,8 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         >>> topics = {"/camera/image": None, "/joint_states": ["position", "velocity"]}
         >>> recording.aligned(topics, on="/camera/image", tolerance="50ms").to_arrow()
 
-        `topics` has the fields of each topic, None for all. The value of a tick is that of the
+        `topics` has the fields of each topic, None for all, or elements of lists, such as
+        `position.elbow` by name or `covariance[0]` by index. The value of a tick is that of the
         `last` message until then, or of the `nearest`, or `linear` between two. It is null without
         a message within `tolerance`. The `clock` of messages is `log`, or `header` for the stamp of
         their header. These three are for all topics, or a mapping has them by topic. Lengths of

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
-from idlc.build.step import present, remove_leftovers
+from idlc.build.step import is_clone, present, remove_leftovers
 from idlc.cli import output
 from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
@@ -51,6 +51,12 @@ def compiled_class(package: str, base: Any) -> type:
     inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
     folder = home_of(where.root.base, package, where.root)
     if not inputs:
+        lock = load_lock(folder, "", Report())
+        if lock and lock.inputs and is_clone(where.root.base):
+            raise SystemExit(
+                f"error: the interfaces of the classes in `{folder.name}` are gone\n"
+                "  = hint: `idlc check` names the files to remove"
+            )
         return distribution_class(package, base, {}, folder)
     home = folder.relative_to(where.root.base).as_posix()
     runtime, vendoring = settings.runtime, settings.vendoring

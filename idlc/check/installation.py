@@ -22,7 +22,7 @@ from idlc.packaging.facts import Facts
 from idlc.packaging.layout import PackageLayout, layout
 from idlc.packaging.setup_py import DataFiles, Setup, defines, range_of, span_of
 from idlc.project.find import KINDS
-from idlc.project.lock import Runtime
+from idlc.project.lock import BUILD_STEP, Runtime
 
 _INDEX = "share/ament_index/resource_index"
 
@@ -366,7 +366,8 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
             # where a setup.py runs idlc's build step, the interfaces were in this package
             if facts.has_build_step and output.inputs:
                 message = "the interfaces of the generated code are gone"
-                hint = f"remove `idlc.lock` and the other generated files from `{home}`"
+                hint = f"remove `idlc.lock` and the other generated files from `{home}`, "
+                hint += f"except `{BUILD_STEP}`, which setup.py runs"
                 yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
         elif output.package == facts.name and facts.whole:
             words = ("gen", folder, "-o", home)

@@ -77,9 +77,9 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
 def fmt_command(**arguments: Any) -> int:
     """Normalize whitespace and keep deliberate alignment.
 
-    idlc keeps single spaces between words, and two spaces before a comment. It keeps wider gaps if
-    they align words of the same kind, or if all lines of a block have them. Otherwise, it aligns
-    the word with the lines above and below, or moves it next to the previous word. It puts spaces
+    idlc keeps single spaces between words, and two spaces before a comment. It keeps wider gaps
+    that align a column, such as names or comments, or that all lines of a block have. Other gaps
+    become a column if the lines above and below have one, or else a single space. idlc puts spaces
     on both sides of `=` or on neither side, and keeps at most two consecutive empty lines. If idlc
     changes a file, it also removes trailing whitespace and adds a missing final newline.
 

@@ -42,7 +42,7 @@ from idlc.cli import completion, options
 @click.option(
     "--fields",
     metavar="FIELD,...",
-    help="Select fields, such as `header.stamp,linear_acceleration`.",
+    help="Select fields, such as `header.stamp,position.elbow`.",
 )
 @click.option(
     "--from",
@@ -64,26 +64,33 @@ from idlc.cli import completion, options
     metavar="GRID",
     help="Write one table with all topics: a row for each message of topic GRID, or for each "
     "period, such as `100ms` or `30Hz`. Select fields after a colon: `/imu:orientation`. Before "
-    "idlc writes the table, it shows how well each topic fits.",
+    "idlc writes the table, it shows for each topic how many rows have a value, and its age.",
 )
 @click.option(
     "--how",
     metavar="WAY",
     multiple=True,
     help="With --grid: take the `last` message before a row, the `nearest`, or a value between two "
-    "(`linear`). `/imu=linear` sets it for one topic, also for the next two options.",
+    "(`linear`). For one topic only, write `/imu=linear`. --tolerance and --clock accept this, too.",
 )
 @click.option(
     "--tolerance",
     metavar="LENGTH",
     multiple=True,
-    help="With --grid: leave values empty without a message within this time, such as `50ms`.",
+    help="With --grid: if a topic has no message within this time of a row, such as `50ms`, leave "
+    "its values empty.",
 )
 @click.option(
     "--clock",
     metavar="CLOCK",
     multiple=True,
     help="With --grid: use the time of recording (`log`) or of `header.stamp` (`header`).",
+)
+@click.option(
+    "--each",
+    metavar="FIELD",
+    help="Write a row for each element of a list of messages, such as `transforms`, instead of for "
+    "each message. --fields are those of an element.",
 )
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(
@@ -95,8 +102,8 @@ from idlc.cli import completion, options
 @click.option(
     "--check/--no-check",
     default=None,
-    help="Verify the checksums of the recording. By default, idlc verifies those of a damaged "
-    "recording.",
+    help="Verify the checksums of the recording. By default, idlc verifies them only if it finds "
+    "damage, such as a missing end.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @click.option(

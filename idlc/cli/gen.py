@@ -54,12 +54,12 @@ class _Command(click.Command):
 @click.option(
     "--runtime",
     type=click.Choice(["carried", "installed"]),
-    help="Copy the runtime, or import idlc-runtime.",
+    help="Copy the code that all classes use (default), or import idlc-runtime.",
 )
 @click.option(
     "--force",
     is_flag=True,
-    help="Also replace other files, and keep backups.",
+    help="Also replace files that idlc did not write, and keep backups.",
 )
 @options.report_style
 def command(**arguments: Any) -> int:

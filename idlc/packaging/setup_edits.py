@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 import tokenize
 from collections.abc import Iterator, Sequence
-from itertools import accumulate
+from itertools import accumulate, takewhile
 from typing import TypeAlias
 
 from idlc.diagnostics import codes
@@ -18,8 +19,8 @@ from idlc.diagnostics.source import Source, Span
 from idlc.packaging.setup_py import Setup, parse, range_of, span_of, start_of
 from idlc.project.lock import BUILD_STEP
 
-#: The widest line that the linters of ROS 2 accept.
-WIDTH = 99
+#: The widest line that ruff's formatter and the linters of ROS 2 leave as it is.
+WIDTH = 88
 
 
 def insertion(source: Source, at: int, text: str) -> Edit:
@@ -75,8 +76,7 @@ def append_elements(source: Source, node: Brackets, elements: Sequence[str]) -> 
         elif not ranges:
             before, behind = "", ", "
         return (insertion(source, last, before + between.join(new) + behind),)
-    step = step_of(source)
-    lines = "".join(f"\n{_broken(margin, step, element)}," for element in new)
+    lines = "".join(f"\n{margin}{element}," for element in new)
     edits = () if comma or not ranges else (insertion(source, last, ","),)
     return (*edits, insertion(source, last + tail.start(), lines))
 
@@ -120,12 +120,6 @@ def _range(source: Source, node: Brackets) -> tuple[int, int]:
     if isinstance(node, ast.Call):
         start = source.text.index("(", range_of(source, node.func)[1])
     return start, end
-
-
-def _broken(margin: str, step: str, element: str) -> str:
-    """Return an element on a line of its own, on two if it is long."""
-    line = margin + element
-    return line if len(line) < WIDTH else line.replace(", ", f",\n{margin}{step}", 1)
 
 
 def _begins_line(source: Source, at: int) -> bool:
@@ -178,8 +172,7 @@ def imported(setup: Setup, module: str, name: str) -> tuple[str, tuple[Edit, ...
     first = next((node for node in body if node in imports), body[0])
     if isinstance(first, ast.ImportFrom) and first.module == "__future__":
         first = body[body.index(first) + 1]
-    gap = "\n" if getattr(first, "module", "") == "setuptools" else ""
-    line = f"from {module} import {name}\n{gap}"
+    line = f"from {module} import {name}\n"
     return name, (insertion(source, start_of(source, first), line),)
 
 
@@ -196,11 +189,65 @@ _TRIES = 40
 _LINE_END = re.compile(r"\r\n?|\n")
 
 
-def wrap_lines(old: str, new: str) -> str:
-    """Return an edited file whose lines are not too wide, as far as lists can be wrapped.
+def arrange(old: str, new: str) -> str:
+    """Return an edited file as formatters leave it: imports in order, lists in lines of their own.
 
     Lines that `old` has stay as they are.
     """
+    return _wrap_lines(old, _sort_imports(old, new))
+
+
+_IMPORT = re.compile(r"from (\w+)[\w.]* import \w+\s*")
+_FORMS = (ast.Import, ast.ImportFrom)
+_STANDARD = sys.stdlib_module_names
+_LINE = re.compile(r"[^\r\n]*(?:\r\n?|\n)|[^\r\n]+")
+
+
+def _sort_imports(old: str, new: str) -> str:
+    """Return an edited file with new imports of the standard library in their order."""
+    before = frozenset(_LINE_END.split(old))
+    lines = _LINE.findall(new)
+    changed = [line for line in lines if line.rstrip("\r\n") not in before]
+    added = [line for line in changed if _imports_standard(line)]
+    rest = [line for line in lines if line not in added]
+    tree = parse("".join(rest)) if added else None
+    nodes = (node for node in tree.body if isinstance(node, _FORMS)) if tree else ()
+    imports = [node for node in nodes if _module(node) != "__future__"]
+    if not imports:
+        return new
+    _insert_imports(rest, imports, sorted(added), line_end(Source("", new)))
+    return "".join(rest)
+
+
+def _insert_imports(
+    lines: list[str], imports: Sequence[ast.Import | ast.ImportFrom], added: list[str], end: str
+) -> None:
+    """Insert sorted imports of the standard library into lines that have others."""
+    block = [*takewhile(lambda node: _module(node).partition(".")[0] in _STANDARD, imports)]
+    if not block:
+        first = imports[0].lineno - 1
+        lines[first:first] = [*added, end]
+        return
+    plain = [*takewhile(lambda node: isinstance(node, ast.Import), block)]
+    rivals = block[len(plain) :]
+    if any(isinstance(node, ast.Import) for node in rivals):
+        rivals = block  # the linters of ROS 2 sort both forms of imports together
+    for line in reversed(added):
+        name = line.split()[1]
+        later = (node.lineno - 1 for node in rivals if _module(node) > name)
+        lines.insert(next(later, block[-1].end_lineno or 0), line)
+
+
+def _imports_standard(line: str) -> bool:
+    match = _IMPORT.fullmatch(line)
+    return match is not None and match[1] in _STANDARD
+
+
+def _module(node: ast.Import | ast.ImportFrom) -> str:
+    return node.module or "" if isinstance(node, ast.ImportFrom) else node.names[0].name
+
+
+def _wrap_lines(old: str, new: str) -> str:
     before = frozenset(_LINE_END.split(old))
     refused: set[str] = set()
     for _ in range(_TRIES):

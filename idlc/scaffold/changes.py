@@ -15,7 +15,7 @@ from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.packaging.facts import home_of
 from idlc.packaging.outcome import Edited, Outcome
-from idlc.packaging.setup_edits import wrap_lines
+from idlc.packaging.setup_edits import arrange
 from idlc.project.files import entries
 from idlc.project.library import Library
 from idlc.project.lock import Tree, digest
@@ -120,7 +120,7 @@ class Project:
             if isinstance(outcome, Edited):
                 edited[path] = outcome.text
                 if path == "setup.py":
-                    edited[path] = wrap_lines(self.text(path) or "", outcome.text)
+                    edited[path] = arrange(self.text(path) or "", outcome.text)
                 continue
             place = self.shown(path)
             message = f"cannot edit `{place}`: {outcome.why}"

@@ -100,7 +100,7 @@ def _style(options: ColumnsOptions) -> str:
 
 def _topic(word: str, recording: Recording) -> tuple[str, list[str] | None]:
     """Return a topic and its fields, as `/joints:position,velocity` has them."""
-    name, colon, fields = word.rpartition(":")
+    name, colon, fields = word.partition(":")
     if word in recording or not colon:
         return word, None
     return name, [field.strip() for field in fields.split(",")]

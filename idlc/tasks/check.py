@@ -170,9 +170,9 @@ def _with_recordings(
 def keep_layout(name: str, old: str, new: str) -> str:
     """Return an edited file in its old layout: `idlc fmt`'s, or without long lines."""
     if name.endswith("setup.py"):
-        from idlc.packaging.setup_edits import wrap_lines
+        from idlc.packaging.setup_edits import arrange
 
-        return wrap_lines(old, new)
+        return arrange(old, new)
     from idlc.language.format import format_file
     from idlc.language.parse import parse
 

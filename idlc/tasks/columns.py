@@ -26,6 +26,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model.ir import DUMMY_FIELD
+from idlc.recordings.columns.elements import MissingElementWarning
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.recordings.types import BORROWED, NAMED, damage_problems
@@ -224,6 +225,7 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
     start: str | None = None
     end: str | None = None
     conditions: tuple[Condition, ...] = ()
+    each: str | None = None
     nested: bool = False
     datetimes: bool = True
     check: bool | None = None
@@ -280,6 +282,8 @@ def columns(
         for message in (warning.message for warning in caught):
             if isinstance(message, OtherDefinitionWarning):
                 report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
+            if isinstance(message, MissingElementWarning):
+                report.notes += (str(message),)
             if isinstance(message, MissingDefinitionWarning):
                 missing.setdefault(message.message, []).append(f"`{message.topic}`")
         for problem, topics in missing.items():
@@ -415,7 +419,9 @@ def _written(
     try:
         for condition in options.conditions:
             topic = topic.where(*condition)
-        reader = topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
+        reader = topic.to_reader(
+            fields=options.fields, flat=flat, datetimes=options.datetimes, each=options.each
+        )
     except ValueError as error:
         hint = f"`idlc show {options.recordings[0]} {name}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
@@ -431,7 +437,8 @@ def _written(
             report.notes += (f"{name}: {topic.absent:,} messages do not have a field of --where",)
 
     if job.style == TEXT:
-        preview = Preview(f"{name}  {job.topic.topic.type}", reader.schema.names)
+        title = f"{name}  {job.topic.topic.type}"
+        preview = Preview(title, reader.schema.names, "row" if options.each else "message")
         for batch in counted():
             preview.add(batch, plain)
         yield WrittenFile(name, job.path, rows, preview)

@@ -92,10 +92,14 @@ def _texts(column: pa.Array, plain: Callable[[pa.Array], pa.Array]) -> list[str 
 
 
 class Preview:
-    """The first rows of a table, the number of rows and their times, and its columns of numbers."""
+    """The first rows of a table, the number of rows and their times, and its columns of numbers.
 
-    def __init__(self, title: str, names: list[str]) -> None:
+    A `noun` says what a row is.
+    """
+
+    def __init__(self, title: str, names: list[str], noun: str) -> None:
         self.title = title
+        self.noun = noun
         self.rows = 0
         self.firsts: dict[str, list[str]] = {name: [] for name in names}
         self.numbers: dict[str, NumberStatistics] = {}
@@ -117,7 +121,8 @@ class Preview:
             first = _texts(column.slice(0, missing), plain)
             self.firsts[name] += ["" if text is None else f"{mark}{text}{mark}" for text in first]
             if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
-                values = column.to_numpy(zero_copy_only=False).astype(np.float64)
+                numbers = column.cast(pa.float64(), safe=False)
+                values = numbers.to_numpy(zero_copy_only=False)
                 with np.errstate(over="ignore", invalid="ignore"):
                     self.numbers.setdefault(name, NumberStatistics()).add(values, intervals)
 
@@ -144,8 +149,8 @@ class Preview:
     def text(self, width: int) -> Iterator[str]:
         """Yield lines for a terminal of so many columns."""
         seconds = (self.end - self.start) / 1e9
-        messages = "1 message" if self.rows == 1 else f"{self.rows:,} messages"
-        yield f"{one_line(self.title)}  {messages}{f' in {seconds:.6g} s' if self.rows > 1 else ''}"
+        span = f"s in {seconds:.6g} s" if self.rows > 1 else "s" * (self.rows == 0)
+        yield f"{one_line(self.title)}  {self.rows:,} {self.noun}{span}"
         names = min(NAME_WIDTH, max(1, width // 2), max(map(len, (HEADING, *self.firsts))))
         more = ", …" if self.rows > FIRST_ROWS else ""
         yield f"\n{_fitted('column', names)}  first rows"

@@ -151,6 +151,16 @@ def test_classes_of_removed_interfaces_are_not_built_again(package, tmp_path):
     ]
 
 
+def test_classes_of_interfaces_that_are_all_gone_are_not_installed(package, tmp_path):
+    prefix = tmp_path / "prefix"
+    built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")
+    (package / "msg/Drive.msg").unlink()
+    built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")  # as on a robot
+    (package / ".git").mkdir()
+    with pytest.raises(AssertionError, match="the interfaces of the classes in `demo` are gone"):
+        built_by_keyword(sys.executable, package, prefix, ROS_DISTRO="jazzy")
+
+
 def test_packages_need_not_name_what_a_package_comes_with(package, tmp_path):
     (package / "msg/Drive.msg").write_text("std_msgs/Header header\n")
     (package / "pyproject.toml").write_text("[tool.idlc]\nvendor-deps = true\n")

@@ -61,6 +61,22 @@ def damage_lock():
     Path("demo/idlc.lock").write_text('{"inputs": [}')
 
 
+def delete_all():
+    Path(".git").mkdir()
+    for folder in ("msg", "srv"):
+        shutil.rmtree(folder)
+
+
+def delete_all_of_a_workspace():
+    Path("../.git").write_text("gitdir: elsewhere\n")  # as in a worktree or a submodule
+    for path in FILES:
+        Path(path).unlink()
+
+
+def list_again(*lines):
+    write_all({"resource/rosidl_interfaces/demo": "".join(f"{line}\n" for line in lines)})
+
+
 def nothing():
     pass
 
@@ -83,6 +99,11 @@ OUTDATED = {
         lambda: [rename(path, f"{Path(path).parent}/X{Path(path).name}") for path in FILES],
         "`msg/Drive.msg` was removed",
     ),
+    "all deleted": (delete_all, "`msg/Drive.msg` was removed"),
+    "all deleted in a workspace": (delete_all_of_a_workspace, "`msg/Drive.msg` was removed"),
+    "list emptied": (list_again, "`rosidl_interfaces/demo` omits `msg/Drive.msg`"),
+    "list too short": (lambda: list_again(*sorted(FILES)[1:]), "/demo` omits `msg/Drive.msg`"),
+    "list too long": (lambda: list_again(*FILES, "msg/Old.msg"), "/demo` lists `msg/Old.msg`"),
     "lock damaged": (damage_lock, "`demo/idlc.lock` is damaged"),
     "lock lost": (lambda: Path("demo/idlc.lock").unlink(), "`msg/Drive.msg` has no classes"),
     "classes lost": (lambda: shutil.rmtree("demo/srv"), "`srv/__init__.py` is missing"),
@@ -97,7 +118,7 @@ def test_a_build_stops_at_classes_that_are_out_of_date(change, package):
     assert status == 1
     assert "error: the classes in `demo` are out of date: " in said
     assert reason in said
-    assert "hint: run `idlc gen`, or install idlc where the package is built" in said
+    assert "hint: run `idlc gen` and `idlc check --fix`, or install idlc for the build" in said
     assert "Traceback" not in said
     assert not Path("build").exists()
 
@@ -105,6 +126,7 @@ def test_a_build_stops_at_classes_that_are_out_of_date(change, package):
 #: What is no reason to stop.
 CURRENT = {
     "nothing": nothing,
+    "a list with other files": lambda: list_again(*FILES, "msg/Drive.idl", ""),
     "other line ends": lambda: Path("msg/Drive.msg").write_bytes(b"float64 speed\r\n"),
     "interfaces left out": lambda: [shutil.rmtree(folder) for folder in ("msg", "srv")],
     "interfaces of another package": lambda: write_all(

@@ -156,7 +156,7 @@ def test_packages_below_src_are_fixed_there(package, capsys):
     capsys.readouterr()
     assert codes(capsys)[0] == set()
     text = Path("setup.py").read_text(encoding="utf-8")
-    assert "packages=[package_name, *find_packages('src', include=['demo.*'])]" in text
+    assert "        package_name,\n        *find_packages('src', include=['demo.*']),\n" in text
 
 
 def test_interfaces_are_installed_from_where_they_lie(package, capsys):

@@ -36,8 +36,8 @@ def run(
     """Run the command and return the exit status."""
     work = None
     if grid is not None:
-        has_others = fields is not None or conditions or arguments["nested"]
-        work = _table_of(grid, (how, tolerance, clock), bool(has_others), arguments)
+        has_others = any([fields is not None, conditions, arguments["nested"], arguments["each"]])
+        work = _table_of(grid, (how, tolerance, clock), has_others, arguments)
     elif how or tolerance or clock:
         raise click.UsageError("--how, --tolerance and --clock need --grid")
     report = Report()
@@ -55,9 +55,9 @@ def run(
     width = shutil.get_terminal_size((100, 24)).columns
     previews = [file.preview.text(width) for file in written if file.preview]
     output.texts(("".join(f"{line}\n" for line in lines) for lines in previews), "text", sys.stdout)
+    rows = "rows" if any([grid, request.each]) else "messages"
     for file in written:
         if not file.preview:
-            rows = "messages" if grid is None else "rows"
             sys.stderr.write(f"{file.topic}: {file.rows:,} {rows} → {file.path}\n")
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
@@ -72,7 +72,9 @@ def _table_of(
 
     if has_others or not arguments["datetimes"]:
         hint = "select fields after a colon: `/imu:orientation`"
-        raise click.UsageError(f"--grid has no --fields, --where, --nested, --no-datetimes; {hint}")
+        raise click.UsageError(
+            f"--grid has no --fields, --where, --each, --nested, --no-datetimes; {hint}"
+        )
     to_stdout = arguments["style"] == "text" or (arguments["out"] == "-" and sys.stdout.isatty())
     return partial(write_aligned, Grid(grid, *ways), partial(_show_fit, to_stdout))
 

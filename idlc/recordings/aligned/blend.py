@@ -20,11 +20,14 @@ def is_blendable(pa: Any, type_: Any) -> bool:
 
 
 def line(name: str, first: Any, second: Any, weight: Any) -> Any:
-    """Return an Arrow array between two of numbers or of lists, none of which are null."""
+    """Return an Arrow array between two of numbers or of lists; only numbers can be null."""
     import pyarrow as pa
 
     if pa.types.is_floating(first.type):
-        return pa.array(_numbers(first.to_numpy(), second.to_numpy(), weight), first.type)
+        starts, ends = (array.to_numpy(zero_copy_only=False) for array in (first, second))
+        gaps, ends_gaps = (array.is_null().to_numpy(False) for array in (first, second))
+        gaps = gaps | (ends_gaps & (weight != 0))
+        return pa.array(_numbers(starts, ends, weight), first.type, mask=gaps)
     if pa.types.is_fixed_size_list(first.type):
         size = first.type.list_size
         values = line(name, first.flatten(), second.flatten(), np.repeat(weight, size))

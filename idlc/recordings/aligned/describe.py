@@ -12,6 +12,7 @@ from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.enums import enums
 from idlc.model.lowering.lower import lower
+from idlc.recordings.columns.elements import names_of
 from idlc.recordings.columns.plan import INSTANTS
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
@@ -67,18 +68,9 @@ def _of_fields(structure: Structure) -> dict[str, dict[str, str]]:
 
 
 def labels(structure: Structure) -> list[tuple[str, str]]:
-    """Return lists of numbers, each with a list of texts beside it, which may name its elements."""
-    lists = [leaf for leaf in leaves(structure) if leaf.field.is_list]
-    texts: dict[str, list[str]] = {}
-    for leaf in lists:
-        if leaf.field.text:
-            texts.setdefault(leaf.path.rpartition(".")[0], []).append(leaf.path)
-    return [
-        (leaf.path, label)
-        for leaf in lists
-        if leaf.field.is_numeric
-        for label in texts.get(leaf.path.rpartition(".")[0], ())
-    ]
+    """Return lists of numbers, each with a list of texts that may name its elements."""
+    lists = [leaf.path for leaf in leaves(structure) if leaf.field.is_list and leaf.field.primitive]
+    return [(path, label) for path in lists for label in names_of(structure, path)]
 
 
 def quaternions(structure: Structure) -> list[list[str]]:

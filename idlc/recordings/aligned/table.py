@@ -14,6 +14,7 @@ from idlc.recordings.aligned import blend
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
 from idlc.recordings.aligned.describe import labels, leaves, metadata, quaternions
 from idlc.recordings.columns.arrow import arrow
+from idlc.recordings.columns.elements import element_of
 from idlc.recordings.columns.values import needing
 from idlc.recordings.containers.messages import (
     ALWAYS,
@@ -183,7 +184,9 @@ class Aligned:
                 problems += _not_linear(track)
             for field in track.schema:
                 name = f"{track.topic}.{field.name}"
-                fields.append(pa.field(name, field.type, metadata=facts.get(field.name)))
+                element = element_of(structure, field.name)
+                path = element.values if element else field.name
+                fields.append(pa.field(name, field.type, metadata=facts.get(path)))
             age = f"{track.topic}.{'_age' if 'age' in track.schema.names else 'age'}"
             fields.append(pa.field(age, pa.duration("ns")))
             how = {"how": track.how, "tolerance": track.tolerance, "clock": track.clock}

@@ -43,6 +43,36 @@ def to_arrow(
     return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
 
 
+def to_rows(
+    kind: type | Structure,
+    messages: Any,
+    each: str,
+    fields: Iterable[str] | None = None,
+    flat: bool = False,
+    **options: Any,
+) -> tuple[Any, Any]:
+    """Return a table with a row for each element of a list of messages, and the message of each.
+
+    The `fields` are those of an element.
+    """
+    pa = arrow()
+    from pyarrow import compute
+
+    fields = (fields,) if isinstance(fields, str) else fields
+    paths = (each,) if fields is None else tuple(f"{each}.{field}" for field in fields)
+    table = to_arrow(kind, messages, paths, flat=True, **options)
+    inner = table.schema.field(each).type if each in table.column_names else pa.null()
+    is_list = pa.types.is_large_list(inner) or pa.types.is_fixed_size_list(inner)
+    if not (is_list and pa.types.is_struct(inner.value_type)):
+        raise ValueError(f"`{each}` of {type_of(kind).name} is not a list of messages")
+    column = table[each].combine_chunks()
+    batch = pa.RecordBatch.from_struct_array(column.flatten())
+    rows = pa.Table.from_batches([batch]).replace_schema_metadata(table.schema.metadata)
+    while flat and any(map(pa.types.is_struct, rows.schema.types)):
+        rows = rows.flatten()
+    return rows, compute.list_parent_indices(column)
+
+
 def definition_of(structure: Structure) -> str:
     """Return a type's definition and those it refers to, as recordings have them.
 

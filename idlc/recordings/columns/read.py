@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from idlc.recordings.columns.elements import selected
 from idlc.recordings.columns.plan import PlanLevel, plan_of
 from idlc.recordings.columns.scan import (
     Cursors,
@@ -77,16 +78,21 @@ def to_columns(
 ) -> Columns:
     """Return the columns of messages, which may have a way of their own; raise DecodeError.
 
+    Elements of lists, such as `position.elbow` or `covariance[0]`, can be among the fields.
     `on_unread` gets the number of bytes that are left in each message, and `None` if that is not
     known, because not all fields are read, or a message cannot be read.
     """
     wanted = (fields,) if isinstance(fields, str) else fields
     judge = on_unread or _ignore
+    selection = None
+    if wanted is not None:
+        selection = selected(type_of(kind), tuple(wanted))
+        wanted = selection.needed
     if hasattr(messages, "columns"):
         judge(None)
         columns: Columns = messages.columns(kind, wanted)
     else:
-        plan = plan_of(type_of(kind), None if wanted is None else tuple(wanted))
+        plan = plan_of(type_of(kind), wanted)
         located = messages_of(messages)
         try:
             table, top, unread = _read(plan, located)
@@ -95,6 +101,8 @@ def to_columns(
             explain(kind, plan, located)
         judge(unread if plan.whole else None)
         columns = table.columns(top)
+    if selection is not None and selection.elements:
+        columns = selection.columns(columns)
     return columns.dated() if datetimes else columns
 
 

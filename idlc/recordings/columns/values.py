@@ -262,7 +262,11 @@ def _arrow(pa: Any, column: Any, dictionary: bool) -> Any:
     """Return the array of a column. `pa.array` would import pandas."""
 
     def of_buffers(type_: Any, *buffers: Any, children: Any = None) -> Any:
-        every = [None, *map(pa.py_buffer, buffers)]
+        valid = None
+        if isinstance(column, np.ma.MaskedArray):
+            mask = np.ma.getmaskarray(column)
+            valid = pa.py_buffer(np.packbits(~mask, bitorder="little"))
+        every = [valid, *map(pa.py_buffer, buffers)]
         return pa.Array.from_buffers(type_, len(column), every, children=children)
 
     if isinstance(column, Columns):
@@ -301,6 +305,9 @@ def _dtype(column: Any, path: str) -> Any:
     if isinstance(column, Columns):
         inner = dict(column).items()
         return np.dtype([(name, _dtype(inside, f"{path}.{name}")) for name, inside in inner])
+    if isinstance(column, np.ma.MaskedArray):
+        row = int(np.ma.getmaskarray(column).argmax())
+        raise ValueError(f"{path.format(row)}: is missing; a structured array has no gaps")
     if isinstance(column, np.ndarray):
         return np.dtype((column.dtype, column.shape[1:]))
     sizes = column.sizes
