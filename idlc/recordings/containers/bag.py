@@ -132,14 +132,13 @@ def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, Fi
 
     Other files are left out. `metadata` is what `retyped` returns.
     """
-    spans = [file.span for file in files.values() if file.span]
-    whole = (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
-    total = FileExtent(sum(topics.values()), whole)
+    total = _total(files.values())
     root = _root(metadata)
     information = _values([root], INFORMATION)
-    edits = [_number(node, total.messages) for node in _values(information, COUNT)]
+    values = [(information, COUNT, total.messages)]
     for outer, (key, time) in total.times().items():
-        edits += [_number(node, time) for node in _values(_values(information, outer), key)]
+        values.append((_values(information, outer), key, time))
+    edits = [_number(node, value) for nodes, key, value in values for node in _values(nodes, key)]
     for listed in _values(information, TOPICS):
         for topic in listed.value if listed.id == "sequence" else ():
             name = _type_of(*_values([topic], TOPIC)).get("name", "")
@@ -151,6 +150,17 @@ def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, Fi
         contents = (_content(node) for node in described.value if node.id == "mapping")
         edits.append(_listed(described, list(_described(contents, files))))
     return _edited(metadata.decode(), edits).encode()
+
+
+def _total(files: Iterable[FileExtent]) -> FileExtent:
+    """Return the extent of a bag of some files."""
+    messages, spans = 0, list[tuple[int, int]]()
+    for file in files:
+        messages += file.messages
+        spans += [file.span] if file.span else []
+    if not spans:
+        return FileExtent(messages, None)
+    return FileExtent(messages, (min(spans)[0], max(end for _, end in spans)))
 
 
 def _described(
