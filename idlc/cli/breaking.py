@@ -67,8 +67,8 @@ def command(**arguments: Any) -> int:
     the recording. If PATH is a recording, too, idlc compares the recorded types with each other.
     Without PATH, it compares every recorded type with the type on this machine.
 
-    With graph or the address of a robot, idlc reports types of which running nodes use different
-    versions. It also compares these versions with your files and your installed packages.
+    With `graph` or the address of a robot, idlc reports each type that running nodes use in
+    different versions. It also compares these versions with your files and your installed packages.
     """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli.run.breaking import run
 

@@ -60,7 +60,7 @@ include = click.option(
     metavar="DIR",
     multiple=True,
     type=click.Path(file_okay=False),
-    help="Search this folder first. Repeatable.",
+    help="Search this folder for types before any other. Repeatable.",
 )
 exclude = click.option(
     "--exclude",

@@ -44,8 +44,8 @@ def command(**arguments: Any) -> None:
     topics, services and actions, and the nodes that use them. It also reports incompatible
     endpoints.
 
-    With --format hash, idlc prints the hashes of all TYPE, PATH and REC arguments, and for a
-    service or action those of the messages that ROS 2 derives from it.
+    With --format hash, you can give several arguments, and idlc prints the hash of each type. For a
+    service or action, it also prints the hashes of its messages, such as the request.
     """
     from idlc.cli.run.show import run
 

@@ -68,7 +68,8 @@ EPILOG += "\n" + options.example(
 @click.option(
     "--allow-loss",
     is_flag=True,
-    help="If the new version does not contain the type of a message, keep the message unchanged.",
+    help="If a type was removed, keep its messages under the old type. Without this option, idlc "
+    "reports an error.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @options.packages

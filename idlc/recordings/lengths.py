@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from struct import Struct
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from idlc.model.distros import Distro
 from idlc.recordings.containers.file import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.runtime.typeinfo import Structure
@@ -98,6 +99,17 @@ class _Estimate:
         self.size += -self.size % size + count * size
 
 
+class KnownVersion(NamedTuple):
+    """A version of a type, and the words that name it.
+
+    A recording that defines nothing can be read as that of a `distro`.
+    """
+
+    words: str
+    structure: Structure
+    distro: Distro | None = None
+
+
 class WrongDefinitionError(RecordingError):
     """Messages are of another version of the type that they are recorded with."""
 
@@ -107,14 +119,15 @@ def check_lengths(
     structure: Structure,
     unread: Any,
     raws: Sequence[Raw],
-    known_versions: Iterable[tuple[str, Structure]],
-    hint: str = WRONG_DEFINITION,
+    known_versions: Iterable[KnownVersion],
+    option: str = "--distro ",
 ) -> str:
     """Return what the lengths of messages prove, empty if they fit a type.
 
     `unread` has the number of bytes in each message that the type does not read, and is `None` if
     one cannot be read; `raws` are some of the messages, those that are longest if any is too long.
-    Raises WrongDefinitionError if no message fits, but another version does.
+    Raises WrongDefinitionError if no message fits, but another version does. The hint of that says
+    how to choose a distribution, which is the value of an `option`.
     """
     if unread is None:
         what = f"messages of `{topic.name}` do not have the definition of {topic.type}"
@@ -132,7 +145,8 @@ def check_lengths(
         what = f"{which} of `{topic.name}` has {size} bytes that the definition of {topic.type} "
         what += "does not read"
     if is_proof:
-        for words, version in known_versions:
+        for words, version, distro in known_versions:
             if version.hash != structure.hash and fits(version, raws):
+                hint = f"use `{option}{distro.name}`" if distro else WRONG_DEFINITION
                 raise WrongDefinitionError(f"{what}; {words} fits", hint)
     return "" if unread is None else f"{what}: the publisher has another version of the type"

@@ -28,7 +28,7 @@ from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
-from idlc.recordings.lengths import fits
+from idlc.recordings.lengths import KnownVersion, fits
 from idlc.recordings.memory import (
     ModelsByName,
     class_in,
@@ -204,7 +204,9 @@ def type_of(
         message = diagnostic.message
         if distros:
             what = message.partition("; ")[0]
-            message = f"{what}; idlc uses the type of {titles(distros)}, which fits the messages"
+            message = (
+                f"{what}; idlc uses the type of ROS 2 {titles(distros)}, which fits the messages"
+            )
         fitting = next(iter(distros), None)
         warnings.warn(MissingDefinitionWarning(topic.name, message, fitting), stacklevel=2)
     if list(report):  # the local definitions that are used instead may change
@@ -236,21 +238,24 @@ def _fitting(
 
 def known_versions(
     topic: Topic, include: tuple[str, ...], others: Iterable[Topic]
-) -> Iterator[tuple[str, Structure]]:
-    """Yield other versions of a topic's type, each with the words that name it.
+) -> Iterator[KnownVersion]:
+    """Yield other versions of a topic's type.
 
     They are those of `others`, that of this machine, and those of each distribution of ROS 2.
     """
     release = Scope(Root.here()).distro
     bare = msgspec.structs.replace(topic, schema=None, hash=None)
-    candidates = [
-        *(("another version in the recording", other, release) for other in others),
-        ("the version on this machine", bare, release),
-        *((f"the version of ROS 2 {distro.title}", bare, distro) for distro in DISTROS),
+    is_undefined = topic.schema is None or topic.schema.is_blank
+    candidates: list[tuple[str, Topic, Distro, Distro | None]] = [
+        *(("another version in the recording", other, release, None) for other in others),
+        ("the version on this machine", bare, release, None),
     ]
-    for words, candidate, distro in candidates:
+    for distro in DISTROS:
+        words = f"the version of ROS 2 {distro.title}"
+        candidates.append((words, bare, distro, distro if is_undefined else None))
+    for words, candidate, distro, chosen in candidates:
         with suppress(RecordingError):
-            yield words, _compiled(candidate, include, distro)[0].structure
+            yield KnownVersion(words, _compiled(candidate, include, distro)[0].structure, chosen)
 
 
 @lru_cache(maxsize=64)

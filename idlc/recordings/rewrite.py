@@ -28,7 +28,7 @@ from idlc.project.atomic import (
 )
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
-from idlc.recordings.containers.container import is_db3
+from idlc.recordings.containers.container import is_db3, open_recording
 from idlc.recordings.containers.conversion import (
     Conversion,
     Conversions,
@@ -252,7 +252,11 @@ class _Rewriting:
             return
         if self.damage:
             by_topic = {name: topic.messages for name, topic in self.result.topics.items()}
-            data = bag.recounted(data, by_topic, counts)
+            files: dict[str, bag.FileExtent] = {}
+            for name, count in counts.items():
+                with open_recording(str(target / mcap_name(Path(name)))) as written:
+                    files[name] = bag.FileExtent(count, written.span())
+            data = bag.recounted(data, by_topic, files)
         is_mcap = all(path.suffix == ".mcap" for path in paths)
         data = data if is_mcap else as_mcap(data.decode()).encode()
         (target / bag.METADATA).write_bytes(data)

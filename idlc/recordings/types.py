@@ -204,7 +204,7 @@ class Contents:
 #: Names that are listed in a sentence.
 NAMED = 5
 #: The hint where a local definition is used instead of the recording's.
-BORROWED = "check that the local type equals the recorded type, or add the right folder with -I"
+BORROWED = "check that it equals the recorded type; `--distro NAME` or `-I DIR` chooses another"
 #: Reasons why a definition is not the recording's.
 ABSENT, UNREADABLE = "the recording does not define", "there are errors in the definition of"
 WRONG = "the recorded hash does not match the definition of"
@@ -253,6 +253,13 @@ class LocalTypes:
         report = Report()
         model = self._compiler.model(package, list(interfaces.values()), report)
         return model.sound({error.where[0] for error in report.errors})
+
+    def origin(self, name: ir.TypeName) -> str:
+        """Return the words for a type that is defined locally: it may be of a distribution."""
+        if name in self.library.texts:
+            return "the type of `--from`"
+        is_built_in = self.library.path(name) is None
+        return f"the type of ROS 2 {self.library.distro.title}" if is_built_in else "the local type"
 
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
         """Return the hash of a type that an interface defines; `None` if it is not known."""
@@ -378,19 +385,20 @@ class RecordedTypes:
 
         A local definition that replaces a missing one and has the recorded hash is not reported.
         """
-        doubtful: dict[tuple[str, str, bool], set[ir.TypeName]] = {}
+        doubtful: dict[tuple[str, str, bool, str], set[ir.TypeName]] = {}
         for typed in self.topics:
             missing = {name for name in self.names_of(typed) if name not in self.texts}
             sure = bool(missing) and typed.recorded.topic.hash == self.hash(typed)
             for name in missing:
                 why = self._broken.get(name, ABSENT)
                 if why != ABSENT or not sure:
-                    doubtful.setdefault((typed.recorded.recording, why, sure), set()).add(name)
-        for (recording, why, sure), undefined in doubtful.items():
+                    key = typed.recorded.recording, why, sure, self._local.origin(name)
+                    doubtful.setdefault(key, set()).add(name)
+        for (recording, why, sure, origin), undefined in doubtful.items():
             names = _named(undefined)
             which = "the recorded hash" if sure else "the same name"
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
-            message = f"{why} {names}; idlc uses the local type, which has {which}"
+            message = f"{why} {names}; idlc uses {origin}, which has {which}"
             hint = _RECORDERS if why == WRONG else None
             yield code.of(recording, message, hint=hint if sure else BORROWED)
         partial: dict[str, set[ir.TypeName]] = {}

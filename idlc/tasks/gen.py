@@ -126,6 +126,10 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
         named += recorded
     if report.had_errors:
         return ()
+    if recordings:
+        from idlc.tasks.check_recordings import note_fitting
+
+        note_fitting(recordings, options.scope, report)
     packages = requested_packages(paths, named, options.out, options.scope, report)
     for package in packages:
         is_whole = options.ament or package.package in words or package.is_whole(root)

@@ -180,8 +180,19 @@ def test_the_distribution_that_fits_is_used(tmp_path, monkeypatch, capsys):
     assert main(words) == 0
     assert "which fits the messages" in capsys.readouterr().err
     assert main([*words, "--distro", "humble"]) == 0
-    assert "fits" not in capsys.readouterr().err
-    assert main([*words, "--distro", "jazzy"]) == 1
+    error = capsys.readouterr().err
+    assert "fits" not in error
+    assert "idlc uses the type of ROS 2 Humble, which has the same name" in error
+    commands = {
+        (*words, "--distro", "jazzy"): "use `--distro humble`",
+        ("upgrade", path, "--topic", "/range", "-o", "up"): "use `--from distro:humble`",
+        ("upgrade", path, "--from", "src/own_msgs", "-o", "up"): "use `--from distro:humble`",
+        ("gen", path, "-o", "g", "-I", "src"): "generate with `--distro humble`",
+        ("check", path, "-I", "src"): "check with `--distro humble`",
+    }
+    for command, advice in commands.items():
+        assert main([*command]) == (1 if "use" in advice else 0)
+        assert advice in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("name", CASES)

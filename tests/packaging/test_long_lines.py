@@ -1,12 +1,33 @@
 """Edits of setup.py wrap the lines that they make too long, and change nothing else."""
 
 import ast
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from idlc.cli.main import main
 from idlc.packaging.setup_edits import arrange
 
+FORMATTED = """\
+import os
+
+from setuptools import find_packages, setup
+
+package_name = os.path.basename("demo")
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/demo"]),
+        ("share/demo", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+)
+"""
 LONG = ", ".join(f"'name_{n} = demo.module_{n}:main'" for n in range(6))
 LINES = {
     "a list": f"scripts = [{LONG}]\n",
@@ -79,6 +100,23 @@ def test_commands_write_no_long_lines(command, tmp_path, monkeypatch):
         assert name in setup.read_text()
     assert all(len(line) <= 99 for line in setup.read_text().splitlines())
     ast.parse(setup.read_text())
+
+
+def test_a_formatted_file_stays_formatted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo"]) == 0
+    monkeypatch.chdir("demo")
+    Path("setup.py").write_text(FORMATTED, encoding="utf-8")
+    Path("msg").mkdir()
+    Path("msg/Drive.msg").write_text("bool a\n", encoding="utf-8")
+    main(["check", "--fix", "."])
+    text = Path("setup.py").read_text(encoding="utf-8")
+    assert "rosidl_interfaces" in text
+    assert "find_spec" in text
+    for words in (["check", "--select", "E,F,I"], ["format", "--check"]):
+        command = [sys.executable, "-m", "ruff", *words, "--isolated", "setup.py"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{done.stdout}\n{text}"
 
 
 @pytest.mark.parametrize(

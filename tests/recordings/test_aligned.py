@@ -226,6 +226,30 @@ def test_elements_that_change_places_have_nothing_between_them(tmp_path):
             assert part.to_arrow()["/joints.position"].to_pylist() == [[0, 1], [2, 1], [1, 3]]
 
 
+@pytest.mark.parametrize("how", ["last", "nearest", "linear"])
+def test_a_topic_without_messages_has_no_values(how, tmp_path):
+    path = tmp_path / "a.mcap"
+    found = made.messages(9)
+    with path.open("wb") as file:
+        writer = made.Writer(file)
+        writer.start(profile="ros2")
+        for topic in ("/imu", "/other"):
+            text = made.definition(made.IMU).encode()
+            schema = writer.register_schema(made.IMU, "ros2msg", text)
+            channel = writer.register_channel(topic, "cdr", schema)
+            for message in made.of_topic(found, topic):
+                writer.add_message(channel, message.log_time, message.data, message.log_time)
+        writer.finish()
+    topics = {"/imu": "angular_velocity", "/other": "angular_velocity"}
+    with idlc.Recording(path) as recording:
+        for clock, count in (({"on": "/imu"}, 3), ({"every": "300ms"}, 3), ({"on": "/other"}, 0)):
+            table = recording.aligned(topics, how={"/other": how}, **clock)
+            arrow = table.to_arrow()
+            assert [len(arrow), arrow["/other.age"].null_count] == [count, count]
+            assert [arrow[NUMBERS].null_count, table.summary()[1].missing] == [0, count]
+            assert sum(len(part.to_arrow()) for part in table.parts()) == count
+
+
 def test_a_header_of_its_own_is_no_clock(tmp_path):
     found = [message for message in made.varied() if message.topic in ("/Bool", "/TFMessage")]
     with idlc.Recording(made.by_mcap(tmp_path / "a.mcap", found)) as recording:

@@ -258,6 +258,11 @@ def test_the_metadata_of_a_copy_counts_what_is_there(storage, style, loss, tmp_p
     counts = [file["message_count"] for file in information["files"]]
     assert counts[0] == counts[-1] == 40
     assert sum(counts) == information["message_count"] == messages.total() < 120
+    for written, place in ((information, ""), *zip(information["files"], names, strict=True)):
+        _, part = read(tmp_path / "copy" / place)
+        start, end = part.span() or (0, 0)
+        assert written["starting_time"] == {"nanoseconds_since_epoch": start}
+        assert written["duration"] == {"nanoseconds": end - start}
     every = [each["message_count"] for each in information["topics_with_message_count"]]
     assert sum(every) == messages.total()
 

@@ -1,5 +1,6 @@
 """Names that interface files cannot have, and packages of .idl files, in recordings of others."""
 
+import shutil
 import sqlite3
 import struct
 from contextlib import closing
@@ -103,9 +104,16 @@ def test_a_package_of_idl_files_defines_recorded_types(inside, include, tmp_path
     folder = str(tmp_path / "ws" / include)
     assert main(["columns", str(path), "/x", "-I", folder, "--format", "csv"]) == 0
     assert ",,7," in capsys.readouterr().out
-    assert main(["upgrade", str(path), "-I", folder, "-o", str(tmp_path / "up")]) == 0
-    with idlc.Recording(tmp_path / "up" / "a.mcap") as opened:
-        assert opened["/x"].to_arrow()["a"].to_pylist() == [7]
+    longer = tmp_path / "longer" / "demo_msgs"
+    shutil.copytree(package, longer)
+    (longer / "msg" / "X.idl").write_text(IDL.format(inside.replace("; };", "; octet c; };")))
+    for number, words in enumerate((["-I", folder], ["--from", folder, "--to", str(longer)])):
+        out = tmp_path / str(number)
+        assert main(["upgrade", str(path), *words, "-o", str(out)]) == 0
+        with idlc.Recording(out / "a.mcap") as opened:
+            columns = opened["/x"].to_arrow()
+        assert columns["a"].to_pylist() == [7]
+        assert ("c" in columns.column_names) == bool(number)
 
 
 def test_complete_recordings_need_no_packages_around_here(tmp_path, monkeypatch):

@@ -49,8 +49,14 @@ def test_definitions_of_one_type_are_upgraded_together(other, tmp_path, monkeypa
 
 def test_what_did_not_change_is_said(files, capsys):
     write_package(files / "other", {"X": "uint8 x\n"}, "other_msgs")
-    assert main(["upgrade", "2023.mcap", "--to", "other/other_msgs", "-o", "up"]) == 0
-    assert capsys.readouterr().out == "2023.mcap → up/2023.mcap\n  no types changed\n"
+    write_package(files / "near", {"Near": "uint8 x\n"}, "demo_msgs")
+    for target in ("other/other_msgs", "near/demo_msgs", "2023.mcap"):
+        words = ["--to", target, "-o", target.partition("/")[0] + "_up"]
+        assert main(["upgrade", "2023.mcap", *words, "--allow-loss"]) == 0
+        captured = capsys.readouterr()
+        has_note = "has none of the packages of `2023.mcap`, which are `demo_msgs`" in captured.err
+        assert has_note == target.startswith("other")
+        assert ("  no types changed\n" in captured.out) != target.startswith("near")
 
 
 #: Texts of two types on one topic, and those of the target: one type changes, or both do.

@@ -136,7 +136,7 @@ class AlignedPart:
         self._tracks = [source.track for source in sources]
         self._needs = needs
         self._parts = [
-            source.selection.between(*need.window).parts() if len(need.rows) else []
+            _ordered_parts(source.selection.between(*need.window)) if len(need.rows) else []
             for source, need in zip(sources, needs, strict=True)
         ]
 
@@ -150,6 +150,17 @@ class AlignedPart:
             for track, parts, need in zip(self._tracks, self._parts, self._needs, strict=True)
         ]
         return _assembled(self.schema, self._ticks, values)
+
+
+def _ordered_parts(selection: Any) -> list[Any]:
+    """Return the parts of messages; raise RecordingError if they are not in the recorded order."""
+    parts: list[Any] = selection.parts()
+    channels = {(str(part.place), part.ids) for part in parts}
+    if len(channels) > len({place for place, _ in channels}):
+        what = f"a file has several versions of the messages of `{selection.topic.name}`"
+        hint = "use to_reader(), or convert the file: `idlc upgrade REC --to PATH -o OUT`"
+        raise RecordingError(f"{what}: its table has no parts", hint)
+    return parts
 
 
 class Aligned:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -20,6 +20,7 @@ METADATA = "metadata.yaml"
 #: Keys in it.
 INFORMATION, TOPICS = "rosbag2_bagfile_information", "topics_with_message_count"
 TOPIC, COUNT, PATHS = "topic_metadata", "message_count", "relative_file_paths"
+START, DURATION = "starting_time", "duration"
 TYPE_KEYS = ("type", "type_description_hash")
 #: No recorder writes more, or deeper.
 MOST_OF_METADATA = 1 << 23
@@ -114,14 +115,30 @@ def retyped(metadata: Path, new_type: Callable[[str, str], tuple[str, str] | Non
     return text.encode()
 
 
-def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, int]) -> bytes:
-    """Return a metadata.yaml with the numbers of messages of topics and files, by their names.
+class FileExtent(NamedTuple):
+    """The number of messages in a file of a bag, and the times of the first and the last one."""
+
+    messages: int
+    span: tuple[int, int] | None
+
+    def times(self) -> dict[str, tuple[str, int]]:
+        """Return the key of each time and its value in nanoseconds, by the key around it."""
+        start, end = self.span or (0, 0)
+        return {START: ("nanoseconds_since_epoch", start), DURATION: ("nanoseconds", end - start)}
+
+
+def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, FileExtent]) -> bytes:
+    """Return a metadata.yaml with the messages of topics and files, by their names, and the times.
 
     Other files are left out. `metadata` is what `retyped` returns.
     """
+    total = _total(files.values())
     root = _root(metadata)
     information = _values([root], INFORMATION)
-    edits = [_number(node, sum(topics.values())) for node in _values(information, COUNT)]
+    values = [(information, COUNT, total.messages)]
+    for outer, (key, time) in total.times().items():
+        values.append((_values(information, outer), key, time))
+    edits = [_number(node, value) for nodes, key, value in values for node in _values(nodes, key)]
     for listed in _values(information, TOPICS):
         for topic in listed.value if listed.id == "sequence" else ():
             name = _type_of(*_values([topic], TOPIC)).get("name", "")
@@ -130,14 +147,31 @@ def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, in
         names = [str(node.value) for node in paths.value if node.id == "scalar"]
         edits.append(_listed(paths, [name for name in names if _plain_name(name) in files]))
     for described in _values(information, "files"):
-        contents = [_content(node) for node in described.value if node.id == "mapping"]
-        present = [
-            {**content, COUNT: files[name]}
-            for content in contents
-            if (name := _plain_name(str(content.get("path", "")))) in files
-        ]
-        edits.append(_listed(described, present))
+        contents = (_content(node) for node in described.value if node.id == "mapping")
+        edits.append(_listed(described, list(_described(contents, files))))
     return _edited(metadata.decode(), edits).encode()
+
+
+def _total(files: Iterable[FileExtent]) -> FileExtent:
+    """Return the extent of a bag of some files."""
+    messages, spans = 0, list[tuple[int, int]]()
+    for file in files:
+        messages += file.messages
+        spans += [file.span] if file.span else []
+    if not spans:
+        return FileExtent(messages, None)
+    return FileExtent(messages, (min(spans)[0], max(end for _, end in spans)))
+
+
+def _described(
+    contents: Iterable[dict[str, Any]], files: Mapping[str, FileExtent]
+) -> Iterator[dict[str, Any]]:
+    """Yield what a metadata.yaml says about files, of those that there are."""
+    for content in contents:
+        extent = files.get(_plain_name(str(content.get("path", ""))))
+        if extent is not None:
+            times = {outer: {key: time} for outer, (key, time) in extent.times().items()}
+            yield {**content, **times, COUNT: extent.messages}
 
 
 #: A part of a text, from one offset to another, and what takes its place.

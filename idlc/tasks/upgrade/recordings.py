@@ -17,7 +17,7 @@ from idlc.api.sources import read_source
 from idlc.api.upgrade import Runner, UpgradeError
 from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Label, Report
+from idlc.diagnostics.report import Label, Report, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model import ir
 from idlc.project.files import is_folder
@@ -38,9 +38,10 @@ from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import definition_text, interface_of
 from idlc.recordings.find import is_recording
-from idlc.recordings.lengths import SAMPLE, check_lengths, first_longer
+from idlc.recordings.lengths import SAMPLE, WRONG_DEFINITION, check_lengths, first_longer
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
+    NAMED,
     DefinedTopic,
     LocalTypes,
     RecordedTypes,
@@ -217,6 +218,7 @@ def _plans(
     if topics is None:
         return
     selected = set(options.topics)
+    packages: set[str] = set()
     definitions = Counter(topic.topic.name for topic in topics)
     for version in versions(topics):
         version = msgspec.structs.replace(
@@ -227,11 +229,16 @@ def _plans(
             continue
         types = recorded_types(version, local, report)
         report.extend(types.errors)
+        packages |= {name.package for name in types.interfaces}
         if not is_address(recording):
             _check_lengths(recording, types, options, report)
         with stage("plan", recording):
             for each in _of_types(recording, types, target, rules, report, undefined):
                 yield each._replace(several=definitions[each.topic] > 1)
+    if packages and target.texts and not any(map(target.owns, packages)):
+        listed = first_few((f"`{package}`" for package in sorted(packages)), NAMED)
+        where = f"`{options.to}` has none of the packages of `{recording}`"
+        report.notes.append(f"{where}, which are {listed}")
     undefined[:] = [each._replace(several=definitions[each.topic] > 1) for each in undefined]
 
 
@@ -251,16 +258,20 @@ def _check_lengths(
                 raws += batch.first_views(SAMPLE - len(raws))
                 if len(raws) >= SAMPLE:
                     break
-            known = known_versions(topic, options.scope.include, ())
-            hint = "if the recording has no definition, add --from with the publisher's version"
             unread = unread_bytes(structure, raws)
+            hint: str | None = WRONG_DEFINITION
+            if topic.schema is None:
+                hint = "use `--from` with the publisher's version"
+            problem = ""
             try:
-                problem = check_lengths(topic, structure, unread, raws, known, hint) if raws else ""
+                if raws:
+                    known = known_versions(topic, options.scope.include, ())
+                    option = "--from distro:"
+                    problem = check_lengths(topic, structure, unread, raws, known, option)
             except RecordingError as error:
-                report.add(codes.CONVERSION_FAILED.of(recording, error.message, hint=error.hint))
-            else:
-                if problem:
-                    report.add(codes.CONVERSION_FAILED.of(recording, problem, hint=hint))
+                problem, hint = error.message, error.hint
+            if problem:
+                report.add(codes.CONVERSION_FAILED.of(recording, problem, hint=hint))
 
 
 def _of_types(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from idlc.api.sources import read_source
 from idlc.compiler.compiler import Compiler, sources_of
@@ -15,8 +15,9 @@ from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.project import inputs
-from idlc.project.find import InterfaceFile, find
-from idlc.project.library import InterfaceTexts, Library
+from idlc.project.find import InterfaceFile, list_files, no_interfaces, unread_idl
+from idlc.project.library import IDL, InterfaceTexts, Library
+from idlc.project.package_xml import declared_name
 from idlc.project.settings import Scope
 from idlc.recordings.find import is_recording
 from idlc.recordings.packages import check_versions
@@ -67,13 +68,13 @@ class UpgradeTarget:
     ) -> None:
         self.scope = scope
         self.texts = texts
-        self.homes = homes
+        self.homes = dict(homes)
         self.distro = distro
-        self._whole = whole
+        self.whole = whole
 
     def defines(self, package: str) -> bool:
         """Return whether the target has all interfaces of a package, so that others are gone."""
-        return package in self._whole or bool(self.distro and catalog.is_standard(package))
+        return package in self.whole or bool(self.distro and catalog.is_standard(package))
 
     def owns(self, package: str) -> bool:
         """Return whether a package is one of the folder or revision that was named."""
@@ -117,7 +118,7 @@ def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[UpgradeT
     elif is_recording(to, scope.root):
         yield _of_recording(to, scope, report)
     else:
-        yield _of_files(find([to], scope.root, report, scope.exclude), scope, report)
+        yield _of_path(to, scope, report)
 
 
 def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
@@ -126,6 +127,32 @@ def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget | No
     if report.had_errors:
         return None
     return UpgradeTarget(scope, groups[0].texts if groups else {}, {})
+
+
+def _of_path(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
+    """Return the types of an interface file, or of all packages in a folder."""
+    root = scope.root
+    listing = list_files([path], root, report, scope.exclude)
+    texts: dict[ir.TypeName, Source] = {}
+    homes: dict[str, Path] = {}
+    for folder in listing.packages:
+        manifest = root.manifest(folder)
+        declared = declared_name(manifest, root, Report()) if manifest else None
+        package = declared or folder.name
+        for name in unread_idl([folder], scope.exclude):
+            kind, _, file = name.partition("/")
+            source = root.read_source(folder / name, root.shown(folder / name), report)
+            if source is not None:
+                homes[package] = folder
+                interface = ir.TypeName(package, cast("ir.Kind", kind), file.removesuffix(IDL))
+                texts[interface] = source
+    if not texts:
+        report.extend(no_interfaces(each, root, scope.exclude) for each in listing.empty)
+    target = _of_files(listing.files, scope, report)
+    if target is None or not texts:
+        return target
+    texts.update(target.texts)
+    return UpgradeTarget(scope, texts, homes | target.homes, target.whole | homes.keys())
 
 
 def _of_files(
