@@ -861,11 +861,15 @@ class RecordedTopic(Selection):
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
+        places = self._container.places(self.topic)
+        return [part for file, ids, _ in places for part in self.parts_of(file, ids, size)]
+
+    def parts_of(self, file: Any, ids: list[int], size: int) -> list[Part]:
+        """Return the parts of one file."""
         how = self.window, self.options
         return [
-            Part(self.topic, file.place, tuple(numbers), pieces, *how)
-            for file, numbers, _ in self._container.places(self.topic)
-            for pieces in file.parts(numbers, self.window, size)
+            Part(self.topic, file.place, tuple(ids), pieces, *how)
+            for pieces in file.parts(ids, self.window, size)
         ]
 
 
@@ -893,8 +897,23 @@ class RecordedVersions(RecordedTopic):
         return RecordedVersions(self._container, versions[0].window, versions)
 
     def parts(self, size: int = PART) -> list[Part]:
-        """Return pieces for others to read, those of each version apart."""
-        return [part for version in self.versions for part in version.parts(size)]
+        """Return pieces for others to read, in the order of the files; each is of one version."""
+        return [
+            part
+            for file, owners in self._owners()
+            for version, ids in owners
+            for part in version.parts_of(file, ids, size)
+        ]
+
+    def _owners(self) -> Iterator[tuple[Any, list[tuple[RecordedTopic, list[int]]]]]:
+        """Yield the files with messages, and which versions have them."""
+        owners: dict[int, list[tuple[RecordedTopic, list[int]]]] = {}
+        for version in self.versions:
+            for file, ids, _ in self._container.places(version.topic):
+                owners.setdefault(id(file), []).append((version, ids))
+        for file in self._container.files:
+            if id(file) in owners:
+                yield file, owners[id(file)]
 
     def compare_lengths(self, batch: TopicMessages | None = None, kind: Any = None) -> None:
         """Compare nothing: `recorded` compares the lengths of each version."""
@@ -908,19 +927,15 @@ class RecordedVersions(RecordedTopic):
 
     def recorded(self) -> Iterator[TopicMessages]:
         """Yield the messages as one version; those that are stored together in order of time."""
-        numbers: dict[int, list[tuple[RecordedTopic, list[int]]]] = {}
         for version in self.versions:
             version.absent = 0
-            for file, mine, _ in self._container.places(version.topic):
-                numbers.setdefault(id(file), []).append((version, mine))
         warned = len(self._container.damage)
-        for file in self._container.files:
-            owners = numbers.get(id(file), [])
-            every = [number for _, mine in owners for number in mine]
-            for pieces in file.parts(every, self.window, PART) if every else ():
+        for file, owners in self._owners():
+            every = [number for _, ids in owners for number in ids]
+            for pieces in file.parts(every, self.window, PART):
                 batches = []
-                for version, mine in owners:
-                    recorded = file.messages(mine, pieces, self.window)
+                for version, ids in owners:
+                    recorded = file.messages(ids, pieces, self.window)
                     for batch in version.matching(recorded):
                         version.compare_lengths(batch)
                         batches.append(version.read_as(batch))

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
-from idlc.build.step import is_clone, present, remove_leftovers
+from idlc.build.step import present, remove_leftovers, stop_if_outdated
 from idlc.cli import output
 from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
@@ -23,7 +23,7 @@ from idlc.project.atomic import write_whole
 from idlc.project.files import is_file, read_bytes, reason
 from idlc.project.find import list_files
 from idlc.project.inputs import packages
-from idlc.project.lock import load_lock
+from idlc.project.lock import FILE, load_lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 from idlc.tasks.gen import GenOptions, gen
@@ -51,12 +51,8 @@ def compiled_class(package: str, base: Any) -> type:
     inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
     folder = home_of(where.root.base, package, where.root)
     if not inputs:
-        lock = load_lock(folder, "", Report())
-        if lock and lock.inputs and is_clone(where.root.base):
-            raise SystemExit(
-                f"error: the interfaces of the classes in `{folder.name}` are gone\n"
-                "  = hint: `idlc check` names the files to remove"
-            )
+        if is_file(folder / FILE):
+            stop_if_outdated(folder)
         return distribution_class(package, base, {}, folder)
     home = folder.relative_to(where.root.base).as_posix()
     runtime, vendoring = settings.runtime, settings.vendoring

@@ -367,7 +367,7 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
             if facts.has_build_step and output.inputs:
                 message = "the interfaces of the generated code are gone"
                 hint = f"remove `idlc.lock` and the other generated files from `{home}`, "
-                hint += f"except `{BUILD_STEP}`, which setup.py runs"
+                hint += f"except `{BUILD_STEP}`, which the build runs"
                 yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
         elif output.package == facts.name and facts.whole:
             words = ("gen", folder, "-o", home)

@@ -63,22 +63,24 @@ from idlc.cli import completion, options
     "--grid",
     metavar="GRID",
     help="Write one table with all topics: a row for each message of topic GRID, or for each "
-    "period, such as `100ms` or `30Hz`. Select fields after a colon: `/imu:orientation`. Before "
-    "idlc writes the table, it shows for each topic how many rows have a value, and its age.",
+    "period, such as `100ms` or `30Hz`. To select fields of a TOPIC, add them after a colon: "
+    "`/imu:orientation`. First, idlc shows for each topic how many rows have a value, and how old "
+    "these values are.",
 )
 @click.option(
     "--how",
     metavar="WAY",
     multiple=True,
     help="With --grid: take the `last` message before a row, the `nearest`, or a value between two "
-    "(`linear`). For one topic only, write `/imu=linear`. --tolerance and --clock accept this, too.",
+    "(`linear`). To set it for a single topic, write `/imu=linear`. --tolerance and --clock "
+    "take the same form, such as `/imu=50ms`.",
 )
 @click.option(
     "--tolerance",
     metavar="LENGTH",
     multiple=True,
-    help="With --grid: if a topic has no message within this time of a row, such as `50ms`, leave "
-    "its values empty.",
+    help="With --grid: the longest time between a row and a message, such as `50ms`. If a topic "
+    "has no message within this time, its columns are empty in that row.",
 )
 @click.option(
     "--clock",
@@ -89,8 +91,8 @@ from idlc.cli import completion, options
 @click.option(
     "--each",
     metavar="FIELD",
-    help="Write a row for each element of a list of messages, such as `transforms`, instead of for "
-    "each message. --fields are those of an element.",
+    help="Write one row for each element of the list FIELD, such as `transforms`, instead of one "
+    "row for each recorded message. --fields then selects fields of the element.",
 )
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(

@@ -54,7 +54,7 @@ class _Command(click.Command):
 @click.option(
     "--runtime",
     type=click.Choice(["carried", "installed"]),
-    help="Copy the code that all classes use (default), or import idlc-runtime.",
+    help="Copy the shared code into the package (`carried`, the default), or import idlc-runtime.",
 )
 @click.option(
     "--force",
@@ -67,7 +67,7 @@ def command(**arguments: Any) -> int:
 
     PATH is a file or folder, PACKAGE and TYPE are names such as std_msgs and std_msgs/msg/Header,
     and REC is a recording. idlc writes the package to the folder OUT, or several packages to
-    OUT/NAME. In the folder of a package with a setup.py, `idlc gen` is enough.
+    OUT/NAME. Without arguments, it compiles the package in the working folder.
 
     With --ament, `source PREFIX/setup.bash` makes the packages available to ROS 2.
     """

@@ -152,6 +152,16 @@ def including(folder: str) -> str:
     return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
 
 
+def absence() -> str:
+    """Return the advice on a folder that should contain packages, and does not exist."""
+    if _HAS_OPTIONS.get():
+        return "correct `-I`, or `include` in [tool.idlc] of pyproject.toml"
+    return (
+        "correct `include` in [tool.idlc] of pyproject.toml; source distributions do not contain "
+        "it, so build without one: `python -m build --wheel`"
+    )
+
+
 def closest_package(name: str, names: Iterable[str]) -> str | None:
     """Return the package of the nearest name, or `None` if none is near.
 

@@ -29,11 +29,12 @@ from idlc.project.lock import (
 )
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
+from idlc.project.settings import SETTINGS_FILE
 from idlc.project.write import FileChange, WritePlan, plan
 
 
 def build_step() -> bytes:
-    """Return the file that a setup.py runs in builds without idlc."""
+    """Return the file that builds without idlc run."""
     source = Path(__file__).parents[1] / "build" / "step.py"
     return (COPY_HEAD + source.read_text(encoding="utf-8")).encode()
 
@@ -122,13 +123,25 @@ class Target:
 
     @cached_property
     def step(self) -> Mapping[str, bytes]:
-        """The file that the package's setup.py runs; empty without a setup.py."""
+        """The file that the package's build runs; empty if there is no such build."""
         root = self._output.root
         manifest = root.manifest(self.path)
-        if manifest is None or not is_file(manifest.parent / "setup.py"):
-            return {}
-        is_own = declared_name(manifest, root, Report()) == self.package
-        return {BUILD_STEP: build_step()} if is_own else {}
+        if manifest is not None and is_file(manifest.parent / "setup.py"):
+            is_run = declared_name(manifest, root, Report()) == self.package
+        else:
+            is_run = self._is_step_named()
+        return {BUILD_STEP: build_step()} if is_run else {}
+
+    def _is_step_named(self) -> bool:
+        """Return whether a setup.py or pyproject.toml above the package names the file."""
+        root = self._output.root
+        for folder in self.path.parents:
+            named = f"{self.path.relative_to(folder).as_posix()}/{BUILD_STEP}"
+            files = [folder / name for name in ("setup.py", SETTINGS_FILE)]
+            sources = [root.read_source(file, "", Report()) for file in files if is_file(file)]
+            if any(named in source.text for source in sources if source):
+                return True
+        return False
 
     def usable(self) -> bool:
         """Return whether this is or can become a folder; reports IDL612."""

@@ -310,7 +310,7 @@ def unnoticed_changes(setup: Setup, folder: str) -> Iterator[Diagnostic]:
     if BUILD_STEP in setup.source.text or not (is_entered or KEYWORD in setup.arguments):
         return
     find, run = "find_spec('idlc')", f"run_path('{folder}/{BUILD_STEP}')"
-    edits = _before_setup(setup, folder)
+    edits = step_before_setup(setup, folder)
     yield codes.STALE_GENERATED_CODE.at(
         setup.place(KEYWORD),
         "builds without idlc do not notice if the classes are out of date",
@@ -320,8 +320,11 @@ def unnoticed_changes(setup: Setup, folder: str) -> Iterator[Diagnostic]:
     )
 
 
-def _before_setup(setup: Setup, folder: str) -> tuple[Edit, ...]:
-    """Return the edits that run the build step before the statement that calls setup()."""
+def step_before_setup(setup: Setup, folder: str, *, is_library: bool = False) -> tuple[Edit, ...]:
+    """Return the edits that run the build step before the statement that calls setup().
+
+    Where idlc is installed, it compiles the interfaces of other packages than libraries instead.
+    """
     source, call = setup.source, setup.call
     if call is None:
         return ()
@@ -331,18 +334,21 @@ def _before_setup(setup: Setup, folder: str) -> tuple[Edit, ...]:
     has_own_line = _begins_line(source, at) and not getattr(statement, "decorator_list", ())
     if not has_own_line or re.search(r"[^\w./-]", folder):  # it becomes part of a program
         return ()
-    find, imports = imported(setup, "importlib.util", "find_spec")
-    run, more = imported(setup, "runpy", "run_path")
-    if imports and more and imports[0].span == more[0].span:
-        first = imports[0]
-        blank = first.text.rstrip("\r\n") + line_end(source)
-        imports, more = (Edit(first.span, blank + more[0].text),), ()
+    run, imports = imported(setup, "runpy", "run_path")
+    step = f"{run}('{folder}/{BUILD_STEP}')"
+    reason = "# this build stops if `idlc gen` was not run after a change"
+    if is_library:
+        text = f"{reason}\n{step}\n\n"
+    else:
+        find, more = imported(setup, "importlib.util", "find_spec")
+        if imports and more and imports[0].span == more[0].span:
+            first = more[0]
+            blank = first.text.rstrip("\r\n") + line_end(source)
+            more, imports = (Edit(first.span, blank + imports[0].text),), ()
+        imports = (*more, *imports)
+        text = f"if not {find}('idlc'):  {reason}\n{step_of(source)}{step}\n\n"
     quote = quote_of(source, call)
-    text = (
-        f"if not {find}('idlc'):  # this build stops if `idlc gen` was not run after a change\n"
-        f"{step_of(source)}{run}('{folder}/{BUILD_STEP}')\n\n"
-    )
-    return (*imports, *more, insertion(source, at, text.replace("'", quote)))
+    return (*imports, insertion(source, at, text.replace("'", quote)))
 
 
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:

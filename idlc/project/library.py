@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.diagnostics.text import closest, did_you_mean, including
+from idlc.diagnostics.text import absence, closest, did_you_mean, including
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
 from idlc.project import inputs, prefixes
@@ -149,7 +149,7 @@ class Library:
         """Report problems to another report from now on, also for interfaces read before."""
         self._report = report
         for path in self._missing:
-            report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
+            report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}`", hint=absence()))
 
     def _roots(self, package: str) -> list[Path]:
         """Return the folders that may hold a package's interfaces, in order of precedence."""

@@ -31,13 +31,13 @@ from idlc.packaging import dependencies
 from idlc.packaging.facts import folders
 from idlc.packaging.layout import layout
 from idlc.packaging.outcome import Edited, Outcome, Refused
-from idlc.packaging.setup_edits import KEYWORD, append_element
+from idlc.packaging.setup_edits import KEYWORD, append_element, step_before_setup
 from idlc.packaging.setup_py import BOM, Setup
 from idlc.project import git
 from idlc.project.files import entries, is_file, is_folder, read_bytes
 from idlc.project.find import list_files, no_interfaces
 from idlc.project.inputs import Inputs, packages
-from idlc.project.lock import Tree
+from idlc.project.lock import BUILD_STEP, Tree
 from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import INDEX
 from idlc.project.root import MANIFEST, Root
@@ -58,6 +58,11 @@ _REVIEWED_ELSEWHERE = (
     *("_idlc/**", "_vendor/**", "_idlc_build.py", "_type_data.py"),
     *("*/_*__codec.py", "idlc.lock"),
 )
+#: The settings by which build backends run a file of the project.
+_HOOKS = {
+    "hatchling": ("tool.hatch.build.hooks.custom", "path"),
+    "pdm": ("tool.pdm.build", "custom-hook"),
+}
 _PLAIN_SETUP = "from setuptools import setup\n\nsetup()\n"
 _SETUP_TEXT = _PLAIN_SETUP.replace("()", f"({KEYWORD}=True)")
 #: The file of each service at the top of a repository, and its template.
@@ -319,7 +324,7 @@ def _built(
     if layout.kind == "library" and _has_arrays(model):
         note = _numpy(draft)
     if layout.kind != "ament_cmake":
-        more = _outdated_builds(draft, layout)
+        more = _outdated_builds(draft, layout, out)
     return tuple(filter(None, (note, more)))
 
 
@@ -564,19 +569,48 @@ def _setuptools(draft: Draft, out: str, files: Mapping[str, str], report: Report
             report.add(problem)
 
 
-def _outdated_builds(draft: Draft, layout: Layout) -> str:
-    """Return a note on a build that does not notice if the classes are out of date."""
-    system = toml(draft.text(SETTINGS_FILE) or "").get("build-system", {})
+def _outdated_builds(draft: Draft, layout: Layout, out: str) -> str:
+    """Have the build stop at outdated classes; return a note if its tool runs nothing for that."""
+    text = draft.text(SETTINGS_FILE) or ""
+    system = toml(text).get("build-system", {})
     requires = system.get("requires", ()) if isinstance(system, dict) else ()
     if any(_IDLC.match(str(name)) for name in requires):
         return ""
-    if layout.kind != "library" and layout.backend.startswith("setuptools."):
+    tool, step = tool_of(layout.backend), f"{out}/{BUILD_STEP}"
+    reason = "the build stops if `idlc gen` was not run after a change"
+    if tool == "setuptools" and layout.kind != "library":
         return ""  # setup.py stops the build
-    tool = tool_of(layout.backend)
+    if tool == "setuptools":
+        setup = Setup(Source(SETUP, draft.text(SETUP) or _PLAIN_SETUP))
+        edits = step_before_setup(setup, out, is_library=True)
+        if edits and step not in setup.source.text:
+            draft.put(SETUP, apply(setup.source.text, edits)[0], reason)
+    elif tool in _HOOKS and (new := _with_setting(text, *_HOOKS[tool], step)):
+        draft.put(SETTINGS_FILE, new, reason)
+    if any(step in (draft.text(path) or "") for path in (SETUP, SETTINGS_FILE)):
+        return ""
     return (
         f"{tool} installs the classes that the last `idlc gen` wrote, even if the interfaces have "
         "changed since: run `idlc gen --check` before you build a wheel"
     )
+
+
+def _with_setting(text: str, table: str, key: str, value: str) -> str:
+    """Return a pyproject.toml with one more setting; empty if it has another value already."""
+    ending = "\r\n" if "\r\n" in text else "\n"
+    line = f"{key} = {json.dumps(value)}{ending}"
+    at = re.search(rf"(?m)^{re.escape(f'[{table}]')}[ \t]*(?:#.*)?\r?\n", text)
+    new = f"{text}{ending}[{table}]{ending}{line}"
+    if at:
+        new = f"{text[: at.end()]}{line}{text[at.end() :]}"
+    with suppress(ValueError, AttributeError, TypeError):
+        wanted = toml(text)
+        place = wanted
+        for part in table.split("."):
+            place = place.setdefault(part, {})
+        place[key] = value
+        return new if toml(new) == wanted else ""
+    return ""
 
 
 def _has_arrays(model: Model) -> bool:
@@ -628,7 +662,11 @@ def _ignored(draft: Draft, layout: Layout, out: str) -> None:
             )
         return
     lines = [f"{out}/{pattern} linguist-generated" for pattern in _REVIEWED_ELSEWHERE]
-    del lines[2 if layout.kind == "library" else 1]  # a library has no setup.py that runs it
+    if layout.kind != "library":
+        del lines[1]
+    step = f"{out}/{BUILD_STEP}"
+    if not any(step in (draft.text(path) or "") for path in (SETUP, SETTINGS_FILE)):
+        lines = [line for line in lines if step not in line]
     attributes = draft.text(".gitattributes")
     reason = "reviews hide generated code"
     draft.put(".gitattributes", _with_lines(attributes, lines), reason)

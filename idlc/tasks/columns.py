@@ -172,8 +172,8 @@ def write(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any, style
             batches = (converted(batch, filled) for batch in batches)
         with parquet.ParquetWriter(file, kept) as writer:
             for group in _groups(batches):
-                table = pa.Table.from_batches(group, kept)
-                writer.write_table(table, row_group_size=ROWS * 2)
+                writer.write_table(pa.Table.from_batches(group, kept), row_group_size=ROWS * 2)
+                group.clear()  # it would stay in memory beside the next one
         return
     if style == "csv":
         from pyarrow import csv

@@ -26,7 +26,9 @@ const { session, bare } = await loaded().catch((error) => {
   throw error;
 });
 // From here on there is nothing to load, and nothing to send but answers.
-for (const name of ["fetch", "XMLHttpRequest", "WebSocket", "EventSource", "importScripts", "indexedDB", "caches"]) {
+const connecting = ["fetch", "XMLHttpRequest", "WebSocket", "WebSocketStream", "WebTransport", "EventSource"];
+const others = ["Worker", "BroadcastChannel", "importScripts", "indexedDB", "caches"];
+for (const name of [...connecting, ...others]) {
   Object.defineProperty(globalThis, name, { value: undefined });
 }
 onmessage = ({ data: { id, request } }) => {

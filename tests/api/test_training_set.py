@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,13 @@ def test_programs_and_commands_print_what_the_page_shows(here, capfd):
         if program:
             (here / program).write_text(text, encoding="utf-8")
     runpy.run_path("record.py")
+    Path("bags").mkdir()
+    shutil.copy("robot.mcap", "bags/monday.mcap")
+    Path("bags/tuesday.mcap").write_text("no recording", encoding="utf-8")
     for _, command, shown in BLOCKS:
         tool, *words = command.split() or [""]
         if tool == "python":
-            runpy.run_path(words[0])
+            runpy.run_path(words[0], run_name="__main__")
         elif tool:
             assert main(words) == 0
         assert not tool or capfd.readouterr().out == shown
@@ -35,3 +39,4 @@ def test_programs_and_commands_print_what_the_page_shows(here, capfd):
     assert len(list(here.glob("images/*.png"))) == 50
     with np.load("train.npz") as train:
         assert train["images"][20, 0, :, 0].argmax() == int(3 * 2.04)
+    assert {path.name for path in here.glob("tables/*")} == {"monday.parquet", "manifest.json"}

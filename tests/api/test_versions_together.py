@@ -1,7 +1,9 @@
 """Recordings of one type and of several versions, read together."""
 
+import random
 import struct
 
+import pyarrow as pa
 import pytest
 from mcap.writer import Writer
 
@@ -115,6 +117,42 @@ def test_versions_are_read_as_one(place, values, files):
         assert topic.between(2, 4).to_columns()["v"].tolist() == [
             v for v, _ in values if 2 <= v < 4
         ]
+
+
+def test_versions_are_on_one_clock(files):
+    """Of several messages of one time the last counts; no part mistakes one version for another."""
+    kind = idlc.load("2024.mcap").P
+    for seed in range(8):
+        rng, rows, places, definitions = random.Random(seed), [], [], []
+        for number in range(seed % 3 + 1):
+            versions, messages = rng.choice([[1], [2], [1, 2]]), []
+            times = (
+                rng.sample(range(1, 20), 12) if len(versions) > 1 else rng.choices(range(20), k=9)
+            )
+            for time in times:
+                value = rng.randrange(256)
+                is_old = rng.choice(versions) == 1
+                message = (P1, time, old(value)) if is_old else (P2, time, new(value, value / 2))
+                messages.append(message)
+                rows.append((time, value, 7.0 if is_old else value / 2))
+            places.append(write(files / f"{number}.mcap", messages))
+            definitions.append({definition for definition, *_ in messages})
+        ordered = sorted(rows, key=lambda row: row[0])
+        with idlc.Recording(places, as_=kind) as recording:
+            on, every = (
+                recording.aligned(["/t"], **clock) for clock in ({"on": "/t"}, {"every": "3ns"})
+            )
+            table = on.to_arrow().to_pydict()
+            assert [*zip(table["/t.v"], table["/t.w"], strict=True)] == [row[1:] for row in ordered]
+            ticks = range(ordered[0][0], ordered[-1][0] + 1, 3)
+            last = [[row for row in ordered if row[0] <= tick][-1][1] for tick in ticks]
+            assert every.to_arrow()["/t.v"].to_pylist() == last
+            if any(len(texts) > 1 for texts in definitions):
+                with pytest.raises(RecordingError, match="several versions"):
+                    on.parts(1)
+            else:
+                parts = pa.concat_tables([part.to_arrow() for part in on.parts(1)])
+                assert parts.equals(on.to_arrow())
 
 
 @pytest.mark.parametrize("place", [["2023.mcap", "2024.mcap"], "both.mcap"])

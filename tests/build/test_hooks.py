@@ -548,6 +548,23 @@ def compiled(_):
     distribution.run_commands()
 
 
+@pytest.mark.parametrize("build", [built, compiled])
+def test_a_build_says_why_a_folder_of_packages_is_absent(
+    build, source, tmp_path, capfd, monkeypatch
+):
+    write(source, {"pyproject.toml": f'{BUILD}[tool.idlc]\ninclude = ["../far"]\n'})
+    monkeypatch.setattr("sys.argv", ["setup.py", "build"])
+    with pytest.raises(SystemExit):
+        build(tmp_path / "dist")
+    said = capfd.readouterr().err
+    assert "error[IDL602]: no such folder: `../far`" in said
+    assert "hint: correct `include` in [tool.idlc] of pyproject.toml; source distrib" in said
+    assert "`python -m build --wheel`" in said
+    assert "-I " not in said
+    assert main(["check", "--package", "demo_msgs", "."]) == 2
+    assert "hint: correct `-I`, or `include` in [tool.idlc]" in capfd.readouterr().out
+
+
 @pytest.mark.parametrize("package", ["far_msgs", "near_msgs"])
 @pytest.mark.parametrize("build", [built, compiled])
 def test_a_build_says_where_to_name_folders_of_packages(

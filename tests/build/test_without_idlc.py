@@ -1,13 +1,18 @@
 """Builds in environments without idlc install today's classes, or stop and say why."""
 
 import importlib.util
+import runpy
 import shutil
 import sys
 from pathlib import Path
 
 import pytest
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.plugin.utils import load_plugin_from_script
 
 from idlc.cli.main import main
+from idlc.project.settings import toml
+from idlc.scaffold.proof import Proof
 from tests.support.files import write_all
 from tests.support.programs import clean_environment, ended
 
@@ -118,7 +123,7 @@ def test_a_build_stops_at_classes_that_are_out_of_date(change, package):
     assert status == 1
     assert "error: the classes in `demo` are out of date: " in said
     assert reason in said
-    assert "hint: run `idlc gen` and `idlc check --fix`, or install idlc for the build" in said
+    assert "hint: run `idlc gen` and `idlc check --fix`" in said
     assert "Traceback" not in said
     assert not Path("build").exists()
 
@@ -135,6 +140,10 @@ CURRENT = {
     "interfaces moved": lambda: rename("srv/Ask.srv", "interfaces/srv/Ask.srv"),
     "an excluded interface": lambda: write_all(
         {"msg/Old.msg": "bad", "pyproject.toml": '[tool.idlc]\nexclude = ["Old.msg"]\n'}
+    ),
+    "interfaces beside the package": lambda: (
+        write_all({"pyproject.toml": '[tool.idlc]\npaths = ["../all"]\n', ".git": ""}),
+        [rename(path, f"../all/{path}") for path in FILES],
     ),
     "results of a build": lambda: write_all({"build/x/msg/Drive.msg": "int8 a\n"}),
 }
@@ -199,3 +208,122 @@ def test_a_new_package_is_built_before_it_has_interfaces(package):
     status, said = build(package)
     assert status == 1
     assert "`msg/First.msg` has no classes" in said
+
+
+PROJECT = """
+[project]
+name = "trackkit"
+version = "1.0"
+{settings}
+[build-system]
+requires = ["{requires}"]
+build-backend = "{backend}"
+
+[tool.idlc]
+paths = {paths}
+out = "src/trackkit/ros"
+package = "track_msgs"
+"""
+#: What runs in a build: setup.py, and the hooks that other tools' settings name.
+BACKENDS = {
+    "setuptools": "setuptools.build_meta",
+    "hatchling": "hatchling.build",
+    "pdm-backend": "pdm.backend",
+}
+#: Where a library has its interfaces, and a change of them.
+LIBRARIES = {
+    "nothing": ("interfaces", nothing, ""),
+    "edited": (
+        "interfaces",
+        lambda: Path("interfaces/msg/Track.msg").write_text("int8 a\n"),
+        "`msg/Track.msg` changed",
+    ),
+    "added": (
+        "interfaces",
+        lambda: write_all({"interfaces/msg/More.msg": "int8 a\n"}),
+        "`msg/More.msg` was added",
+    ),
+    "deleted": (
+        "interfaces",
+        lambda: (Path(".git").mkdir(), Path("interfaces/msg/Track.msg").unlink()),
+        "`msg/Track.msg` was removed",
+    ),
+    "not cloned": (
+        "interfaces",
+        lambda: (
+            write_all({".gitmodules": "", ".git": ""}),
+            Path("interfaces/msg/Track.msg").unlink(),
+        ),
+        "",
+    ),
+    "edited in another package": (
+        "../track_msgs",
+        lambda: Path("../track_msgs/msg/Track.msg").write_text("int8 a\n"),
+        "`msg/Track.msg` changed",
+    ),
+    "another project around the classes": (
+        "interfaces",
+        lambda: write_all({"src/pyproject.toml": "", ".git": ""}),
+        "",
+    ),
+    "another package beside it": (
+        "interfaces/msg/Track.msg",
+        lambda: write_all({"track_msgs/package.xml": "", "track_msgs/msg/Track.msg": "int8 a\n"}),
+        "",
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def library(request, template, tmp_path_factory):
+    """Return the tool that builds a library as `idlc init` sets it up, and where that is."""
+    folder, tool = tmp_path_factory.mktemp("library") / "trackkit", request.param
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
+        patch.setattr("idlc.scaffold.proof.installed_files", lambda *_: frozenset())
+        folder.mkdir()
+        patch.chdir(folder)
+        settings = "" if tool == "setuptools" else "[tool.hatch.build]\n[tool.pdm.build]\n"
+        names = {"requires": tool, "backend": BACKENDS[tool], "settings": settings}
+        project = PROJECT.format(**names, paths='["interfaces"]')
+        files = {"src/trackkit/__init__.py": "", "interfaces/msg/Track.msg": "int8 b\n"}
+        write_all({**files, "pyproject.toml": project})
+        assert main(["init", "--yes"]) == 0
+    return tool, folder
+
+
+def run_hook(tool, template):
+    """Run in a process what a build of the library runs; return the error."""
+    settings = toml(Path("pyproject.toml").read_text())["tool"]
+    if tool == "setuptools":
+        return build(template)[1]
+    try:
+        if tool == "hatchling":
+            path = settings["hatch"]["build"]["hooks"]["custom"]["path"]
+            hook = load_plugin_from_script(path, path, BuildHookInterface, "build_hook")
+            hook("", {}, None, None, "", "wheel").initialize("standard", {})
+        else:
+            path = settings["pdm"]["build"]["custom-hook"]
+            runpy.run_path(path, run_name="_local")["pdm_build_initialize"](None)
+    except SystemExit as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("change", LIBRARIES)
+def test_a_library_stops_builds_of_classes_that_are_out_of_date(
+    change, library, template, tmp_path, monkeypatch
+):
+    tool, folder = library
+    paths, make, reason = LIBRARIES[change]
+    shutil.copytree(folder, tmp_path / "trackkit")
+    monkeypatch.chdir(tmp_path / "trackkit")
+    if paths.startswith(".."):
+        shutil.move("interfaces", paths)
+        write_all({f"{paths}/package.xml": ""})
+    settings = Path("pyproject.toml").read_text().replace('["interfaces"]', f"['{paths}']")
+    Path("pyproject.toml").write_text(settings)
+    make()
+    said = run_hook(tool, template)
+    assert reason in said
+    assert ("the classes in `src/trackkit/ros` are out of date" in said) == bool(reason)

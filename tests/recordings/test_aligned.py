@@ -155,6 +155,10 @@ REFUSED = {
         {"on": "/joints", "how": "linear", "topics": ["/camera/image"]},
         r"`/camera/image.header.stamp` \(timestamp.*`/camera/image.height` \(uint32.*encoding",
     ),
+    "elements that change places": (
+        {"every": "1s", "how": "linear", "topics": {"/joints": "position"}},
+        r"`/joints.position` \(large_list<item: double>\)",
+    ),
     "a part of a turn": (
         {"every": "1s", "how": "linear", "topics": {"/imu": "orientation.x"}},
         r"`/imu.orientation` \(a part of a quaternion\)",
@@ -181,49 +185,28 @@ def test_one_wrong_time_does_not_make_billions_of_rows(tmp_path):
         assert rows == 271
 
 
-def test_lists_of_other_lengths_have_nothing_between_them(tmp_path):
-    type_ = "std_msgs/msg/Float64MultiArray"
-    array, layout = (
-        made.STORE.types[f"std_msgs/msg/{name}"]
-        for name in ("Float64MultiArray", "MultiArrayLayout")
-    )
-    found = []
-    for size in (2, 3):
-        data = bytes(made.STORE.serialize_cdr(array(layout([], 0), np.zeros(size)), type_))
-        time = made.START + size * 100 * MS
-        found.append(made.Recorded("/array", type_, time, time, data))
-    with idlc.Recording(made.by_mcap(tmp_path / "a.mcap", found)) as recording:
-        table = recording.aligned({"/array": "data"}, every="50ms", how="linear")
-        with pytest.raises(RecordingError, match=r"`/array.data` has 2 elements in a message"):
-            table.to_arrow()
-
-
-def test_elements_that_change_places_have_nothing_between_them(tmp_path):
-    """`name` says which joint a position is of."""
-    type_ = "sensor_msgs/msg/JointState"
-    joints = made.STORE.types[type_]
-
-    def recorded(names, position, at):
-        template = made.MAKERS["/joints"][1](random.Random(1), made.START)
-        message = joints(template.header, names, np.array(position), np.array([]), np.array([]))
-        data = bytes(made.STORE.serialize_cdr(message, type_))
-        return made.Recorded("/joints", type_, made.START + at, made.START + at, data)
-
-    same = [recorded(["a", "b"], [0.0, 1.0], 0), recorded(["a", "b"], [2.0, 1.0], 100 * MS)]
-    turned = recorded(["b", "a"], [1.0, 3.0], 200 * MS)
-    for found, wanted in ((same, [[0, 1], [1, 1], [2, 1]]), ([*same, turned], None)):
-        with idlc.Recording(made.by_mcap(tmp_path / "a.mcap", found)) as recording:
-            table = recording.aligned({"/joints": "position"}, every="50ms", how="linear")
-            assert table.schema.names == ["time", "/joints.position", "/joints.age"]
-            if wanted:
-                assert table.to_arrow()["/joints.position"].to_pylist() == wanted
-                continue
-            with pytest.raises(RecordingError, match="`name` names others in the next message"):
-                table.to_arrow()
-            (part,) = recording.aligned(
-                {"/joints": "position"}, every="100ms", how="linear"
-            ).parts()
-            assert part.to_arrow()["/joints.position"].to_pylist() == [[0, 1], [2, 1], [1, 3]]
+@pytest.mark.parametrize("how", ["last", "nearest", "linear"])
+def test_a_topic_without_messages_has_no_values(how, tmp_path):
+    path = tmp_path / "a.mcap"
+    found = made.messages(9)
+    with path.open("wb") as file:
+        writer = made.Writer(file)
+        writer.start(profile="ros2")
+        for topic in ("/imu", "/other"):
+            text = made.definition(made.IMU).encode()
+            schema = writer.register_schema(made.IMU, "ros2msg", text)
+            channel = writer.register_channel(topic, "cdr", schema)
+            for message in made.of_topic(found, topic):
+                writer.add_message(channel, message.log_time, message.data, message.log_time)
+        writer.finish()
+    topics = {"/imu": "angular_velocity", "/other": "angular_velocity"}
+    with idlc.Recording(path) as recording:
+        for clock, count in (({"on": "/imu"}, 3), ({"every": "300ms"}, 3), ({"on": "/other"}, 0)):
+            table = recording.aligned(topics, how={"/other": how}, **clock)
+            arrow = table.to_arrow()
+            assert [len(arrow), arrow["/other.age"].null_count] == [count, count]
+            assert [arrow[NUMBERS].null_count, table.summary()[1].missing] == [0, count]
+            assert sum(len(part.to_arrow()) for part in table.parts()) == count
 
 
 def test_a_header_of_its_own_is_no_clock(tmp_path):

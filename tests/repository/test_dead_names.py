@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from tests.support.imports import MODULES, tree
 from tests.support.paths import ROOT
 
-#: What is called by its name from outside: by click, pytest, Python, and PEP 517's frontends.
-CALLED = re.compile(r"__\w+__|pytest_\w+|hatch_\w+|command|(get_requires_for_)?build_\w+")
+#: What is called by its name from outside: by click, pytest, Python, and builds.
+CALLED = re.compile(
+    r"__\w+__|(pytest|hatch|pdm)_\w+|command|get_build_hook|(get_requires_for_)?build_\w+"
+)
 #: What only programs use, as docs/ says: `Ragged.stacked`, `Columns.structured`.
 PUBLIC = {"stacked", "structured"}
 #: What generated code has for numbers of each size, and what no golden package happens to use.

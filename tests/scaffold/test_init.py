@@ -118,8 +118,8 @@ def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys
     assert main(["init"]) == 1, "not without a terminal"
     printed = capsys.readouterr().out
     assert sample.words in printed
-    # a setup.py stops a build of outdated classes, and CMake compiles the interfaces
-    is_unnoticed = "a Python library" in printed or "idlc writes no setup.py" in printed
+    # other tools run something that stops a build of outdated classes, or compile the interfaces
+    is_unnoticed = any(f"(built with {tool})" in printed for tool in ("flit", "poetry", "uv"))
     assert ("run `idlc gen --check` before you build" in printed) == is_unnoticed
     assert tree(project) == before
     warning = r"The test runs the package's own build\."
@@ -901,6 +901,27 @@ def test_a_folder_of_packages_is_a_workspace_whatever_its_root_lists(root, proje
     write_all({**files, **of_ros("a_msgs")})
     main(["init"])
     assert words in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize(
+    ("settings", "is_noticed"),
+    [
+        ("", True),
+        ("[tool.hatch.build.hooks.vcs]\nversion-file = 'v.py'\n", True),
+        ("[tool.hatch.build.hooks.custom]\ndependencies = []\n", True),
+        ("[tool.hatch.build.hooks.custom]\npath = 'own.py'\n", False),
+        ("[tool.hatch.build.hooks]\ncustom.path = 'own.py'\n", False),
+        ("[tool.hatch]\nbuild = { dev-mode-dirs = ['src'] }\n", False),
+    ],
+)
+def test_a_build_that_runs_a_hook_of_its_own_is_noted(settings, is_noticed, project, capsys):
+    system = '[build-system]\nrequires = ["hatchling"]\nbuild-backend = "hatchling.build"\n'
+    text = f'[project]\nname = "bot"\nversion = "1"\n{system}{settings}'
+    write_all({"bot/__init__.py": "", "pyproject.toml": text})
+    assert main(["init"]) == 1, "not without a terminal"
+    printed = capsys.readouterr().out
+    assert ('+path = "bot/ros/_idlc_build.py"' in printed) == is_noticed
+    assert ("run `idlc gen --check` before you build" in printed) != is_noticed
 
 
 @pytest.mark.parametrize("tool", ["hatchling.build", "flit_core.buildapi", "poetry"])
