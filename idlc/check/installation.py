@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from idlc.check.outputs import outdated
+from idlc.check.outputs import dependencies, outdated, with_dependencies
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
 from idlc.diagnostics.source import Source, Span
@@ -357,7 +357,7 @@ def names(facts: Facts, _: Model) -> Iterator[Diagnostic]:
             yield codes.NAME_MISMATCH.at(span, message, hint=f"write `$base/lib/{facts.name}`")
 
 
-def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
+def current_output(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """Generated code in the package matches the current interfaces."""
     for output in facts.outputs:
         folder = facts.manifest.path.rpartition("/")[0] or "."
@@ -371,4 +371,7 @@ def current_output(facts: Facts, _: Model) -> Iterator[Diagnostic]:
                 yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
         elif output.package == facts.name and facts.whole:
             words = ("gen", folder, "-o", home)
-            yield from outdated(output.path, output.inputs, facts.inputs, words)
+            recorded, used = output.dependencies, dependencies(model)
+            before = with_dependencies(output.inputs, recorded, used)
+            now = with_dependencies(facts.inputs, used, recorded)
+            yield from outdated(output.path, before, now, words)

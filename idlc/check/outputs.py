@@ -9,10 +9,12 @@ from pathlib import Path
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.model.catalog import is_standard
+from idlc.model.link import Model
 from idlc.project.files import is_file
 from idlc.project.find import CLOSING, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import FILE, Lock, load_lock
+from idlc.project.lock import FILE, Lock, load_lock, meaning
 from idlc.project.settings import Scope
 
 
@@ -35,6 +37,25 @@ def outdated(
         message = f"the generated code is out of date: {first_few(changed, 3)}"
         hint = f"run `idlc {shlex.join(words)}`"
         yield codes.STALE_GENERATED_CODE.of(path, message, hint=hint)
+
+
+def dependencies(model: Model) -> dict[str, str]:
+    """Return the digests of the interfaces of other packages that a model uses, as in a lock.
+
+    Standard ones are left out, because they differ between distributions.
+    """
+    used = (each for each in model.interfaces.values() if each.name.package != model.package)
+    sources = {each.name: each.source for each in used if not is_standard(each.name.package)}
+    return {
+        str(name): meaning(source.text, name.package) for name, source in sources.items() if source
+    }
+
+
+def with_dependencies(
+    inputs: Mapping[str, str], recorded: Mapping[str, str], now: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the digests of files with those of dependencies that are known then and now."""
+    return {**inputs, **{name: recorded[name] for name in recorded.keys() & now.keys()}}
 
 
 def outputs(package: Inputs, scope: Scope) -> dict[Path, Lock]:
@@ -80,11 +101,11 @@ def _generated(home: Path) -> Iterator[Path]:
 
 
 def current_outputs(
-    package: Inputs, records: Mapping[Path, Lock], scope: Scope
+    package: Inputs, model: Model, records: Mapping[Path, Lock], scope: Scope
 ) -> Iterator[Diagnostic]:
     """Yield a problem for each folder of generated code that does not match a package."""
     root = scope.root
-    is_whole = package.is_whole(root)
+    is_whole, used = package.is_whole(root), dependencies(model) if records else {}
     for folder, record in records.items():
         manifest = root.manifest(package.home)
         if manifest is not None and folder.is_relative_to(manifest.parent):
@@ -93,6 +114,8 @@ def current_outputs(
         if not is_whole:  # the other files are not known
             before = {name: before[name] for name in before.keys() & now.keys()}
             now = {name: now[name] for name in before}
+        before = with_dependencies(before, record.dependencies, used)
+        now = with_dependencies(now, used, record.dependencies)
         words = ["gen"]
         if not (scope.paths and scope.out and folder.is_relative_to(root.absolute(scope.out))):
             words += [root.shown(package.home), "-o", root.shown(folder)]

@@ -25,11 +25,12 @@ _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
 
 
 class GeneratedOutput(msgspec.Struct, frozen=True):
-    """Code that idlc generated within the package: its lock, and the inputs recorded in it."""
+    """Code that idlc generated within the package: its lock, and what is recorded in it."""
 
     path: str
     package: str
     inputs: Mapping[str, str]
+    dependencies: Mapping[str, str] = {}
     runtime: Runtime = "carried"
 
 
@@ -144,7 +145,13 @@ def facts(
         whole=_is_whole(package, files, scope),
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
-            GeneratedOutput(root.shown(at), record.package, record.inputs, record.runtime)
+            GeneratedOutput(
+                root.shown(at),
+                record.package,
+                record.inputs,
+                record.dependencies,
+                record.runtime,
+            )
             for at, record in locks.items()
         ),
         files=_files_by_key(package, folder, root),

@@ -224,7 +224,8 @@ class Checker:
             if surroundings is not None:
                 with stage("check package", package.package):
                     check_package(surroundings, models[-1], report)
-            report.extend(outputs.current_outputs(package, self._outputs(package), self._scope))
+            records = self._outputs(package)
+            report.extend(outputs.current_outputs(package, model, records, self._scope))
             if any(is_folder(folder / RULES) for folder in package.folders):
                 from idlc.versions.coverage import rule_folders, rule_problems
 

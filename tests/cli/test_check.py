@@ -389,6 +389,39 @@ def test_outdated_code_is_found_wherever_it_is_kept(project, capsys):
     assert len([*Path().rglob("idlc.lock")]) == (2 if "n/msg/C.msg" in files else 1)
 
 
+_NAMED = "<package format='3'><name>{}</name></package>\n"
+#: Packages that use types of another, and the commands that generate and check their classes.
+_USERS = {
+    "library": (
+        "[tool.idlc]\npaths = ['m']\nout = 'kit/ros'\nvendor-deps = true\ninclude = ['far']\n",
+        "gen",
+        "m",
+    ),
+    "package": ("", "gen m -o m/m_msgs -I far", "."),
+    "out of a package": ("[tool.idlc]\npaths = ['m']\nout = 'lib'\ninclude = ['.']\n", "gen", "m"),
+}
+
+
+@pytest.mark.parametrize("user", _USERS)
+def test_outdated_types_of_other_packages_are_found(user, capsys):
+    settings, command, path = _USERS[user]
+    files = {} if user == "library" else {"m/package.xml": _NAMED.format("m_msgs")}
+    far = {"far/msg/Near.msg": "Deep deep\n", "far/msg/Deep.msg": "int8 a\n", **files}
+    far |= {"far/package.xml": _NAMED.format("far_msgs"), "m/msg/A.msg": "far_msgs/Near a\n"}
+    write_all({**far, "pyproject.toml": settings})
+    assert main(shlex.split(command)) == 0
+    write_all({"far/msg/Deep.msg": "# more words\nint8 a\n", "far/msg/Unused.msg": "int8 a\n"})
+    assert "IDL460" not in check(capsys, path, "--select", "IDL460")[1]
+    for change in ({"far/msg/Deep.msg": "int16 a\n"}, {"far/msg/Near.msg": "Deep other\n"}):
+        write_all(change)
+        said = check(capsys, path, "--select", "IDL460")[1]
+        (name,) = (file.split("/")[2].removesuffix(".msg") for file in change)
+        assert f"the generated code is out of date: `far_msgs/msg/{name}` changed\n" in said
+        assert main(shlex.split(command)) == 0
+        capsys.readouterr()
+        assert "IDL460" not in check(capsys, path, "--select", "IDL460")[1]
+
+
 def test_an_entry_point_that_leads_nowhere_is_found(capsys):
     setup = "from setuptools import setup\nname = 'demo'\nsetup(name=name, entry_points={})\n"
     scripts = [
