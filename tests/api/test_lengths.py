@@ -162,18 +162,26 @@ def test_the_distribution_that_fits_is_used(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     echo = [0.0, 0.5, 0.75]
     nested = [humble_range(n) + struct.pack("<I3f", 3, *echo) for n in range(3)]
+    several = cdr("<I", 2) + HEADER + b"\1\0" + struct.pack("<4f", 0.5, 0.1, 9.0, 3.0)
+    several += HEADER + b"\1\0" + struct.pack("<4f", 0.5, 0.1, 9.0, 4.0)
     topics = [
         ("/range", "sensor_msgs/msg/Range", [humble_range(n) for n in range(3)]),
         ("/echo", "own_msgs/msg/Echo", nested),
+        ("/all", "own_msgs/msg/All", [several]),
     ]
     path = write_db3(tmp_path / "humble.db3", topics)
-    own = {"Echo": "sensor_msgs/Range range\nfloat32[] echo\n"}
+    own = {
+        "Echo": "sensor_msgs/Range range\nfloat32[] echo\n",
+        "All": "sensor_msgs/Range[] ranges\n",
+    }
     write_package(tmp_path / "src", own, "own_msgs")
     with idlc.Recording(path, include=["src"]) as recording:
         with pytest.warns(MissingDefinitionWarning, match="type of Humble, .*, which fits|Humble"):
             assert recording["/range"].to_columns()["range"].tolist() == [0.0, 1.0, 2.0]
         with pytest.warns(MissingDefinitionWarning, match="Humble"):
             assert recording["/echo"].to_columns()["echo"].to_list() == [echo] * 3
+        with pytest.warns(MissingDefinitionWarning, match="Humble"):
+            assert [each.range for _, all_ in recording["/all"] for each in all_.ranges] == [3, 4]
         with pytest.warns(MissingDefinitionWarning, match="Humble"):
             assert [message.range for _, message in recording["/range"]] == [0.0, 1.0, 2.0]
     words = ["columns", path, "/range", "--format", "csv"]
