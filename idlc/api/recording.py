@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from idlc.recordings.aligned.table import Aligned
     from idlc.recordings.load import TopicType
     from idlc.runtime.typeinfo import Structure
+    from idlc.versions.conversion import Version
 
 
 class Reading(NamedTuple):
@@ -197,6 +198,13 @@ class Selection:
         from idlc.recordings.load import type_of
 
         return type_of(self.topic, self.options.include, self.options.distro, self._sample)
+
+    @property
+    def version(self) -> Version:
+        """The recorded version of the type."""
+        from idlc.versions.conversion import Version
+
+        return Version(self._type.models, self._type.name)
 
     def _sample(self) -> list[Raw]:
         """Return some messages as they are recorded."""
@@ -625,7 +633,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         for single in self._apart(topics):
             digest = single.structure.hash if len(topics) > 1 else ""
             groups.setdefault(digest, []).append(single)
-        versions = [self._joined(group) for group in groups.values()]
+        versions = [
+            version for group in groups.values() for version in self._of_one_hash(group, reading)
+        ]
         if len(versions) == 1:
             return versions[0]
         if reading is not None:
@@ -663,6 +673,26 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         """Yield the messages of each topic, those of different definitions apart."""
         for topics in self._topics.values():
             yield from self._apart(topics)
+
+    def _of_one_hash(
+        self, group: list[RecordedTopic], reading: Reading | None
+    ) -> list[RecordedTopic]:
+        """Return the messages of definitions of one hash as one.
+
+        If units or constants differ, warn of it, or keep them apart if they are converted.
+        """
+        if len(group) > 1:
+            from idlc.recordings.load import OtherDefinitionWarning
+            from idlc.versions.conversion import changed_meanings
+
+            first, *others = (topic.version for topic in group)
+            changes = {each: None for other in others for each in changed_meanings(first, other)}
+            if changes and reading is not None:
+                return group
+            for change in changes:
+                what = f"`{group[0].topic.name}` has messages of several definitions: {change}"
+                warnings.warn(OtherDefinitionWarning(what), stacklevel=4)
+        return [self._joined(group)]
 
     def _joined(self, group: list[RecordedTopic]) -> RecordedTopic:
         """Return the messages of topics whose types are the same."""

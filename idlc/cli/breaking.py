@@ -35,7 +35,7 @@ EPILOG += "\n" + options.example(
     "recording, or the standard interfaces of a distribution. For several recordings, write a "
     "pattern, such as 'bags/*.mcap'. To compare with running nodes, write the word "
     "'graph', or the address of a robot, such as tcp/robot:7447. For a folder named graph, write "
-    "./graph. By default, idlc compares with the setting `against`, or with git:origin/HEAD or "
+    "./graph. By default, idlc uses `against` of the settings, else git:origin/HEAD, else "
     "git:HEAD.",
 )
 @click.option(

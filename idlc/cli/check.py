@@ -77,12 +77,12 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
 def fmt_command(**arguments: Any) -> int:
     """Normalize whitespace and keep deliberate alignment.
 
-    idlc keeps single spaces between words, and two spaces before a comment. It keeps a wider gap if
-    it aligns names or comments in a column, or if every line of the block has the same gap. If only
-    the lines above and below are aligned, idlc aligns the line with them. It reduces all other gaps
-    to one space. idlc puts spaces on both sides of `=` or on neither side, and keeps at most two
-    consecutive empty lines. If idlc changes a file, it also removes trailing whitespace and adds a
-    missing final newline.
+    idlc leaves a wide gap unchanged if the gap aligns names or comments in a column, or if every
+    line of the block has the same gap. If the lines above and below a line are aligned, idlc aligns
+    that line with them. Every other gap becomes one space, or two spaces before a comment. idlc
+    puts spaces on both sides of `=` or on neither side, and keeps at most two consecutive empty
+    lines. If idlc changes a file, it also removes trailing whitespace and adds a missing final
+    newline.
 
     Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
     as in `idlc check`.

@@ -80,7 +80,7 @@ from idlc.cli import completion, options
     metavar="LENGTH",
     multiple=True,
     help="With --grid: the longest time between a row and a message, such as `50ms`. If a topic "
-    "has no message that close, its columns are empty in that row.",
+    "has no message within this time, its columns are empty in that row.",
 )
 @click.option(
     "--clock",

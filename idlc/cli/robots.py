@@ -126,7 +126,7 @@ def record_command(**arguments: Any) -> bool:
     help="Also connect to this router, such as `tcp/robot:7447`. May be repeated.",
 )
 def router_command(**arguments: Any) -> int:
-    """Run a router for ROS 2 nodes that use Zenoh, instead of rmw_zenohd, until Ctrl-C.
+    """Run a Zenoh router for ROS 2 nodes. It replaces rmw_zenohd. Ctrl-C stops it.
 
     Nodes on one machine find each other through the router. Other machines can reach the router
     only if --listen admits them.

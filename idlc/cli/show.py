@@ -21,9 +21,9 @@ from idlc.cli import completion, options
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @options.output_style(
     ("text", "json", "hash", "type-description", "ros2idl", "jsonschema", "mcap", "msg"),
-    "Output format: text, JSON facts, type hashes (RIHS01), the type description that ROS 2 "
-    "installs as JSON, IDL, JSON Schema, an MCAP schema, or the files of the recorded definitions "
-    "(see --out).",
+    "Output format. `hash` is the type hash (RIHS01), `type-description` the JSON file that ROS 2 "
+    "installs, `ros2idl` an IDL file, and `mcap` the schema of an MCAP file. `msg` writes the "
+    "recorded definitions as files (see --out).",
 )
 @click.option(
     "-o",

@@ -166,18 +166,18 @@ class TopicType:
     """The type of a topic's messages, compiled from what was recorded."""
 
     def __init__(self, models: ModelsByName, name: ir.TypeName) -> None:
-        self._models = models
-        self._name = name
+        self.models = models
+        self.name = name
 
     @cached_property
     def structure(self) -> Structure:
         """The type, field by field."""
-        return Types(content(self._models[self._name.package]))[str(self._name)]
+        return Types(content(self.models[self.name.package]))[str(self.name)]
 
     @cached_property
     def kind(self) -> Any:
         """The class of the messages."""
-        return class_in(home_of(self._models), self._name)
+        return class_in(home_of(self.models), self.name)
 
 
 def type_of(

@@ -517,6 +517,19 @@ def _holds_all(new: str, old: str) -> bool:
     return low <= least and greatest <= high
 
 
+def changed_meanings(old: Version, new: Version) -> Iterator[str]:
+    """Yield the units and constants that differ between versions of one hash, as sentences."""
+    for name in sorted(old.reached & new.reached):
+        before, after = old.of(name).message, new.of(name).message
+        fields = {field.name: field for field in before.fields}
+        for field in after.fields:
+            if field.name in fields and _unit_changed(fields[field.name], field):
+                units = f"[{fields[field.name].unit}] to [{field.unit}]"
+                yield f"the unit of `{field.name}` changed from {units}"
+        for field_name, change in renumbered(before, after).items():
+            yield f"`{field_name}`: {change.reason}"
+
+
 def _unit_changed(old: ir.Field, new: ir.Field) -> bool:
     units = old.unit, new.unit
     return all(unit and not ir.is_range(unit) for unit in units) and old.unit != new.unit

@@ -8,6 +8,7 @@ import pytest
 from mcap.writer import Writer
 
 import idlc
+from idlc.api.upgrade import UpgradeError
 from idlc.cli.main import main
 from idlc.recordings.containers.source import RecordingError
 
@@ -176,3 +177,40 @@ def test_one_of_two_types_is_selected(files, capsys):
     words = ["columns", "two.mcap", "/t", "--type", "demo_msgs/msg/P", "--format", "csv"]
     assert main(words) == 0
     assert capsys.readouterr().out.splitlines()[0].endswith('"v"')
+
+
+NESTED = f"In i\n{LINE}\nMSG: demo_msgs/In\nint32 x  # [{{}}]\n"
+#: Definitions of one hash, the bytes of a message, and what is said if it means something else.
+MEANINGS = {
+    "unit": ("float64 v  # [rad]\n", "float64 v  # [deg]\n", 8, "the unit of `v` changed"),
+    "constant": ("uint8 A=0\nuint8 v\n", "uint8 A=1\nuint8 v\n", 1, "from A=0 to A=1"),
+    "nested unit": (NESTED.format("m"), NESTED.format("mm"), 4, "the unit of `x` changed"),
+    "added unit": ("float64 v\n", "float64 v  # [deg]\n", 8, ""),
+    "comment": ("float64 v  # to the left\n", "float64 v  # left\n", 8, ""),
+}
+
+
+@pytest.mark.parametrize("case", MEANINGS)
+def test_values_of_other_meanings_are_not_mixed_without_a_word(case, tmp_path, recwarn):
+    """Nor are they converted as one."""
+    first, second, size, words = MEANINGS[case]
+    rows = [(("demo_msgs/msg/M", text), 1, bytes(4 + size)) for text in (first, second)]
+    path = write(tmp_path / "a.mcap", rows)
+    with idlc.Recording(path) as recording:
+        assert len(recording["/t"].to_columns()) == 2
+    messages = [str(warning.message) for warning in recwarn]
+    assert len(messages) == bool(words)
+    assert all("several definitions" in message and words in message for message in messages)
+    top, _, nested = second.partition(f"{LINE}\nMSG: demo_msgs/In\n")
+    folder = tmp_path / "demo_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "M.msg").write_text(f"uint8 more\n{top}")
+    if nested:
+        (folder / "In.msg").write_text(nested)
+    kind = idlc.load(str(folder.parent))["demo_msgs/msg/M"]
+    with idlc.Recording(path, as_=kind) as recording:
+        if words:
+            with pytest.raises(UpgradeError, match="rule"):
+                recording["/t"].to_columns()
+        else:
+            assert len(recording["/t"].to_columns()) == 2

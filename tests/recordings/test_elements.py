@@ -11,6 +11,7 @@ import idlc
 from idlc.cli.main import main
 from idlc.recordings.columns.elements import MissingElementWarning
 from idlc.recordings.containers.source import RecordingError
+from tests.support import recorded_text
 from tests.support import recordings as made
 from tests.support.rounds import rounds
 
@@ -89,6 +90,15 @@ def test_lines_follow_the_names(tmp_path):
         table = recording.aligned(topics, every="50ms", how="linear").to_arrow()
     assert table["/joints.position.a"].to_pylist() == [0, 0.5, 1, None, None]
     assert table["/joints.position.b"].to_pylist() == [10, 15, 20, 25, 30]
+
+
+def test_lines_lie_between_arrays_only_if_nothing_names_their_elements(tmp_path):
+    text = "@ /a p/A\nfloat64[2] x\n@ /b p/B\nfloat64[2] x\nstring[2] y\n@ /c p/C\nfloat64[] x\n"
+    with idlc.Recording(recorded_text.write(tmp_path / "a.mcap", text)) as recording:
+        assert recording.aligned({"/a": "x"}, every="1s", how="linear").to_arrow().num_rows == 0
+        for topic in ("/b", "/c"):
+            with pytest.raises(RecordingError, match=f"no values between those of `{topic}.x`"):
+                recording.aligned({topic: "x"}, every="1s", how="linear")
 
 
 TEXTS = {

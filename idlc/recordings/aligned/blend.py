@@ -6,46 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from idlc.recordings.containers.source import RecordingError
-
 #: Between quaternions that are so close, a line is more exact than an arc.
 CLOSE = 0.9995
 
 
-def is_blendable(pa: Any, type_: Any) -> bool:
-    """Return whether a column has floating-point numbers, or lists of these."""
-    if pa.types.is_fixed_size_list(type_) or pa.types.is_large_list(type_):
-        type_ = type_.value_type
-    return bool(pa.types.is_floating(type_))
-
-
-def line(name: str, first: Any, second: Any, weight: Any) -> Any:
-    """Return an Arrow array between two of numbers or of lists; only numbers can be null."""
+def line(first: Any, second: Any, weight: Any) -> Any:
+    """Return an Arrow array between two of numbers, or of arrays of as many numbers."""
     import pyarrow as pa
 
-    if pa.types.is_floating(first.type):
-        starts, ends = (array.to_numpy(zero_copy_only=False) for array in (first, second))
-        gaps, ends_gaps = (array.is_null().to_numpy(False) for array in (first, second))
-        gaps = gaps | (ends_gaps & (weight != 0))
-        return pa.array(_numbers(starts, ends, weight), first.type, mask=gaps)
-    if pa.types.is_fixed_size_list(first.type):
+    if not pa.types.is_floating(first.type):
         size = first.type.list_size
-        values = line(name, first.flatten(), second.flatten(), np.repeat(weight, size))
+        values = line(first.flatten(), second.flatten(), np.repeat(weight, size))
         return pa.FixedSizeListArray.from_arrays(values, size)
-    sizes, other = (np.diff(array.offsets.to_numpy()) for array in (first, second))
-    if (sizes != other).any():
-        row = int(np.flatnonzero(sizes != other)[0])
-        what = f"`{name}` has {sizes[row]} elements in a message, and {other[row]} in the next"
-        raise RecordingError(f"{what}: no value lies between", "use how='last' for this topic")
-    values = line(name, first.flatten(), second.flatten(), np.repeat(weight, sizes))
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-    return pa.LargeListArray.from_arrays(pa.array(offsets), values)
-
-
-def _numbers(first: Any, second: Any, weight: Any) -> Any:
+    starts, ends = (array.to_numpy(zero_copy_only=False) for array in (first, second))
+    gaps, later_gaps = (array.is_null().to_numpy(zero_copy_only=False) for array in (first, second))
     with np.errstate(invalid="ignore"):  # inf - inf is NaN, as elsewhere
-        between = first * (1 - weight) + second * weight
-    return np.where(weight == 0, first, between).astype(first.dtype)
+        between = np.where(weight == 0, starts, starts * (1 - weight) + ends * weight)
+    is_gap = gaps | (later_gaps & (weight != 0))
+    return pa.array(between.astype(starts.dtype), first.type, mask=is_gap)
 
 
 def turn(first: Any, second: Any, weight: Any) -> Any:

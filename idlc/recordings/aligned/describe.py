@@ -12,7 +12,6 @@ from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.enums import enums
 from idlc.model.lowering.lower import lower
-from idlc.recordings.columns.elements import names_of
 from idlc.recordings.columns.plan import INSTANTS
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
@@ -65,12 +64,6 @@ def _of_fields(structure: Structure) -> dict[str, dict[str, str]]:
         for field in enum.fields:
             facts.setdefault(field.name, {})["ros2.enum"] = json.dumps(names)
     return facts
-
-
-def labels(structure: Structure) -> list[tuple[str, str]]:
-    """Return lists of numbers, each with a list of texts that may name its elements."""
-    lists = [leaf.path for leaf in leaves(structure) if leaf.field.is_list and leaf.field.primitive]
-    return [(path, label) for path in lists for label in names_of(structure, path)]
 
 
 def quaternions(structure: Structure) -> list[list[str]]:

@@ -12,9 +12,9 @@ import numpy as np
 
 from idlc.recordings.aligned import blend
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
-from idlc.recordings.aligned.describe import labels, leaves, metadata, quaternions
+from idlc.recordings.aligned.describe import leaves, metadata, quaternions
 from idlc.recordings.columns.arrow import arrow
-from idlc.recordings.columns.elements import element_of
+from idlc.recordings.columns.elements import element_of, names_of
 from idlc.recordings.columns.values import needing
 from idlc.recordings.containers.messages import (
     ALWAYS,
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
 
+    from idlc.runtime.typeinfo import Structure
+
 #: The times by which messages are ordered: when they were recorded, or their header's stamp.
 CLOCKS = ("log", "header")
 #: Topics whose messages take no more bytes are read once, others a second time for the values.
@@ -42,11 +44,7 @@ STAMP = "header.stamp"
 
 
 class Track(NamedTuple):
-    """A topic of the table: its columns, and how the value of a tick is found.
-
-    `fields` and `decoded` are what is read of a message: also the `labels` of linear columns,
-    which are the texts that name the elements of lists.
-    """
+    """A topic of the table: its columns, and how the value of a tick is found."""
 
     topic: str
     fields: tuple[str, ...] | None
@@ -54,9 +52,7 @@ class Track(NamedTuple):
     tolerance: int | None
     clock: str
     schema: pa.Schema
-    decoded: pa.Schema
     quaternions: list[list[str]]
-    labels: list[tuple[str, str]]
 
 
 class Times(NamedTuple):
@@ -192,7 +188,7 @@ class Aligned:
             track, structure = source.track, source.selection.read_type
             facts = metadata(structure)
             if track.how == "linear":
-                problems += _not_linear(track)
+                problems += _not_linear(track, structure)
             for field in track.schema:
                 name = f"{track.topic}.{field.name}"
                 element = element_of(structure, field.name)
@@ -204,7 +200,8 @@ class Aligned:
             about[track.topic] = {"type": structure.name, "hash": structure.hash, **how}
         if problems:
             what = f"there are no values between those of {', '.join(problems)}"
-            raise RecordingError(what, "select other fields, or `last` for these topics")
+            hint = "select other fields, elements such as `position[0]`, or `last` for these topics"
+            raise RecordingError(what, hint)
         clock = {"on": self._on.track.topic} if self._on else {"every": str(self._period)}
         return pa.schema(fields, {"idlc.aligned": json.dumps({**clock, "topics": about})})
 
@@ -341,19 +338,10 @@ def aligned(
         fields = (fields,) if isinstance(fields, str) else fields
         fields = None if fields is None else tuple(fields)
         selection = recording[name]
-
-        def schema(names: tuple[str, ...] | None) -> Any:
-            return selection.table(join_messages([]), names).schema.remove_metadata()
-
-        columns, named, turned = schema(fields), [], []
-        if way == "linear":
-            turned = quaternions(selection.read_type)
-            named = [pair for pair in labels(selection.read_type) if pair[0] in columns.names]
-        if fields is not None:
-            fields = (*fields, *dict.fromkeys(label for _, label in named))
+        schema = selection.table(join_messages([]), fields).schema.remove_metadata()
+        turned = quaternions(selection.read_type) if way == "linear" else []
         limit = None if limit is None else int(length(limit))
-        track = Track(name, fields, way, limit, by, columns, schema(fields), turned, named)
-        return AlignedTopic(track, selection)
+        return AlignedTopic(Track(name, fields, way, limit, by, schema, turned), selection)
 
     sources = {name: source(name, fields) for name, fields in wanted.items()}
     base = None if on is None else sources.get(on) or source(on, ())
@@ -385,11 +373,17 @@ def _has_clock(source: AlignedTopic) -> bool:
     return any(leaf.structure.name == "std_msgs/msg/Header" for leaf in stamps)
 
 
-def _not_linear(track: Track) -> Iterator[str]:
-    """Yield the columns that have no values between those of two messages."""
-    pa, names = arrow(), set(track.schema.names)
+def _not_linear(track: Track, structure: Structure) -> Iterator[str]:
+    """Yield the columns that have no values between those of two messages.
+
+    Elements of lists may change their places, unless they are those of an array without names.
+    """
+    types, names = arrow().types, set(track.schema.names)
     for field in track.schema:
-        if not blend.is_blendable(pa, field.type):
+        number = field.type
+        if types.is_fixed_size_list(number) and not names_of(structure, field.name):
+            number = number.value_type
+        if not types.is_floating(number):
             yield f"`{track.topic}.{field.name}` ({field.type})"
     for paths in track.quaternions:
         if names.intersection(paths) and not names.issuperset(paths):
@@ -400,7 +394,7 @@ def _scan(track: Track, selection: Any) -> Times:
     """Read the times of a topic's messages, and also the values if they are small."""
     none = np.zeros(0, np.int64)
     log_times, stamps, sizes = [none], [none], [none]
-    tables = [track.decoded.empty_table()]
+    tables = [track.schema.empty_table()]
     size = done = 0
     for batch in selection.recorded():
         numbers = np.arange(done, done + len(batch))
@@ -444,7 +438,7 @@ def _summary(topic: str, times: Times, each: Match) -> ClockFit:
 
 def _values(track: Track, selections: Iterable[Any], need: Needed) -> pa.Table:
     """Return the values of needed messages, without decoding others."""
-    tables = [track.decoded.empty_table()]
+    tables = [track.schema.empty_table()]
     done = last = 0
     for selection in selections:
         for batch in selection.recorded():
@@ -494,35 +488,22 @@ def _taken(table: pa.Table, index: Any, gap: Any) -> list[Any]:
 
 def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
     """Return the values between messages; those of gaps mean nothing."""
-    pa, names = arrow(), table.column_names
-    columns = [column.combine_chunks() for column in table.columns]
+    pa = arrow()
     first, second = (
-        [column.take(pa.array(np.maximum(places, 0))) for column in columns]
-        for places in (each.first, each.second)
+        {name: table[name].combine_chunks().take(rows) for name in table.column_names}
+        for rows in (pa.array(np.maximum(places, 0)) for places in (each.first, each.second))
     )
-    blended = pa.array(np.flatnonzero((each.first >= 0) & (each.weight != 0)))
-    for label, name in {label: name for name, label in track.labels}.items():
-        at = names.index(label)
-        if not first[at].take(blended).equals(second[at].take(blended)):
-            what = f"the elements of `{track.topic}.{name}` change: `{label}` names others"
-            raise RecordingError(f"{what} in the next message", "use how='last' for this topic")
-    arrays: dict[str, Any] = {}
+    arrays = {name: blend.line(first[name], second[name], each.weight) for name in first}
     for paths in track.quaternions:
-        if paths[0] in names:
+        if paths[0] in arrays:
             starts, ends = (
-                np.stack([arrays_[names.index(path)].to_numpy() for path in paths], axis=1)
-                for arrays_ in (first, second)
+                np.stack([columns[path].to_numpy() for path in paths], axis=1)
+                for columns in (first, second)
             )
             turned = blend.turn(starts, ends, each.weight)
-            arrays |= {
-                path: pa.array(turned[:, at], table.schema.field(path).type)
-                for at, path in enumerate(paths)
-            }
-    for name in track.schema.names:
-        if name not in arrays:
-            pair = first[names.index(name)], second[names.index(name)]
-            arrays[name] = blend.line(f"{track.topic}.{name}", *pair, each.weight)
-    return [arrays[name] for name in track.schema.names]
+            for path, values in zip(paths, turned.T, strict=True):
+                arrays[path] = pa.array(values, first[path].type)
+    return list(arrays.values())
 
 
 def _masked(column: Any) -> Any:
