@@ -19,6 +19,7 @@ from idlc.model.distros import DEFAULT, Distro
 from idlc.project import inputs, prefixes
 from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
+from idlc.project.lock import FILE as LOCK
 from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import installed
 from idlc.project.root import MANIFEST, Root
@@ -98,7 +99,10 @@ class InstallPrefix:
 
 
 def _has_interfaces(root: Path) -> bool:
-    return any(os.path.isdir(f"{root}/{kind}") for kind in KIND_FOLDERS)  # noqa: PTH112 - for each look
+    kinds = [f"{root}/{kind}" for kind in KIND_FOLDERS if os.path.isdir(f"{root}/{kind}")]  # noqa: PTH112 - for each look
+    if kinds and is_file(root / LOCK):  # these are the folders of classes
+        return any(path.suffix in KINDS for kind in kinds for path in entries(Path(kind)))
+    return bool(kinds)
 
 
 class Library:

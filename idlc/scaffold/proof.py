@@ -5,7 +5,9 @@ Installing runs the package's own build. `idlc init` does so only after the user
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,11 +19,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from idlc.diagnostics.report import first_few
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import one_line
 from idlc.project.find import SKIPPED
 from idlc.project.root import Root
-from idlc.project.settings import SETTINGS_FILE, toml
+from idlc.project.settings import SETTINGS_FILE, load_settings, toml
 
 _IMPORT = """\
 import sys
@@ -116,12 +118,22 @@ def _built(folder: Path, backend: str, scratch: Path) -> tuple[str, Path | None]
         shutil.copytree(folder, copy, symlinks=True, ignore=left_out)
     except shutil.Error as error:  # such as one for a named pipe
         return one_line(str(error.args[0][0][2])), None
+    _keep_included(root, copy)
     wheels = Path(scratch, "wheels")
     wheels.mkdir()
     build = Path(scratch, "build_wheel.py")  # its folder is on the path, not the package's
     build.write_text(_BUILD, encoding="utf-8")
     failure = _failure(copy, build, wheels, *_hooks(copy, backend))
     return failure, next(iter(wheels.iterdir()), None)
+
+
+def _keep_included(root: Root, copy: Path) -> None:
+    """Have the settings of a copy name the packages beside the original."""
+    file = copy / SETTINGS_FILE
+    for path in load_settings(root, Report()).include if file.is_file() else ():
+        place = json.dumps(str(root.absolute(path))).replace("\\", r"\\")
+        quoted = rf"""(["']){re.escape(path)}\1"""
+        file.write_bytes(re.sub(quoted.encode(), place.encode(), file.read_bytes()))
 
 
 def prove(

@@ -856,13 +856,21 @@ SIBLINGS = {
         of_ros("x/c_msgs") | of_ros("b_msgs", "c_msgs") | of_ros("y/z/a_msgs", "b_msgs"),
         {"y/z/a_msgs": ["../../../b_msgs", "../../../x/c_msgs"], "b_msgs": ["../x/c_msgs"]},
     ),
+    "of Python": (
+        of_ros("b_msgs", build="ament_python")
+        | of_ros("x/c", "b_msgs", build="ament_python")
+        | of_ros("a_msgs", "c", build="ament_python"),
+        {"a_msgs": ["../b_msgs", "../x/c"], "x/c": ["../../b_msgs"]},
+    ),
     "standard": (of_ros("std_msgs") | of_ros("a_msgs", "std_msgs"), {"a_msgs": None}),
 }
 
 
 @pytest.mark.parametrize("case", SIBLINGS)
 @pytest.mark.usefixtures("unproved")
-def test_a_package_includes_those_beside_it_whose_messages_it_uses(case, project, capsys):
+def test_a_package_includes_those_beside_it_whose_messages_it_uses(
+    case, project, monkeypatch, capsys
+):
     files, includes = SIBLINGS[case]
     write_all({**files, ".git/HEAD": ""})
     main(["init", "--yes"])
@@ -873,6 +881,10 @@ def test_a_package_includes_those_beside_it_whose_messages_it_uses(case, project
         path = Path(folder, "pyproject.toml")
         table = toml(path.read_text()) if path.exists() else {"tool": {"idlc": {}}}
         assert table["tool"]["idlc"].get("include") == include
+        if include:  # beside the interfaces, there are classes by now
+            monkeypatch.chdir(project / folder)
+            assert main(["gen"]) == 0
+            monkeypatch.chdir(project)
 
 
 PROJECT = '[project]\nname = "kit"\nversion = "1"\n'

@@ -7,6 +7,7 @@ import zipfile
 
 import pytest
 
+from idlc.project.settings import toml
 from idlc.scaffold.proof import installed_files, prove
 from tests.support.files import write
 
@@ -89,3 +90,20 @@ def test_a_build_that_installs_fewer_files_fails(tmp_path, monkeypatch):
     assert before == {"odd/__init__.py"}
     proof = prove(tmp_path, "setuptools.build_meta", (), tmp_path, before | {"odd/gone.yaml"})
     assert "no longer installs odd/gone.yaml" in proof.failure
+
+
+@pytest.mark.parametrize("include", ['["../far"]', "[ '../far' ]", "[\"../x\", '../far']"])
+def test_the_copy_of_a_package_finds_those_beside_the_original(include, tmp_path, monkeypatch):
+    folder, seen = tmp_path / "odd", []
+    text = f"# ../far\r\n[tool.idlc]\r\ninclude = {include}\r\n"
+    write(folder / "pyproject.toml", text)
+    monkeypatch.setattr("idlc.scaffold.proof.missing_tool", lambda _: "")
+    monkeypatch.setattr(
+        "idlc.scaffold.proof._failure",
+        lambda copy, *_: seen.append((copy / "pyproject.toml").read_bytes().decode()) or "no",
+    )
+    assert prove(folder, "setuptools.build_meta", (), folder).failure == "no"
+    assert seen[0].startswith("# ../far\r\n")
+    named = toml(seen[0])["tool"]["idlc"]["include"]
+    assert os.path.normpath(named[-1]) == str(tmp_path / "far")
+    assert toml((folder / "pyproject.toml").read_text()) == toml(text)
