@@ -298,9 +298,15 @@ def resource_marker(facts: Facts, _: Model) -> Iterator[Diagnostic]:
         message = f"`resource/{facts.name}` is missing; ROS 2 needs this file to find the package"
         hint = f"create it: `mkdir -p resource && touch resource/{facts.name}`"
         yield codes.NO_RESOURCE_MARKER.at(facts.place, message, hint=hint)
-    elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
-        message = f"`resource/{facts.name}` is not in `data_files`"
-        line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
+    else:
+        yield from uninstalled_marker(setup, facts.name)
+
+
+def uninstalled_marker(setup: Setup, package: str) -> Iterator[Diagnostic]:
+    """Yield the problem of a setup.py that does not install the package's marker."""
+    if setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
+        message = f"`resource/{package}` is not in `data_files`"
+        line = f"('{_INDEX}/packages', ['resource/{package}'])"
         yield _data_files_problem(codes.NO_RESOURCE_MARKER, message, setup, [line])
 
 

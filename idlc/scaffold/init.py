@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from idlc.check.installation import check_setup
+from idlc.check.installation import check_setup, uninstalled_marker
 from idlc.check.select import selection
 from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
@@ -480,7 +480,9 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
         return ""
     existing, problems = folders(draft.path), Report()
     for _ in range(_ROUNDS):
-        problems = check_setup(Source(SETUP, text), name, files, existing, others)
+        source = Source(SETUP, text)
+        problems = check_setup(source, name, files, existing, others)
+        problems.extend(uninstalled_marker(Setup(source), name))
         new = apply(text, (edit for problem in problems for edit in problem.edits))[0]
         if new == text:
             break

@@ -404,7 +404,9 @@ def test_a_setup_py_that_is_missing_names_the_package(settings, is_named, projec
     del files["setup.py"]
     write_all(files)
     assert main(["init", "--yes"]) == 0
-    assert ("name=" in Path("setup.py").read_text()) is not is_named
+    text = Path("setup.py").read_text()
+    assert ("name=" in text) is not is_named
+    assert "('share/ament_index/resource_index/packages', ['resource/bot'])" in text
     assert run(sys.executable, "setup.py", "--name", cwd=project).splitlines()[-1] == "bot"
 
 
