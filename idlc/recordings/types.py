@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from functools import cached_property
@@ -22,6 +23,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
+from idlc.project.find import is_address
 from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -130,7 +132,7 @@ def topics_of(
     missing = [name for name in selected if name not in names]
     for name in missing:
         near = did_you_mean(name, names) or did_you_mean(f"/{name}", names)
-        hint = near or "`idlc show` lists the topics"
+        hint = near or f"`idlc show {shlex.quote(paths[0])}` lists the topics"
         message = f"no topic `{name}` in {' or '.join(f'`{path}`' for path in paths)}"
         report.add(codes.NO_SUCH_TOPIC.of("", message, hint=hint))
     if missing:
@@ -400,7 +402,11 @@ class RecordedTypes:
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
             message = f"{why} {names}; idlc uses {origin}, which has {which}"
             hint = _RECORDERS if why == WRONG else None
-            yield code.of(recording, message, hint=hint if sure else BORROWED)
+            hint = hint if sure else BORROWED
+            if is_address(recording):
+                message = message.replace("the recording", "the robot")
+                hint = hint and hint.replace("the recorded type", "the robot's type")
+            yield code.of(recording, message, hint=hint)
         partial: dict[str, set[ir.TypeName]] = {}
         for typed in self.topics:
             texts = ((name, self.texts.get(name)) for name in self.names_of(typed))

@@ -45,6 +45,45 @@ _KINDS = {
 }
 
 
+#: The services that every node has, of all distributions: the name of the type, and the hashes of
+#: it, its request and its response.
+_OF_NODES = """
+rcl_interfaces/srv/DescribeParameters
+845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff
+05dd1c2bc87dec2627105c8070d6f9725c781a4f2ab852975bf105462b82b644
+ad6747319613c6131589e062e095b469a46cc764f7d0f12a001a49e6cd893995
+rcl_interfaces/srv/GetParameterTypes
+da199c878688b3e530bdfe3ca8f74cb9fa0c303101e980a9e8f260e25e1c80ca
+87d7ec5ef545d4daa289d500025d31fb2437bc8b8365ca367161c4dac4be33fd
+ac1335dce67c478e669434f6ac2fbff34fcd529580f272d3006785ba8b54e47f
+rcl_interfaces/srv/GetParameters
+bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc
+135a9e1c3d7cebef792f6687d7ddf99949b21a0bd9a320d863a9110a3f5cf4d6
+9fa773b46e39cc5d02db6224d8fd520bb9caeeffc2b27c96c1e59431baba9f2a
+rcl_interfaces/srv/ListParameters
+3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d
+a1b0b5d6b967a5b8ac5bc8563c3ea678f349e312a6a4967227c5a96bc5ce38df
+31b937b82de3612426be79f231e386259f97e8dc843e3f2845288b4bfa296bdd
+rcl_interfaces/srv/SetParameters
+56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0
+130d46386b7e84ea9ecf60608a4d83cbe5e5cb7c6cc5b712b7a4e3a6c254e932
+7a0e8140a0b8d98308fa81a5403a766e610af29a239caf54b7553227906fc266
+rcl_interfaces/srv/SetParametersAtomically
+0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd
+db0bd950ed5ed867a0e90b225e44dea382d762c0762ff3e0ee842190042a59e5
+31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8
+type_description_interfaces/srv/GetTypeDescription
+69b9c19c1021405984cc60dbbb1edceb147a6538b411d812ba6afabeed962cd5
+470f56ccbcf13d55c78c8b735fb12da03e639e5acded994426c89d94778d9e28
+648c49d976240861a482f961c5621ddd0d2135d8cce6f297a76d4f6376d93b75
+"""
+#: The hashes of these services by their types and the hashes of their requests and responses.
+_SERVICES: dict[tuple[str, str | None, str | None], str] = {
+    (name, f"RIHS01_{request}", f"RIHS01_{response}"): f"RIHS01_{service}"
+    for name, service, request, response in zip(*[iter(_OF_NODES.split())] * 4, strict=True)
+}
+
+
 class NodeInfo(NamedTuple):
     """A node, and the GUIDs of its endpoints."""
 
@@ -182,7 +221,8 @@ class RemoteNodes:
     ) -> Iterator[Entity]:
         """Yield the entities of the participants that exist; forget what others told.
 
-        DDS tells no hash of a service: `hashes` has those of the own ones by name and type.
+        DDS tells the hashes of requests and responses, but none of a service: `hashes` has those of
+        the own ones by name and type.
         """
         self._nodes = {each: self._nodes[each] for each in prefixes if each in self._nodes}
         owners: dict[bytes, _Owner] = {}
@@ -193,8 +233,15 @@ class RemoteNodes:
                     yield entity
                 owners |= dict.fromkeys((*node.readers, *node.writers), owner)
         unknown = _Owner(self._domain, 0, "/", _UNKNOWN)
+        endpoints = [*endpoints]
+        told: dict[tuple[object, ...], dict[str, str]] = {}
         for end in endpoints:
-            if entity := _endpoint(end, owners.get(end.guid, unknown), hashes.get(_names(end), "")):
+            told.setdefault(_side(end), {})[end.topic.partition("/")[0]] = end.hash
+        for end in endpoints:
+            halves = told[_side(end)]
+            of_nodes = _SERVICES.get((_names(end)[1], halves.get("rq"), halves.get("rr")), "")
+            service = hashes.get(_names(end), of_nodes)
+            if entity := _endpoint(end, owners.get(end.guid, unknown), service):
                 yield entity
 
 
@@ -218,6 +265,12 @@ def _names(end: EndpointData) -> tuple[str, str]:
     if half in HALVES:
         name, type_ = map(str.removesuffix, (name, type_), HALVES[half])
     return f"/{name}", ros_type(type_) or ""
+
+
+def _side(end: EndpointData) -> tuple[object, ...]:
+    """Return the participant of an endpoint, the service, and whether it is the server's."""
+    is_request = end.topic.startswith("rq/")
+    return end.guid[: wire.PREFIX], *_names(end), is_request is not end.is_writer
 
 
 @lru_cache(_MOST_CACHED)

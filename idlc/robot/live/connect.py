@@ -106,7 +106,7 @@ def find_endpoints(
     noun = "topic" if EntityKind.PUBLISHER in kinds else "service"
     known = {end.name for end in entities}
     for name in sorted({*names} - known):
-        hint = did_you_mean(name, known) or f"`idlc show` lists the {noun}s"
+        hint = did_you_mean(name, known) or f"`idlc show` with this address lists the {noun}s"
         report.add(codes.NO_SUCH_TOPIC.of("", f"no {noun} `{one_line(name)}`", hint=hint))
     return [end for end in entities if end.name in names]
 

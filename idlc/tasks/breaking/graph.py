@@ -281,7 +281,10 @@ def _robot_endpoints(end: RobotEntity) -> Iterator[GraphEndpoint]:
 
 #: A structure's full name and type hash.
 Key = tuple[str, str]
-_HASHES = "nodes announce type hashes from Iron on"
+_HASHES = (
+    "nodes announce type hashes from Iron on; over DDS, they announce none of services: compare "
+    "these with `--against graph` on a machine with rclpy"
+)
 #: The variables that choose a graph.
 _OF_A_ROBOT = "ROS_DOMAIN_ID to the nodes' value"
 _OF_RCLPY = (
