@@ -7,8 +7,12 @@ import pytest
 
 import idlc
 from idlc.robot import ActionClient, ActionServer, DurabilityPolicy, QoSProfile
+from idlc.robot.dds import graph
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import EntityKind
+from idlc.robot.names import dds_type
+from idlc.robot.nodes.interfaces import interface_of, standard
+from idlc.runtime.typeinfo import structure_of
 from tests.robot.nodes import LONG, SetBool, String, node_at, spin_until
 from tests.support.domains import held_domain
 from tests.support.waiting import wait_for
@@ -99,6 +103,26 @@ with init(address=sys.argv[1]):
         spin_once(node, timeout_sec=0.1)
 print(received[0].data)
 """
+
+
+def test_services_of_every_node_are_known_by_both_halves():
+    """DDS tells no hash of a service: a request alone does not prove it."""
+    for (name, *halves), service in graph.SERVICES.items():
+        kind = standard(name).kind
+        hashes = [structure_of(each).hash for each in (kind.Request, kind.Response)]
+        assert (hashes, service) == (halves, interface_of(kind).hash)
+        other = "RIHS01_" + "0" * 64
+        for told, shown in ((halves, service), ([halves[0], other], ""), ([other, halves[1]], "")):
+            type_ = dds_type(name)
+            ends = [
+                graph.EndpointData(bytes(15) + last, topic, f"{type_}{part}_", LATCHED, hash_)
+                for last, topic, part, hash_ in (
+                    (graph.READER, "rq/a/getRequest", "Request", told[0]),
+                    (graph.WRITER, "rr/a/getReply", "Response", told[1]),
+                )
+            ]
+            entities = graph.RemoteNodes(0).entities([], ends, {})
+            assert [(each.type, each.hash) for each in entities] == [(name, shown)]
 
 
 def test_a_first_message_needs_no_other_package():

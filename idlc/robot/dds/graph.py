@@ -45,7 +45,7 @@ _KINDS = {
 }
 
 
-#: The services that every node has, of all distributions: the name of the type, and the hashes of
+#: The services that every node has: the name of the type as in Jazzy, and the hashes of
 #: it, its request and its response.
 _OF_NODES = """
 rcl_interfaces/srv/DescribeParameters
@@ -78,7 +78,7 @@ type_description_interfaces/srv/GetTypeDescription
 648c49d976240861a482f961c5621ddd0d2135d8cce6f297a76d4f6376d93b75
 """
 #: The hashes of these services by their types and the hashes of their requests and responses.
-_SERVICES: dict[tuple[str, str | None, str | None], str] = {
+SERVICES: dict[tuple[str, str | None, str | None], str] = {
     (name, f"RIHS01_{request}", f"RIHS01_{response}"): f"RIHS01_{service}"
     for name, service, request, response in zip(*[iter(_OF_NODES.split())] * 4, strict=True)
 }
@@ -239,7 +239,7 @@ class RemoteNodes:
             told.setdefault(_side(end), {})[end.topic.partition("/")[0]] = end.hash
         for end in endpoints:
             halves = told[_side(end)]
-            of_nodes = _SERVICES.get((_names(end)[1], halves.get("rq"), halves.get("rr")), "")
+            of_nodes = SERVICES.get((_names(end)[1], halves.get("rq"), halves.get("rr")), "")
             service = hashes.get(_names(end), of_nodes)
             if entity := _endpoint(end, owners.get(end.guid, unknown), service):
                 yield entity
