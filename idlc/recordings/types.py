@@ -213,6 +213,21 @@ WRONG = "the recorded hash does not match the definition of"
 _RECORDERS = "the recorder and the publisher used different versions of the interface files"
 
 
+def _substitution(
+    recording: str, why: str, sure: bool, origin: str, undefined: Iterable[ir.TypeName]
+) -> Diagnostic:
+    """Return IDL652 or IDL654 for definitions of another origin, which are `sure` to be equal."""
+    which = "the recorded hash" if sure else "the same name"
+    message = f"{why} {_named(undefined)}; idlc uses {origin}, which has {which}"
+    code, hint = codes.MISSING_DEFINITION, None if sure else BORROWED
+    if why == WRONG:
+        code, hint = codes.RECORDED_HASH_DIFFERS, _RECORDERS if sure else BORROWED
+    if is_address(recording):
+        message = message.replace("the recording", "the robot")
+        hint = hint and hint.replace("the recorded type", "the robot's type")
+    return code.of(recording, message, hint=hint)
+
+
 def _named(names: Iterable[ir.TypeName]) -> str:
     return first_few((f"`{name}`" for name in sorted(names)), NAMED)
 
@@ -396,17 +411,8 @@ class RecordedTypes:
                 if why != ABSENT or not sure:
                     key = typed.recorded.recording, why, sure, self._local.origin(name)
                     doubtful.setdefault(key, set()).add(name)
-        for (recording, why, sure, origin), undefined in doubtful.items():
-            names = _named(undefined)
-            which = "the recorded hash" if sure else "the same name"
-            code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
-            message = f"{why} {names}; idlc uses {origin}, which has {which}"
-            hint = _RECORDERS if why == WRONG else None
-            hint = hint if sure else BORROWED
-            if is_address(recording):
-                message = message.replace("the recording", "the robot")
-                hint = hint and hint.replace("the recorded type", "the robot's type")
-            yield code.of(recording, message, hint=hint)
+        for key, undefined in doubtful.items():
+            yield _substitution(*key, undefined)
         partial: dict[str, set[ir.TypeName]] = {}
         for typed in self.topics:
             texts = ((name, self.texts.get(name)) for name in self.names_of(typed))
