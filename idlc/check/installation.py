@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from idlc.check.outputs import dependencies, outdated, with_dependencies
+from idlc.check.outputs import dependencies, include_options, outdated, with_dependencies
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
 from idlc.diagnostics.source import Source, Span
@@ -376,7 +376,7 @@ def current_output(facts: Facts, model: Model) -> Iterator[Diagnostic]:
                 hint += f"except `{BUILD_STEP}`, which the build runs"
                 yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
         elif output.package == facts.name and facts.whole:
-            words = ("gen", folder, "-o", home)
+            words = ("gen", folder, "-o", home, *include_options(model))
             recorded, used = output.dependencies, dependencies(model)
             before = with_dependencies(output.inputs, recorded, used)
             now = with_dependencies(facts.inputs, used, recorded)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.source import Source
+from idlc.model import ir
 from idlc.model.catalog import is_standard
 from idlc.model.link import Model
 from idlc.project.files import is_file
@@ -44,11 +46,25 @@ def dependencies(model: Model) -> dict[str, str]:
 
     Standard ones are left out, because they differ between distributions.
     """
+    used = _used(model)
+    return {str(name): meaning(source.text, name.package) for name, source in used.items()}
+
+
+def include_options(model: Model) -> list[str]:
+    """Return the options by which `idlc gen` finds the packages that a model uses.
+
+    Packages with absolute paths are installed, or found by settings.
+    """
+    paths = (PurePosixPath(source.path) for source in _used(model).values())
+    folders = {path.parent.parent.as_posix() for path in paths if not path.is_absolute()}
+    return [word for folder in sorted(folders) for word in ("-I", folder)]
+
+
+def _used(model: Model) -> dict[ir.TypeName, Source]:
+    """Return the interfaces of packages, other than standard ones, that a model uses."""
     used = (each for each in model.interfaces.values() if each.name.package != model.package)
     sources = {each.name: each.source for each in used if not is_standard(each.name.package)}
-    return {
-        str(name): meaning(source.text, name.package) for name, source in sources.items() if source
-    }
+    return {name: source for name, source in sources.items() if source}
 
 
 def with_dependencies(
@@ -119,6 +135,7 @@ def current_outputs(
         words = ["gen"]
         if not (scope.paths and scope.out and folder.is_relative_to(root.absolute(scope.out))):
             words += [root.shown(package.home), "-o", root.shown(folder)]
+            words += include_options(model)
             words += [] if manifest else ["--package", record.package]
             words += {"": [], "private": ["--vendor-deps"], "beside": ["--vendor-deps=beside"]}[
                 record.vendoring
