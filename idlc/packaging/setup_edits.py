@@ -19,8 +19,8 @@ from idlc.diagnostics.source import Source, Span
 from idlc.packaging.setup_py import Setup, parse, range_of, span_of, start_of
 from idlc.project.lock import BUILD_STEP
 
-#: The widest line that ruff's formatter and the linters of ROS 2 leave as it is.
-WIDTH = 88
+#: The widest line that the linters of ROS 2 accept, and that ruff's formatter leaves as it is.
+WIDTH, _WIDTH_OF_RUFF = 99, 88
 
 
 def insertion(source: Source, at: int, text: str) -> Edit:
@@ -194,9 +194,12 @@ def arrange(old: str, new: str) -> str:
 
     Lines that `old` has stay as they are.
     """
-    return _wrap_lines(old, _sort_imports(old, new))
+    mark = _MARK * new.startswith(_MARK)
+    old, new = old.removeprefix(_MARK), new.removeprefix(_MARK)
+    return mark + _wrap_lines(old, _sort_imports(old, new))
 
 
+_MARK = "\ufeff"
 _IMPORT = re.compile(r"from (\w+)[\w.]* import \w+\s*")
 _FORMS = (ast.Import, ast.ImportFrom)
 _STANDARD = sys.stdlib_module_names
@@ -252,7 +255,7 @@ def _wrap_lines(old: str, new: str) -> str:
     refused: set[str] = set()
     for _ in range(_TRIES):
         lines = enumerate(_LINE_END.split(new), 1)
-        wide = {at for at, line in lines if len(line) > WIDTH and line not in before}
+        wide = {at for at, line in lines if len(line) > _WIDTH_OF_RUFF and line not in before}
         tree = parse(new) if wide else None
         nodes = ast.walk(tree) if tree else ()
         texts = (_spread(new, node, wide, refused) for node in nodes)

@@ -153,3 +153,5 @@ def test_new_imports_stand_where_a_formatter_has_them(old, new):
     added = "from runpy import run_path\nfrom glob import glob\n"
     assert arrange(old + rest, f"{old}{added}{rest}") == new + rest
     assert arrange(old + rest, old + rest) == old + rest
+    mark = "\ufeff"
+    assert arrange(mark + old + rest, f"{mark}{old}{added}{rest}") == mark + new + rest

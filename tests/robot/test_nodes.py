@@ -424,6 +424,24 @@ def test_types_are_described_with_their_sources(pair):
     assert not ask(type_name=known.name, type_hash="RIHS01_0").successful
 
 
+def test_each_version_of_a_type_is_described(pair, tmp_path):
+    left, right = pair
+    for topic, text in (("a", "int8 a\n"), ("b", "int16 a\n")):
+        path = tmp_path / topic / "demo_msgs/msg/A.msg"
+        path.parent.mkdir(parents=True)
+        path.write_text(text, encoding="utf-8")
+        right.create_publisher(idlc.load(path.parents[1]).A, topic, 1)
+    client = left.create_client(standard(SERVICE).kind, "/right/get_type_description")
+    assert client.wait_for_service(timeout_sec=LONG)
+    hashes = {each.entity.hash for each in right.endpoints if each.topic_name in ("/a", "/b")}
+    assert len(hashes) == 2
+    for digest in hashes:
+        request = standard(SERVICE).kind.Request(type_name="demo_msgs/msg/A", type_hash=digest)
+        future = client.call_async(request)
+        spin_until(future.done, left, right)
+        assert future.result().successful
+
+
 @pytest.mark.parametrize("name", _HASHES)
 def test_announced_hashes_are_those_of_the_catalogue(name):
     assert standard(name).hash == types_of(standard(name).kind).hashes[name]

@@ -200,10 +200,11 @@ SERVICE = "type_description_interfaces/srv/GetTypeDescription"
 
 def describe(node: Any, request: Any, response: Any) -> Any:
     """Fill in the response to a request, from the types that a Node uses."""
-    used = {each.interface.name: each.interface for each in node.endpoints}
-    interface = used.get(request.type_name)
-    if interface is None or request.type_hash not in ("", interface.hash):
-        problem = f"uses the hash {interface.hash}" if interface else "does not use this type"
+    # a relay uses several versions of one type
+    versions = [e.interface for e in node.endpoints if e.interface.name == request.type_name]
+    interface = next((v for v in versions if request.type_hash in ("", v.hash)), None)
+    if interface is None:
+        problem = f"uses the hash {versions[0].hash}" if versions else "does not use this type"
         response.failure_reason = f"the node {problem}"
         return response
     types = types_of(interface.kind)
