@@ -107,7 +107,7 @@ def pytest_sessionfinish(session):
 def pytest_terminal_summary(terminalreporter, config):
     """Keep the names of tests that passed, and print what tests recorded as found."""
     passed = {report.nodeid for report in terminalreporter.getreports("passed")}
-    if config.getoption("left_out") or config.getoption("lf"):
+    if config.getoption("left_out") or config.getoption("lf", default=False):
         passed.update(config.cache.get(PASSED, []))
     if hasattr(config, "cache"):  # without -p no:cacheprovider
         config.cache.set(PASSED, sorted(passed))
