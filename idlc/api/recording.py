@@ -724,12 +724,12 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         >>> recording.aligned(topics, on="/camera/image", tolerance="50ms").to_arrow()
 
         `topics` has the fields of each topic, None for all, or elements of lists, such as
-        `position.elbow` by name or `covariance[0]` by index. The value of a tick is that of the
-        `last` message until then, or of the `nearest`, or `linear` between two. It is null without
-        a message within `tolerance`. The `clock` of messages is `log`, or `header` for the stamp of
-        their header. These three are for all topics, or a mapping has them by topic. Lengths of
-        time are `50ms`, `30Hz`, a timedelta, or an int in nanoseconds; `start` and `end` limit the
-        ticks, as for `between`.
+        `position.elbow` by name or `covariance[0]` by index. A row has the values of the `last`
+        message until its time, of the `nearest`, or on a line between two (`linear`). They are null
+        without a message within `tolerance`. The `clock` of messages is `log`, or `header` for the
+        stamp of their header. These three are for all topics, or a mapping has them by topic.
+        Lengths of time are `50ms`, `30Hz`, a timedelta, or an int in nanoseconds; `start` and `end`
+        limit the ticks, as for `between`.
         """
         from idlc.recordings.aligned.table import aligned
 

@@ -16,7 +16,7 @@ from typing import TypeAlias
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit
 from idlc.diagnostics.source import Source, Span
-from idlc.packaging.setup_py import Setup, parse, range_of, span_of, start_of
+from idlc.packaging.setup_py import BOM, Setup, parse, range_of, span_of, start_of
 from idlc.project.lock import BUILD_STEP
 
 #: The widest line that the linters of ROS 2 accept, and that ruff's formatter leaves as it is.
@@ -194,12 +194,11 @@ def arrange(old: str, new: str) -> str:
 
     Lines that `old` has stay as they are.
     """
-    mark = _MARK * new.startswith(_MARK)
-    old, new = old.removeprefix(_MARK), new.removeprefix(_MARK)
+    mark = BOM * new.startswith(BOM)
+    old, new = old.removeprefix(BOM), new.removeprefix(BOM)
     return mark + _wrap_lines(old, _sort_imports(old, new))
 
 
-_MARK = "\ufeff"
 _IMPORT = re.compile(r"from (\w+)[\w.]* import \w+\s*")
 _FORMS = (ast.Import, ast.ImportFrom)
 _STANDARD = sys.stdlib_module_names

@@ -162,7 +162,7 @@ class _Rewriting:
 
     @property
     def result(self) -> Rewritten:
-        """What was written until now."""
+        """The topics that were written, and the damage, so far."""
         return Rewritten(self.definitions, tuple(self.damage))
 
     @property

@@ -168,7 +168,7 @@ def _with_recordings(
 
 
 def keep_layout(name: str, old: str, new: str) -> str:
-    """Return an edited file in its old layout: `idlc fmt`'s, or without long lines."""
+    """Return an edited file in its old layout: `idlc fmt`'s, or that of formatters of Python."""
     if name.endswith("setup.py"):
         from idlc.packaging.setup_edits import arrange
 

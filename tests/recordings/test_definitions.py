@@ -295,7 +295,7 @@ def test_what_has_errors_is_what_is_known_here(encoding, hash_, said):
     assert told.code == "IDL652"
     broken = "there are errors in the definition of `std_msgs/msg/String`; idlc uses "
     # installed, or of the catalogue
-    origin = r"the (local type|type of ROS 2 \w+), which has "
+    origin = r"the (local type|type of ROS 2 Jazzy), which has "
     assert re.fullmatch(re.escape(broken) + origin + said, told.message)
 
 

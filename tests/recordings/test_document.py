@@ -33,10 +33,10 @@ def folder(tmp_path_factory):
 def test_the_examples_print_what_the_page_shows(folder):
     # in their order: one reads what another has written
     for command, expected in EXAMPLES:
-        assert run(command, folder) == re.sub(r"→ \d+ files", "→ N files", expected)
+        check(command, expected, folder)
 
 
-def run(command, folder):
+def check(command, expected, folder):
     python = f"'{sys.executable}'"
     functions = f'idlc() {{ {python} -m idlc "$@"; }}\npython() {{ {python} "$@"; }}\n'
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -50,7 +50,9 @@ def run(command, folder):
         env=environment,
     )
     assert "Traceback" not in done.stderr
-    return re.sub(r"→ \d+ files", "→ N files", done.stdout)
+    assert re.sub(r"→ \d+ files", "→ N files", done.stdout) == re.sub(
+        r"→ \d+ files", "→ N files", expected
+    ), done.stderr
 
 
 def test_there_are_examples():

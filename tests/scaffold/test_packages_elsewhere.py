@@ -156,7 +156,8 @@ def test_packages_below_src_are_fixed_there(package, capsys):
     capsys.readouterr()
     assert codes(capsys)[0] == set()
     text = Path("setup.py").read_text(encoding="utf-8")
-    assert "        package_name,\n        *find_packages('src', include=['demo.*']),\n" in text
+    packages = "        package_name,\n        *find_packages('src', include=['demo.*']),\n"
+    assert f"    packages=[\n{packages}    ], package_dir=" in text
 
 
 def test_interfaces_are_installed_from_where_they_lie(package, capsys):

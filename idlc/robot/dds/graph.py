@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from idlc.robot.dds import wire
 from idlc.robot.dds.discovery import EndpointData
@@ -17,6 +17,7 @@ from idlc.robot.dds.formats import Received
 from idlc.robot.dds.wire import GUID, WireError
 from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
+from idlc.robot.nodes.interfaces import standard
 
 #: The topic about nodes, its type, and what one message of it may contain.
 INFO_TOPIC = "ros_discovery_info"
@@ -45,42 +46,34 @@ _KINDS = {
 }
 
 
-#: The services that every node has: the name of the type as in Jazzy, and the hashes of
-#: it, its request and its response.
+#: The services that every node has, with the hashes of their requests and responses in Jazzy.
 _OF_NODES = """
 rcl_interfaces/srv/DescribeParameters
-845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff
 05dd1c2bc87dec2627105c8070d6f9725c781a4f2ab852975bf105462b82b644
 ad6747319613c6131589e062e095b469a46cc764f7d0f12a001a49e6cd893995
 rcl_interfaces/srv/GetParameterTypes
-da199c878688b3e530bdfe3ca8f74cb9fa0c303101e980a9e8f260e25e1c80ca
 87d7ec5ef545d4daa289d500025d31fb2437bc8b8365ca367161c4dac4be33fd
 ac1335dce67c478e669434f6ac2fbff34fcd529580f272d3006785ba8b54e47f
 rcl_interfaces/srv/GetParameters
-bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc
 135a9e1c3d7cebef792f6687d7ddf99949b21a0bd9a320d863a9110a3f5cf4d6
 9fa773b46e39cc5d02db6224d8fd520bb9caeeffc2b27c96c1e59431baba9f2a
 rcl_interfaces/srv/ListParameters
-3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d
 a1b0b5d6b967a5b8ac5bc8563c3ea678f349e312a6a4967227c5a96bc5ce38df
 31b937b82de3612426be79f231e386259f97e8dc843e3f2845288b4bfa296bdd
 rcl_interfaces/srv/SetParameters
-56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0
 130d46386b7e84ea9ecf60608a4d83cbe5e5cb7c6cc5b712b7a4e3a6c254e932
 7a0e8140a0b8d98308fa81a5403a766e610af29a239caf54b7553227906fc266
 rcl_interfaces/srv/SetParametersAtomically
-0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd
 db0bd950ed5ed867a0e90b225e44dea382d762c0762ff3e0ee842190042a59e5
 31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8
 type_description_interfaces/srv/GetTypeDescription
-69b9c19c1021405984cc60dbbb1edceb147a6538b411d812ba6afabeed962cd5
 470f56ccbcf13d55c78c8b735fb12da03e639e5acded994426c89d94778d9e28
 648c49d976240861a482f961c5621ddd0d2135d8cce6f297a76d4f6376d93b75
 """
 #: The hashes of these services by their types and the hashes of their requests and responses.
 SERVICES: dict[tuple[str, str | None, str | None], str] = {
-    (name, f"RIHS01_{request}", f"RIHS01_{response}"): f"RIHS01_{service}"
-    for name, service, request, response in zip(*[iter(_OF_NODES.split())] * 4, strict=True)
+    (name, f"RIHS01_{request}", f"RIHS01_{response}"): standard(name).hash
+    for name, request, response in zip(*[iter(_OF_NODES.split())] * 3, strict=True)
 }
 
 
@@ -233,14 +226,14 @@ class RemoteNodes:
                     yield entity
                 owners |= dict.fromkeys((*node.readers, *node.writers), owner)
         unknown = _Owner(self._domain, 0, "/", _UNKNOWN)
-        endpoints = [*endpoints]
-        told: dict[tuple[object, ...], dict[str, str]] = {}
-        for end in endpoints:
-            told.setdefault(_side(end), {})[end.topic.partition("/")[0]] = end.hash
-        for end in endpoints:
-            halves = told[_side(end)]
-            of_nodes = SERVICES.get((_names(end)[1], halves.get("rq"), halves.get("rr")), "")
-            service = hashes.get(_names(end), of_nodes)
+        sides = [(end, _side(end)) for end in endpoints]
+        halves: dict[_Side, dict[str, str]] = {}
+        for end, side in sides:
+            halves.setdefault(side, {})[end.topic.partition("/")[0]] = end.hash
+        for end, side in sides:
+            _, name, type_, _ = side
+            of_nodes = SERVICES.get((type_, halves[side].get("rq"), halves[side].get("rr")), "")
+            service = hashes.get((name, type_), of_nodes)
             if entity := _endpoint(end, owners.get(end.guid, unknown), service):
                 yield entity
 
@@ -267,8 +260,12 @@ def _names(end: EndpointData) -> tuple[str, str]:
     return f"/{name}", ros_type(type_) or ""
 
 
-def _side(end: EndpointData) -> tuple[object, ...]:
-    """Return the participant of an endpoint, the service, and whether it is the server's."""
+#: A participant, the names of a service and of its type, and whether it is the server.
+_Side: TypeAlias = tuple[bytes, str, str, bool]
+
+
+def _side(end: EndpointData) -> _Side:
+    """Return the side of a service that an endpoint is half of."""
     is_request = end.topic.startswith("rq/")
     return end.guid[: wire.PREFIX], *_names(end), is_request is not end.is_writer
 

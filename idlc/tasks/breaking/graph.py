@@ -281,9 +281,10 @@ def _robot_endpoints(end: RobotEntity) -> Iterator[GraphEndpoint]:
 
 #: A structure's full name and type hash.
 Key = tuple[str, str]
-_HASHES = (
-    "nodes announce type hashes from Iron on; over DDS, they announce none of services: compare "
-    "these with `--against graph` on a machine with rclpy"
+_HASHES = "nodes announce type hashes from Iron on"
+_HASHES_OF_A_ROBOT = (
+    f"{_HASHES}, but over DDS not those of services: to compare services, use `--against graph` on "
+    "a machine with rclpy"
 )
 #: The variables that choose a graph.
 _OF_A_ROBOT = "ROS_DOMAIN_ID to the nodes' value"
@@ -358,13 +359,18 @@ def compare_with_graph(
     silent = [endpoint for endpoint in meant if not endpoint.hash]
     if not changes and len(silent) == len(meant):
         reason = "no node announces the hash of one of these types"
-        report_nothing(options, reason, _HASHES, report)
+        report_nothing(options, reason, _advice(options.against), report)
     names = sorted({str(interface_of(endpoint.structure)) for endpoint in silent})
-    skipped = Skipped(tuple(names), "nodes announce no type hash", _HASHES)
+    skipped = Skipped(tuple(names), "nodes announce no type hash", _advice(options.against))
     left = report_skipped([skipped], options, report)
     judged = judge(changes, options, report)
     facts = len(silent), endpoints, judged.hidden, left
     return GraphVerdict(judged.levels, judged.allowed, _counts(endpoints), *facts)
+
+
+def _advice(against: str) -> str:
+    """Return what to do about endpoints without a type hash."""
+    return _HASHES_OF_A_ROBOT if is_address(against) else _HASHES
 
 
 def _counts(endpoints: Iterable[GraphEndpoint]) -> dict[str, int]:

@@ -84,7 +84,7 @@ class UpgradeOptions(msgspec.Struct, frozen=True):
 class TopicPlan(NamedTuple):
     """A recorded topic, and the plan of its messages; without a plan, the type was removed.
 
-    `definition` is that of the recorded type, and `several` says that the topic has others, too.
+    `definition` is the key of the recorded definition; `several` is true if the topic has others.
     """
 
     recording: str
