@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Collection, Iterator, Mapping
+from os.path import relpath
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 from xml.sax.saxutils import escape, quoteattr
@@ -15,7 +16,9 @@ from idlc.diagnostics.source import Source, Span
 from idlc.generate.target import build_step
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
+from idlc.project.files import is_file
 from idlc.project.lock import BUILD_STEP
+from idlc.project.lock import FILE as LOCK
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import Code, EscapedText, code
@@ -151,11 +154,18 @@ def package(
     starters: Mapping[str, str] | None = None,
     chosen: Collection[str] = (),
 ) -> ScaffoldResult | None:
-    """Write a new package, with interfaces if it has none yet.
+    """Write a new package, with interfaces if it has none yet, but not among generated code.
 
     `chosen` are the fields of `requested`, and `starters`, that the user chose. Reports IDL620
     where files that stay as they are contradict them.
     """
+    base = settings.root.base
+    generated = next((folder for folder in (base, *base.parents) if is_file(folder / LOCK)), None)
+    if generated is not None:
+        hint = f"change to a folder of sources: `cd {shlex.quote(relpath(generated.parent, base))}`"
+        message = f"`{generated}` contains generated code"
+        report.add(codes.FOREIGN_FILE.of(requested.name, message, hint=hint))
+        return None
     project = Project(requested.name, settings, report)
     with stage("scaffold", requested.name):
         available = catalog.packages(scope(load_settings(settings.root, report)).distro)

@@ -215,6 +215,22 @@ def test_outside_of_a_package(tmp_path, monkeypatch, capsys):
     assert "idlc scaffold package NAME" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("folder", ["out/demo", "out/demo/msg"])
+def test_no_package_begins_among_generated_code(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "demo" / "msg").mkdir(parents=True)
+    (tmp_path / "demo" / "msg" / "Drive.msg").write_text("float64 speed\n", encoding="utf-8")
+    assert main(["gen", "demo", "-o", "out/demo"]) == 0
+    monkeypatch.chdir(folder)
+    before = tree(tmp_path)
+    assert main(["scaffold", "package", "arm"]) == 1
+    assert tree(tmp_path) == before
+    (way,) = re.findall("`cd (.*)`", capsys.readouterr().err)
+    monkeypatch.chdir(way)
+    assert Path.cwd() == tmp_path / "out"
+    assert main(["scaffold", "package", "arm"]) == 0
+
+
 def test_the_wizard_asks_for_the_same(package, monkeypatch):
     from click.testing import CliRunner
 
