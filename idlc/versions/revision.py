@@ -16,7 +16,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.files import reason
-from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, list_files
+from idlc.project.find import CLOSING, KINDS, Exclusions, FileListing, InterfaceFile, list_files
 from idlc.project.git import (
     LINK,
     GitError,
@@ -26,6 +26,7 @@ from idlc.project.git import (
     repository_of,
     run_git,
 )
+from idlc.project.library import IDL
 from idlc.project.root import MANIFEST, Root
 
 _ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTALL)
@@ -61,10 +62,17 @@ class Revision(NamedTuple):
         self, paths: Iterable[str], exclude: Exclusions, report: Report
     ) -> tuple[InterfaceFile, ...]:
         """Return the interface files that paths of the working tree meant; there may be none."""
+        return self.listing(paths, exclude, report).files
+
+    def listing(self, paths: Iterable[str], exclude: Exclusions, report: Report) -> FileListing:
+        """Return what paths of the working tree meant in the revision; there may be nothing."""
         places = [place for place in map(self.counterpart, paths) if place and Path(place).exists()]
         left_out = exclude.seen_from(self.folder, self.top)
-        listed = list_files(places, self.root, report, left_out).files
-        return tuple(msgspec.structs.replace(file, shown=self.shown(file.path)) for file in listed)
+        listed = list_files(places, self.root, report, left_out)
+        files = (
+            msgspec.structs.replace(each, shown=self.shown(each.path)) for each in listed.files
+        )
+        return msgspec.structs.replace(listed, files=tuple(files))
 
     def holds(self, path: Path) -> bool:
         """Return whether a file of the working tree is in this repository, not in another."""
@@ -226,7 +234,7 @@ def _is_wanted(entry: _Entry) -> bool:
     is_inside = not pure.anchor and ".." not in pure.parts
     if entry.mode == LINK:
         return is_inside
-    is_wanted = pure.suffix in KINDS or pure.name in (MANIFEST, *CLOSING)
+    is_wanted = pure.suffix in {*KINDS, IDL} or pure.name in (MANIFEST, *CLOSING)
     return is_inside and is_wanted and entry.mode.startswith(b"100")
 
 

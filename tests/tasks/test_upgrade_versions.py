@@ -2,6 +2,7 @@
 
 import json
 import re
+import struct
 
 import pytest
 
@@ -9,6 +10,7 @@ import idlc
 from idlc.cli.main import main
 from tests.api.test_lengths import cdr, humble_range, write_db3
 from tests.api.test_versions_together import P1, P2, SAME, body, new, old, same, write
+from tests.support import programs
 from tests.tasks.test_upgrade import write_package
 
 
@@ -150,3 +152,34 @@ def test_definitions_are_written_as_files(files, capsys):
     assert "IDL653" in capsys.readouterr().err
     for words in (["a.mcap", "--format", "msg"], ["a.mcap", "-o", "x"], ["std_msgs", "-o", "x"]):
         assert main(["show", *words]) == 2
+
+
+IDL = "module p_msgs {{\n  module msg {{\n    struct P {{\n      double v;\n{}    }};\n  }};\n}};\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [("git:v1", "p_msgs"), ("git:v1", "git:v2"), ("../of_v1/p_msgs", "git:v2")],
+)
+def test_git_revisions_have_idl_files_too(before, after, tmp_path, monkeypatch, capsys):
+    (tmp_path / "src").mkdir()
+    git = ("git", "-c", "user.name=A", "-c", "user.email=a@b.c")
+    programs.run("git", "init", "-q", cwd=tmp_path / "src")
+    for tag, fields in {"v1": "", "v2": "      long extra;\n"}.items():
+        for place in ("src", f"of_{tag}"):
+            path = tmp_path / place / "p_msgs/msg/P.idl"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(IDL.format(fields), encoding="utf-8")
+            manifest = path.parent.parent / "package.xml"
+            manifest.write_text("<package><name>p_msgs</name></package>", encoding="utf-8")
+        for words in ("add p_msgs", "commit -qm more", f"tag {tag}"):
+            programs.run(*git, *words.split(), cwd=tmp_path / "src")
+    monkeypatch.chdir(tmp_path / "src")
+    payload = b"\0\1\0\0" + struct.pack("<d", 1.5)
+    recording = write_db3(tmp_path / "x.db3", [("/p", "p_msgs/msg/P", [payload])])
+    words = ["upgrade", recording, "--from", before, "--to", after, "-o", "up"]
+    assert main(words) == 0
+    assert "/p: 1 message converted" in capsys.readouterr().out
+    with idlc.Recording("up/x.mcap") as upgraded:
+        ((_, message),) = upgraded["/p"]
+        assert (message.v, message.extra) == (1.5, 0)

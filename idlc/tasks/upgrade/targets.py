@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -15,7 +15,14 @@ from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.project import inputs
-from idlc.project.find import InterfaceFile, list_files, no_interfaces, unread_idl
+from idlc.project.find import (
+    Exclusions,
+    FileListing,
+    InterfaceFile,
+    list_files,
+    no_interfaces,
+    unread_idl,
+)
 from idlc.project.library import IDL, InterfaceTexts, Library
 from idlc.project.package_xml import declared_name
 from idlc.project.settings import Scope
@@ -113,8 +120,12 @@ def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[UpgradeT
     elif to.startswith(GIT):
         paths = scope.paths or (".",)
         with checked_out(to.removeprefix(GIT), paths[0], scope.root, report) as revision:
-            files = revision.files(paths, scope.exclude, report) if revision else ()
-            yield _of_files(files, scope, report) if revision else None
+            if revision is None:
+                yield None
+                return
+            listing = revision.listing(paths, scope.exclude, report)
+            exclude = scope.exclude.seen_from(revision.folder, revision.top)
+            yield _of_listing(listing, exclude, revision.shown, scope, report)
     elif is_recording(to, scope.root):
         yield _of_recording(to, scope, report)
     else:
@@ -131,23 +142,35 @@ def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget | No
 
 def _of_path(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
     """Return the types of an interface file, or of all packages in a folder."""
+    listing = list_files([path], scope.root, report, scope.exclude)
+    target = _of_listing(listing, scope.exclude, scope.root.shown, scope, report)
+    if target is None or not target.texts:
+        report.extend(no_interfaces(each, scope.root, scope.exclude) for each in listing.empty)
+    return target
+
+
+def _of_listing(
+    listing: FileListing,
+    exclude: Exclusions,
+    shown: Callable[[Path], str],
+    scope: Scope,
+    report: Report,
+) -> UpgradeTarget | None:
+    """Return the types of files, and of .idl files in the packages that were listed."""
     root = scope.root
-    listing = list_files([path], root, report, scope.exclude)
     texts: dict[ir.TypeName, Source] = {}
     homes: dict[str, Path] = {}
     for folder in listing.packages:
         manifest = root.manifest(folder)
         declared = declared_name(manifest, root, Report()) if manifest else None
         package = declared or folder.name
-        for name in unread_idl([folder], scope.exclude):
+        for name in unread_idl([folder], exclude):
             kind, _, file = name.partition("/")
-            source = root.read_source(folder / name, root.shown(folder / name), report)
+            source = root.read_source(folder / name, shown(folder / name), report)
             if source is not None:
                 homes[package] = folder
                 interface = ir.TypeName(package, cast("ir.Kind", kind), file.removesuffix(IDL))
                 texts[interface] = source
-    if not texts:
-        report.extend(no_interfaces(each, root, scope.exclude) for each in listing.empty)
     target = _of_files(listing.files, scope, report)
     if target is None or not texts:
         return target
