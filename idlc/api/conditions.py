@@ -12,8 +12,10 @@ import numpy as np
 
 from idlc.api.reader import Absent, field_reader, type_at
 from idlc.model import ir
+from idlc.recordings.columns.elements import MOST_NAMES, ListElement, element_of
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.times import moment
+from idlc.runtime.typeinfo import structure_of
 
 OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
     "==": operator.eq,
@@ -53,13 +55,45 @@ class Condition(NamedTuple):
         """
         if self.operator not in OPERATORS:
             raise ValueError(f"`{self.operator}` is not one of {' '.join(OPERATORS)}")
-        type_ = type_at(kind, self.path)
+        element = _named_element(kind, self.path)
+        type_ = type_at(kind, f"{element.values}[0]" if element else self.path)
         try:
             return self._replace(value=_comparable(self.value, type_, start))
         except (KeyError, TypeError, ValueError, OverflowError):
             what = "a time" if isinstance(type_, ir.Ref) else f"a {ir.spell(type_)}"
             problem = f"`{self.path}` is {what}, which is not compared with {self.value!r}"
             raise ValueError(problem) from None
+
+
+def _named_element(kind: type, path: str) -> ListElement | None:
+    """Return the element that a path names, as in `position.elbow`, or None for other paths."""
+    element = element_of(structure_of(kind), path)
+    return element if element and element.names else None
+
+
+class _ElementReader:
+    """Reads the element that a path names; raises Absent for a message without it."""
+
+    def __init__(self, kind: type, element: ListElement) -> None:
+        self.kind = kind
+        self.element = element
+        self.read = field_reader(kind, (element.names, element.values))
+        #: How many messages lacked the name until one had it, and names that they have instead.
+        self.lacking = 0
+        self.others: dict[str, None] | None = {}
+
+    def __call__(self, view: Raw) -> Any:
+        names, values = self.read(view)
+        index = self.element.index_in(names, values)
+        if self.element.name in names:
+            self.others = None
+        elif self.others is not None:
+            self.lacking += 1
+            if len(self.others) < MOST_NAMES:
+                self.others |= dict.fromkeys(names)
+        if index is None:
+            raise Absent
+        return field_reader(self.kind, (f"{self.element.values}[{index}]",))(view)
 
 
 def _comparable(value: Any, type_: ir.FieldType, start: Callable[[], int]) -> Any:
@@ -93,15 +127,22 @@ def _number(value: Any) -> Any:
 class Filter:
     """Conditions that are all to hold, for messages of a class.
 
-    `absent` counts the messages that do not match because a list is too short for a path.
+    `absent` counts the messages that do not match because a list lacks the element of a path.
     """
 
     def __init__(self, kind: type, conditions: tuple[Condition, ...]) -> None:
         self.absent = 0
+        self._elements: list[_ElementReader] = []
         self._parts = [
-            (field_reader(kind, (path,), True, True), OPERATORS[sign], value)
-            for path, sign, value in conditions
+            (self._reader(kind, path), OPERATORS[sign], value) for path, sign, value in conditions
         ]
+
+    def _reader(self, kind: type, path: str) -> Callable[[Raw], Any]:
+        element = _named_element(kind, path)
+        if element is None:
+            return field_reader(kind, (path,), True, True)
+        self._elements.append(_ElementReader(kind, element))
+        return self._elements[-1]
 
     def matches(self, view: Raw) -> bool:
         """Return whether a message matches; raise the DecodeError of a broken one."""
@@ -110,3 +151,9 @@ class Filter:
         except Absent:
             self.absent += 1
             return False
+
+    def warn(self) -> None:
+        """Warn of elements that no message has, at the end of the messages."""
+        for reader in self._elements:
+            if reader.others is not None and reader.lacking:
+                reader.element.warn([*reader.others], reader.lacking)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 import numpy as np
 from msgspec.structs import replace
 
+from idlc.diagnostics.text import worded
 from idlc.model.distros import BY_NAME, unknown_distro
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.elements import ElementError
@@ -164,6 +165,7 @@ class Selection:
             if error:
                 _raise(error, self.topic, views[len(results)], done + len(results))
             done += len(batch)
+        matching.warn()
 
     def batches(self) -> Iterator[TopicMessages]:
         """Yield the messages, many at a time, in the version that they are read as."""
@@ -625,7 +627,8 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         name, kinds = topics[0].name, {topic.type for topic in topics}
         if len(kinds) > 1 or len({topic.encoding for topic in topics}) > 1:
             listed = ", ".join(sorted(kinds))
-            hint = "select one of them with --type, or recording.topic(name, type)"
+            selection = worded("--type TYPE", "recording.topic(name, type)")
+            hint = f"select one of them: `{selection}`"
             what = f"`{name}` has messages of several types, {listed}"
             raise RecordingError(what, hint if len(kinds) > 1 else None)
         reading = self._readings.get(topics[0].type)
@@ -649,7 +652,8 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         ):
             target = shlex.quote(files[-1][0])
         olds = " ".join(map(shlex.quote, dict.fromkeys(name for own in files[:-1] for name in own)))
-        hint = f"convert them: `idlc upgrade {olds} --to {target} -o upgraded`; or use `as_=`"
+        hint = f"convert them: `idlc upgrade {olds} --to {target} -o upgraded`"
+        hint += worded("", "; or give the class to read them as: `Recording(..., as_=Class)`")
         raise RecordingError(
             f"`{name}` has messages of {len(versions)} versions of {topics[0].type}: "
             f"{' and '.join(places)}",

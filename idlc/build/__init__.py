@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from idlc.diagnostics.text import without_options
+from idlc.diagnostics.text import Audience, addressed_to
 
 
 def compile_at_build(distribution: Any, keyword: str, value: object) -> None:  # noqa: ARG001
@@ -46,7 +46,7 @@ def _compile(distribution: Any) -> None:
     working_folder, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
-        with without_options():
+        with addressed_to(Audience.SETTINGS):
             distribution.__class__ = compiled_class(name, type(distribution))
     finally:
         os.chdir(working_folder)

@@ -19,7 +19,7 @@ from idlc.cli import output
 from idlc.cli.exit_status import status_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.diagnostics.text import did_you_mean, without_options
+from idlc.diagnostics.text import Audience, addressed_to, did_you_mean
 from idlc.project import prefixes, settings
 from idlc.project.files import reason
 from idlc.project.prefixes import Distribution
@@ -58,7 +58,7 @@ def finished(build: Callable[[Report], _Built | None]) -> _Built:
     def command() -> int:
         report = Report()
         try:
-            with without_options():
+            with addressed_to(Audience.SETTINGS):
                 product = build(report)
             built.extend(() if product is None else (product,))
         except OSError as error:

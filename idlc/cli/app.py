@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
@@ -235,6 +236,10 @@ def _through_click(words: list[str]) -> object:
         message, _, hint = error.format_message().partition("; ")
         if isinstance(error, click.NoSuchOption) and error.possibilities:
             message, hint = error.message, f"did you mean `{error.possibilities[0]}`?"
+        missing = error.param if isinstance(error, click.MissingParameter) else None
+        if context and "address" in context.params and isinstance(missing, click.Argument):
+            address = shlex.quote(context.params["address"])
+            hint = f"`{name} show {address}` lists the {missing.name}s"
         command = context.command_path if context else " ".join((name, *words[:1]))
         hint = hint or f"`{command} --help` lists the arguments and options"
         if message[1:2].islower():  # click begins its sentences with a capital letter

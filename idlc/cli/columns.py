@@ -56,7 +56,7 @@ from idlc.cli import completion, options
     "conditions",
     metavar="CONDITION",
     multiple=True,
-    help="Select messages by a field, such as `width > 640` or `name[0] == 'left'`. Repeat the "
+    help="Select messages by a field, such as `width > 640` or `position.elbow < 1`. Repeat the "
     "option to combine conditions.",
 )
 @click.option(

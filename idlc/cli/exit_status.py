@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from idlc.cli.streams import guarded, set_up
 from idlc.diagnostics.ci import SpeakingError
+from idlc.diagnostics.text import Audience, addressed_to
 
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
@@ -26,7 +27,7 @@ class PipeClosedError(Exception):
 def status_of(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
     set_up()
-    with guarded():
+    with guarded(), addressed_to(Audience.COMMAND):
         return _status_of(command)
 
 

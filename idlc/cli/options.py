@@ -146,6 +146,17 @@ def scoped(
     return decorate
 
 
+def _address(_: click.Context, __: click.Parameter, value: str) -> str:
+    """Refuse a word that is no address before click asks for the arguments after it."""
+    from idlc.diagnostics.text import did_you_mean
+    from idlc.project.files import GRAPH_HINT
+
+    hint = GRAPH_HINT if value == "graph" else did_you_mean(value, ["dds"])
+    if hint and value != "dds":
+        raise click.UsageError(f"`{value}` is not an address; {hint}")
+    return value
+
+
 def on_robot(command: Callable[..., bool | None]) -> Callable[..., int]:
     """Have a command called with the `session` with a robot whose ADDRESS is given, and a `report`.
 
@@ -159,4 +170,4 @@ def on_robot(command: Callable[..., bool | None]) -> Callable[..., int]:
 
         return with_session(partial(command, **arguments), address, include)
 
-    return click.argument("address", metavar="ADDRESS")(include(run))
+    return click.argument("address", metavar="ADDRESS", callback=_address)(include(run))

@@ -88,8 +88,11 @@ class InterfaceItem(pytest.Item):
     def runtest(self) -> None:
         """Fail with the errors that idlc reports for the file."""
         from idlc.cli.run.check import check_file
+        from idlc.diagnostics.text import Audience, addressed_to
 
-        errors, others = check_file(str(self.path), strict=self.config.getoption("--idlc-strict"))
+        is_strict = self.config.getoption("--idlc-strict")
+        with addressed_to(Audience.SETTINGS):
+            errors, others = check_file(str(self.path), strict=is_strict)
         for problem in others:
             warnings.warn(problem, InterfaceWarning, stacklevel=1)
         if errors:

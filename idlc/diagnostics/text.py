@@ -8,6 +8,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from enum import Enum
 
 TAB_STOP = 4
 #: Control, format, surrogate, private-use and unassigned characters, line and paragraph ends.
@@ -92,11 +93,11 @@ _ENDS = ("_msgs", "_interfaces", "_srvs", "_actions")
 def closest(name: str, names: Iterable[str]) -> str | None:
     """Return the known name that is nearest, or `None` if none is near.
 
-    A name of three letters may have one of them wrong, a long one three.
+    A name of two letters may have one of them wrong, a long one three.
     """
     if len(name) > 100:
         return None
-    limit = min(max(1, len(name) // 3), 3)
+    limit = min(max(1, len(name) // 3), 3) if len(name) > 1 else 0
     distances = (
         (edit_distance(name.lower(), candidate.lower()), candidate)
         for candidate in names
@@ -132,33 +133,48 @@ def package_hint(name: str, names: Iterable[str]) -> str:
     )
 
 
-_HAS_OPTIONS: ContextVar[bool] = ContextVar("has_options", default=True)
+class Audience(Enum):
+    """Who reads a hint, which names an option, a setting or an argument accordingly."""
+
+    COMMAND = "the person who typed a command"
+    SETTINGS = "a user of a build or an editor"
+    PYTHON = "a caller of the library"
+
+
+_AUDIENCE: ContextVar[Audience] = ContextVar("audience", default=Audience.PYTHON)
 
 
 @contextmanager
-def without_options() -> Iterator[None]:
-    """Let hints name settings instead of options, for users of a build or an editor."""
-    before = _HAS_OPTIONS.set(False)
+def addressed_to(audience: Audience) -> Iterator[None]:
+    """Let hints be for this audience."""
+    before = _AUDIENCE.set(audience)
     try:
         yield
     finally:
-        _HAS_OPTIONS.reset(before)
+        _AUDIENCE.reset(before)
+
+
+def worded(command: str, python: str) -> str:
+    """Return the words for a command line, or those for Python."""
+    return python if _AUDIENCE.get() is Audience.PYTHON else command
 
 
 def including(folder: str) -> str:
     """Return the advice to look for packages in a folder as well."""
-    if _HAS_OPTIONS.get():
-        return f"add `-I {shlex.quote(folder)}`"
-    return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
+    if _AUDIENCE.get() is Audience.SETTINGS:
+        return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
+    return worded(f"add `-I {shlex.quote(folder)}`", f"add `include=[{folder!r}]`")
 
 
 def absence() -> str:
     """Return the advice on a folder that should contain packages, and does not exist."""
-    if _HAS_OPTIONS.get():
-        return "correct `-I`, or `include` in [tool.idlc] of pyproject.toml"
-    return (
-        "correct `include` in [tool.idlc] of pyproject.toml; source distributions do not contain "
-        "it, so build without one: `python -m build --wheel`"
+    if _AUDIENCE.get() is Audience.SETTINGS:
+        return (
+            "correct `include` in [tool.idlc] of pyproject.toml; source distributions do not "
+            "contain it, so build without one: `python -m build --wheel`"
+        )
+    return worded(
+        "correct `-I`, or `include` in [tool.idlc] of pyproject.toml", "correct `include`"
     )
 
 

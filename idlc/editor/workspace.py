@@ -20,7 +20,7 @@ import msgspec
 from idlc.check import select
 from idlc.compiler.compiler import internal_error
 from idlc.diagnostics.report import Report, Severity
-from idlc.diagnostics.text import without_options
+from idlc.diagnostics.text import Audience, addressed_to
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
@@ -157,7 +157,7 @@ class Workspace:
         files = FileListing((), (), (), {})
         begun = time.time_ns()
         self._root = root = Root.at(self.folder, self._texts())
-        with without_options():
+        with addressed_to(Audience.SETTINGS):
             options = self._options
             self._settings = settings = load_settings(root, report)
             selected = select.selection(settings, report)
@@ -313,7 +313,7 @@ class Workspace:
 
     def _checked(self) -> Snapshot:
         """Return the folder, checked with its current texts."""
-        with without_options():
+        with addressed_to(Audience.SETTINGS):
             problems, models = check_all(self._checkers, self._packages, self._selection)
         first = next(iter(self._checkers))
         return Snapshot(

@@ -17,6 +17,7 @@ from pathlib import Path
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import closest
 
 
 @cache
@@ -122,7 +123,7 @@ def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
             if len(data) <= MAX_SIZE:
                 return data
     except (OSError, ValueError) as error:
-        report.add(unreadable(name, error))
+        report.add(unreadable(name, path, error))
         return None
     report.add(too_large(name))
     return None
@@ -157,13 +158,40 @@ def leading_out(name: str) -> Diagnostic:
     return codes.UNREADABLE.of(name, message, hint=hint)
 
 
-def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
+def unreadable(name: str, place: Path, error: OSError | ValueError) -> Diagnostic:
     """Return the problem with a path that cannot be read."""
     if isinstance(error, OSError) and error.errno == errno.ENOENT:
-        address = re.fullmatch(r"(tcp|udp|tls|quic|ws)://(.+)", name)
-        hint = f"for a robot, write `{address[1]}/{address[2]}`" if address else None
-        return codes.NO_SUCH_PATH.of(name, f"no such file or folder: `{name}`", hint=hint)
+        return missing(name, place)
     return codes.UNREADABLE.of(name, f"cannot read `{name}`: {reason(error)}")
+
+
+def missing(name: str, place: Path) -> Diagnostic:
+    """Return IDL602 for a path that leads nowhere."""
+    message = f"no such file or folder: `{name}`"
+    return codes.NO_SUCH_PATH.of(name, message, hint=near_path(name, place))
+
+
+#: The hint where the word of `idlc breaking --against` takes the place of an address or a path.
+GRAPH_HINT = (
+    "`idlc show dds` lists what running nodes use, and `idlc breaking --against graph` compares it"
+)
+
+
+def near_path(name: str, place: Path) -> str | None:
+    """Return the hint for a path that leads nowhere, such as the closest one that exists."""
+    if address := re.fullmatch(r"(tcp|udp|tls|quic|ws)://(.+)", name):
+        return f"for a robot, write `{address[1]}/{address[2]}`"
+    path = Path(name)
+    shown, parts = Path(path.anchor), path.relative_to(path.anchor).parts
+    folder = Path(*place.parts[: -len(parts)])
+    for part in parts:
+        near: str | None = part
+        if not os.path.lexists(folder / part):
+            near = closest(part, [entry.name for entry in entries(folder)])
+        if near is None:
+            return GRAPH_HINT if name == "graph" else None
+        shown, folder = shown / near, folder / near
+    return f"did you mean `{shown.as_posix()}`?"
 
 
 def decode(data: bytes, name: str, report: Report) -> Source | None:

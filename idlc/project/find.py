@@ -16,9 +16,8 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.diagnostics.text import closest
 from idlc.model.ir import Kind
-from idlc.project.files import entries, is_file, is_folder, kind_of, unreadable
+from idlc.project.files import is_file, is_folder, kind_of, unreadable
 from idlc.project.root import MANIFEST, Root
 
 #: The names of each pattern, and the folder that the paths are relative to.
@@ -214,11 +213,7 @@ def _files_of(
     try:
         mode = os.stat(root.path(path)).st_mode  # noqa: PTH116 - no Path is needed
     except (OSError, ValueError) as error:
-        problem = unreadable(argument, error)
-        close = closest(path.name, [entry.name for entry in entries(Path(root.path(path.parent)))])
-        near = f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
-        hint = problem.hint or near
-        report.add(codes.CODES[problem.code].of(argument, problem.message, hint=hint))
+        report.add(unreadable(argument, Path(root.path(path)), error))
         return
     if stat.S_ISDIR(mode):
         yield from walk(path, root, report, folders)
@@ -264,7 +259,7 @@ def walk(
                 folders[root.absolute(current)] = status
             inside = sorted(os.scandir(place), key=lambda entry: entry.name)
         except OSError as error:
-            report.add(unreadable(current.as_posix(), error))
+            report.add(unreadable(current.as_posix(), Path(root.path(current)), error))
             continue
         identity = (status.st_dev, status.st_ino)
         is_closed = current != folder and any(entry.name in CLOSING for entry in inside)

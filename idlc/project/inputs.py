@@ -11,6 +11,7 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.diagnostics.text import worded
 from idlc.model.ir import TypeName
 from idlc.project.files import decode, is_folder
 from idlc.project.find import InterfaceFile, find, list_files
@@ -97,7 +98,7 @@ def accept_name(name: str, origin: str, report: Report) -> bool:
     what = why_not_package(name)
     if not what:
         return True
-    hint = "choose another name with --package NAME"
+    hint = worded("choose another name with --package NAME", "give it a package.xml with another")
     report.add(codes.UNIMPORTABLE_PACKAGE.of("", f"`{name}` (from {origin}) {what}", hint=hint))
     return False
 
@@ -163,9 +164,8 @@ def load(
         first = loaded.get(file.key)
         if first is not None:
             message = f"`{first.file.shown}` already defines `{file.kind}/{file.name}`"
-            hint = (
-                "a package can have only one interface of each kind and name; exclude files "
-                "with --exclude, or `exclude` in [tool.idlc]"
+            hint = "a package can have only one interface of each kind and name; " + worded(
+                "exclude files with --exclude, or `exclude` in [tool.idlc]", "move one"
             )
             report.add(codes.DUPLICATE_INTERFACE.of(file.shown, message, hint=hint))
         elif (data := root.read_bytes(file.path, file.shown, report)) is not None:

@@ -13,11 +13,11 @@ from typing import NamedTuple, TypeAlias
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.diagnostics.text import absence, closest, did_you_mean, including
+from idlc.diagnostics.text import absence, closest, closest_package, did_you_mean, including
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
 from idlc.project import inputs, prefixes
-from idlc.project.files import entries, is_file, is_folder
+from idlc.project.files import entries, is_file, is_folder, near_path
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
 from idlc.project.lock import FILE as LOCK
 from idlc.project.package_xml import declared_name
@@ -153,7 +153,8 @@ class Library:
         """Report problems to another report from now on, also for interfaces read before."""
         self._report = report
         for path in self._missing:
-            report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}`", hint=absence()))
+            hint = near_path(path, Path(self._root.path(path))) or absence()
+            report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}`", hint=hint))
 
     def _roots(self, package: str) -> list[Path]:
         """Return the folders that may hold a package's interfaces, in order of precedence."""
@@ -339,8 +340,7 @@ def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Res
         message = f"no such type: `{text}`"
         if not _DIVIDER.search(text):
             message = f"no file, folder, package or type named `{text}`"
-        similar = _similar(_DIVIDER.split(text), library, scope.root)
-        hint = similar or "`idlc list` lists the known packages and types"
+        hint = _similar(text, library, scope.root)
     report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
     return library, ()
 
@@ -376,19 +376,23 @@ def _resolved(name: ir.TypeName, library: Library) -> ResolvedType | None:
     return ResolvedType(name, interface)
 
 
-def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
-    """Return the hint with the closest name to a type's or package's."""
+def _similar(text: str, library: Library, root: Root) -> str:
+    """Return the hint with the closest name to a type's or package's, or the closest path."""
+    parts, near_file = _DIVIDER.split(text), near_path(text, Path(root.path(text)))
     if len(parts) == 1:
         every = (name for package in library.packages() for name in library.interfaces(package))
         named = {interface.name: str(interface) for interface in every}
         files = (path.name for path in entries(root.base))
         near = closest(parts[0], [*files, *named, *library.packages()])
-        return f"did you mean `{named.get(near, near)}`?" if near else None
-    package = closest(parts[0], library.packages()) or ""
+        if near:
+            return f"did you mean `{named.get(near, near)}`?"
+        return near_file or "`idlc list` lists the known packages and types"
+    package = closest_package(parts[0], library.packages())
+    if package is None:
+        missing = f"package `{parts[0]}` not found; add its folder with -I, or source its workspace"
+        return near_file or missing
     named = {interface.name: str(interface) for interface in library.interfaces(package)}
-    if package == parts[0]:
-        near, hint = closest(parts[-1], named), f"`idlc list {package}` lists its types"
-    else:
-        near = parts[-1] if parts[-1] in named else None
-        hint = f"package `{parts[0]}` not found; add its folder with -I, or source its workspace"
-    return f"did you mean `{named[near]}`?" if near else hint
+    near = closest(parts[-1], named)
+    if near:
+        return f"did you mean `{named[near]}`?"
+    return near_file or f"`idlc list {package}` lists its types"

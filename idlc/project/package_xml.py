@@ -14,6 +14,7 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import worded
 from idlc.project.files import read_bytes
 from idlc.project.root import Root
 
@@ -136,9 +137,12 @@ def declared_name(path: Path, root: Root, report: Report) -> str | None:
         return None
     if not declared:
         message = "no package name in this file"
-        hint = "add `<name>my_package</name>` to `<package>`, or pass --package NAME"
+        hint = "add `<name>my_package</name>` to `<package>`" + worded(_OTHERWISE, "")
         report.add(codes.BAD_PACKAGE_XML.of(name, message, hint=hint))
     return declared or None
+
+
+_OTHERWISE = ", or pass --package NAME"
 
 
 def declared_version(path: Path) -> str:
@@ -155,7 +159,7 @@ def _version(data: bytes) -> str:
 
 def _broken(data: bytes, name: str, error: Exception) -> Diagnostic:
     message = f"not well-formed XML: {str(error).partition(':')[0]}"
-    hint = "fix the file, or pass --package NAME"
+    hint = "fix the file" + worded(_OTHERWISE, "")
     if not (isinstance(error, expat.ExpatError) and error.lineno):
         return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
     source = Source(name, data.decode("utf-8", errors="replace"))

@@ -10,6 +10,7 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.text import worded
 from idlc.model import catalog, ir
 from idlc.project import inputs
 from idlc.project.find import InterfaceFile, find
@@ -50,7 +51,8 @@ def _from_files(
             codes.SEVERAL_PACKAGES.of(
                 root.shown(apart[0]),
                 f"these folders can be one package or {len(apart)} packages: {names}",
-                hint="use --package NAME for one package, or add a package.xml to each folder",
+                hint=worded("use --package NAME for one package, or ", "")
+                + "add a package.xml to each folder",
             )
         )
         return ()

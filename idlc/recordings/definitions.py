@@ -39,13 +39,24 @@ _DERIVED = re.compile(
 )
 
 
+class Origin(NamedTuple):
+    """The words for where definitions come from, and for the hash and the type that are known."""
+
+    name: str
+    hash: str
+    type: str
+
+
+RECORDING = Origin("the recording", "the recorded hash", "the recorded type")
+ROBOT = Origin("the robot", "the hash that the node announces", "the robot's type")
+
+
 class RecordedDefinition(NamedTuple):
     """A topic, the interface that its messages are of, and all texts that came with it.
 
     `name` may be derived from the `interface`; both are `None` for types that are not of ROS 2.
     `recording` is the recording's name in reports. Of repeated definitions the first counts, and
-    the others are in `repeated`. `origin` is the recording in words, or a robot, and `problem` the
-    reason why a robot has no definition.
+    the others are in `repeated`. `problem` is the reason why a robot has no definition.
     """
 
     recording: str
@@ -54,7 +65,7 @@ class RecordedDefinition(NamedTuple):
     interface: ir.TypeName | None
     texts: dict[ir.TypeName, Source]
     repeated: tuple[tuple[ir.TypeName, Source], ...] = ()
-    origin: str = "the recording"
+    origin: Origin = RECORDING
     problem: str = ""
 
 

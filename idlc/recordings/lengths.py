@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from struct import Struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from idlc.diagnostics.text import worded
 from idlc.model.distros import Distro
 from idlc.recordings.containers.file import Topic
 from idlc.recordings.containers.source import RecordingError
@@ -16,10 +17,6 @@ if TYPE_CHECKING:  # it imports numpy, which classes do not need
 
 #: Middlewares pad messages to a multiple of four bytes.
 MOST_PADDING = 3
-#: The hint where messages are not of the type that they are recorded with.
-WRONG_DEFINITION = (
-    "use the publisher's files for the recorder; where a definition is missing, add --distro or -I"
-)
 #: So many messages show whether a type fits.
 SAMPLE = 64
 
@@ -114,20 +111,31 @@ class WrongDefinitionError(RecordingError):
     """Messages are of another version of the type that they are recorded with."""
 
 
+def wrong_definition(topic: Topic, distro: Distro | None = None, option: str = "") -> str:
+    """Return the hint where messages are of another version of their type, maybe of a `distro`."""
+    if topic.schema is not None and not topic.schema.is_blank:
+        return "use the publisher's files for the recorder"
+    if distro is not None:
+        usual = worded(f"--distro {distro.name}", f"distro={distro.name!r}")
+        return f"use `{f'{option} distro:{distro.name}' if option else usual}`"
+    usual = worded("`--distro` or `-I`", "`distro=` or `include=`")
+    return f"choose the publisher's version with {f'`{option}`' if option else usual}"
+
+
 def check_lengths(
     topic: Topic,
     structure: Structure,
     unread: Any,
     raws: Sequence[Raw],
     known_versions: Iterable[KnownVersion],
-    option: str = "--distro ",
+    option: str = "",
 ) -> str:
     """Return what the lengths of messages prove, empty if they fit a type.
 
     `unread` has the number of bytes in each message that the type does not read, and is `None` if
     one cannot be read; `raws` are some of the messages, those that are longest if any is too long.
-    Raises WrongDefinitionError if no message fits, but another version does. The hint of that says
-    how to choose a distribution, which is the value of an `option`.
+    Raises WrongDefinitionError if no message fits, but another version does. Its hint names the
+    `option` that chooses a version where the recording has none.
     """
     if unread is None:
         what = f"messages of `{topic.name}` do not have the definition of {topic.type}"
@@ -147,6 +155,7 @@ def check_lengths(
     if is_proof:
         for words, version, distro in known_versions:
             if version.hash != structure.hash and fits(version, raws):
-                hint = f"use `{option}{distro.name}`" if distro else WRONG_DEFINITION
-                raise WrongDefinitionError(f"{what}; {words} fits", hint)
+                raise WrongDefinitionError(
+                    f"{what}; {words} fits", wrong_definition(topic, distro, option)
+                )
     return "" if unread is None else f"{what}: the publisher has another version of the type"

@@ -26,7 +26,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definitions import read_definition
+from idlc.recordings.definitions import RECORDING, Origin, read_definition
 from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import KnownVersion, fits
 from idlc.recordings.memory import (
@@ -185,15 +185,16 @@ def type_of(
     include: tuple[str, ...] = (),
     distro: str | None = None,
     sample: Callable[[], Sequence[Raw]] = tuple,
+    origin: Origin = RECORDING,
 ) -> TopicType:
-    """Return the type of a topic's messages.
+    """Return the type of a topic's messages, in a recording or of another origin.
 
     Warns if something else had to be used than what was recorded, or if that is not what the
     topic's publisher said it is. Where a definition is missing and `distro` does not say of which
     distribution it is, it is the one that a `sample` of messages fits, if the local one does not.
     """
     release = BY_NAME[distro] if distro else Scope(Root.here()).distro
-    topic_type, report = _type_of(topic, include, release)
+    topic_type, report = _type_of(topic, include, release, origin)
     borrowed = any(problem.code == codes.MISSING_DEFINITION.id for problem in report)
     distros: tuple[Distro, ...] = ()
     if borrowed and distro is None:
@@ -212,7 +213,7 @@ def type_of(
     if list(report):  # the local definitions that are used instead may change
         _type_of.cache_clear()
     if topic.hash not in (None, topic_type.structure.hash):
-        message = f"`{topic.name}`: the definition of {topic.type} differs from the recorded type"
+        message = f"`{topic.name}`: the definition of {topic.type} differs from {origin.type}"
         warnings.warn(message, OtherDefinitionWarning, stacklevel=2)
     return topic_type
 
@@ -259,12 +260,16 @@ def known_versions(
 
 
 @lru_cache(maxsize=64)
-def _type_of(topic: Topic, include: tuple[str, ...], distro: Distro) -> tuple[TopicType, Report]:
-    return _compiled(topic, include, distro)
+def _type_of(
+    topic: Topic, include: tuple[str, ...], distro: Distro, origin: Origin
+) -> tuple[TopicType, Report]:
+    return _compiled(topic, include, distro, origin)
 
 
-def _compiled(topic: Topic, include: tuple[str, ...], distro: Distro) -> tuple[TopicType, Report]:
-    types, report = _types(topic, include, distro)
+def _compiled(
+    topic: Topic, include: tuple[str, ...], distro: Distro, origin: Origin = RECORDING
+) -> tuple[TopicType, Report]:
+    types, report = _types(topic, include, distro, origin)
     if not types.topics or types.errors or report.had_errors:
         problems = [*types.errors, *report]
         first = min(problems, key=lambda problem: problem.severity, default=None)
@@ -275,11 +280,14 @@ def _compiled(topic: Topic, include: tuple[str, ...], distro: Distro) -> tuple[T
 
 
 def _types(
-    topic: Topic, include: tuple[str, ...], distro: Distro | None = None
+    topic: Topic,
+    include: tuple[str, ...],
+    distro: Distro | None = None,
+    origin: Origin = RECORDING,
 ) -> tuple[RecordedTypes, Report]:
     distros = (distro,) if distro else ()
     where, report = Scope(Root.here(), include=include, distros=distros), Report()
-    (version,) = versions([read_definition(topic, topic.name)])
+    (version,) = versions([read_definition(topic, topic.name)._replace(origin=origin)])
     return recorded_types(version, LocalTypes(where, report), report), report
 
 

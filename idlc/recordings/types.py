@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -15,7 +16,7 @@ from idlc.compiler.compiler import Compiler
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.diagnostics.text import did_you_mean, including
+from idlc.diagnostics.text import did_you_mean, including, worded
 from idlc.language.parse import parse_any
 from idlc.model import derive, ir
 from idlc.model.describe import Describer
@@ -23,7 +24,7 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
-from idlc.project.find import is_address
+from idlc.project.files import missing
 from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -31,7 +32,14 @@ from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.file import CDR, Topic, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.damage import Damage
-from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
+from idlc.recordings.definitions import (
+    ENCODINGS,
+    RECORDING,
+    Origin,
+    RecordedDefinition,
+    TextCache,
+    read_definition,
+)
 from idlc.recordings.find import is_there
 from idlc.wire.layout import oversized
 
@@ -91,7 +99,7 @@ def read_topics(
     """
     place = root.path(path) if is_local(path) else path
     if not is_there(place):
-        report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
+        report.add(missing(path, Path(place)))
         return None
     try:
         with open_recording(place, check=True if verify else None) as container:
@@ -205,26 +213,42 @@ class Contents:
 
 #: Names that are listed in a sentence.
 NAMED = 5
-#: The hint where a local definition is used instead of the recording's.
-BORROWED = "check that it equals the recorded type; `--distro NAME` or `-I DIR` chooses another"
 #: Reasons why a definition is not the recording's.
-ABSENT, UNREADABLE = "the recording does not define", "there are errors in the definition of"
-WRONG = "the recorded hash does not match the definition of"
+ABSENT, UNREADABLE = "{0.name} does not define", "there are errors in the definition of"
+WRONG = "{0.hash} does not match the definition of"
 _RECORDERS = "the recorder and the publisher used different versions of the interface files"
 
 
-def _substitution(
-    recording: str, why: str, sure: bool, origin: str, undefined: Iterable[ir.TypeName]
+def borrowed(origin: Origin = RECORDING, option: str = "") -> str:
+    """Return the hint where a local definition is used, and which `option` chooses another."""
+    options = worded("`--distro NAME` or `-I DIR`", "`distro=NAME` or `include=[DIR]`")
+    return f"check that it equals {origin.type}; {option or options} chooses another"
+
+
+class _Substitution(NamedTuple):
+    """Definitions of a recording, or of another origin, for which idlc uses local ones, and why.
+
+    They are `sure` to be equal if the hash says so.
+    """
+
+    recording: str
+    origin: Origin
+    why: str
+    is_sure: bool
+    used: str
+
+
+def _substituted(
+    substitution: _Substitution, undefined: Iterable[ir.TypeName], option: str
 ) -> Diagnostic:
-    """Return IDL652 or IDL654 for definitions of another origin, which are `sure` to be equal."""
-    which = "the recorded hash" if sure else "the same name"
-    message = f"{why} {_named(undefined)}; idlc uses {origin}, which has {which}"
-    code, hint = codes.MISSING_DEFINITION, None if sure else BORROWED
+    """Return IDL652 or IDL654; an `option` chooses other definitions."""
+    recording, origin, why, is_sure, used = substitution
+    which = origin.hash if is_sure else "the same name"
+    message = f"{why.format(origin)} {_named(undefined)}; idlc uses {used}, which has {which}"
+    code, hint = codes.MISSING_DEFINITION, None
     if why == WRONG:
-        code, hint = codes.RECORDED_HASH_DIFFERS, _RECORDERS if sure else BORROWED
-    if is_address(recording):
-        message = message.replace("the recording", "the robot")
-        hint = hint and hint.replace("the recorded type", "the robot's type")
+        code, hint = codes.RECORDED_HASH_DIFFERS, _RECORDERS
+    hint = hint if is_sure else borrowed(origin, option)
     return code.of(recording, message, hint=hint)
 
 
@@ -241,12 +265,20 @@ class DefinedTopic(NamedTuple):
 
 
 class LocalTypes:
-    """The types that are defined locally, without any recording; `texts` take precedence."""
+    """The types that are defined locally, without any recording; `texts` take precedence.
+
+    Hints name the `option` with which a command finds others, instead of the common ones.
+    """
 
     def __init__(
-        self, scope: Scope, report: Report, texts: InterfaceTexts = MappingProxyType({})
+        self,
+        scope: Scope,
+        report: Report,
+        texts: InterfaceTexts = MappingProxyType({}),
+        option: str = "",
     ) -> None:
         self.scope = scope
+        self.option = option
         self.library = Library(
             scope.include,
             scope.root,
@@ -326,6 +358,8 @@ class RecordedTypes:
         self._broken = broken
         self._local = local
         self._names: dict[ir.TypeName, set[ir.TypeName]] = {}
+        #: The topics without a definition, for each problem that says so.
+        self.undefined: dict[Diagnostic, list[str]] = {}
         texts = {name: source for name, source in version.texts.items() if name not in broken}
         for topic in version.topics:
             name = topic.interface
@@ -378,13 +412,13 @@ class RecordedTypes:
                 what = f"; its encoding is {encoding}" if encoding not in ENCODINGS else ""
                 why = f"`{recorded.type}` is not a ROS 2 type{what}"
             elif interface not in self.texts and self._local.library.source(interface) is None:
-                why = f"{topic.origin} does not define `{interface}`{reason}"
+                why = f"{ABSENT.format(topic.origin)} `{interface}`{reason}"
             elif (
                 interface not in self.texts
                 and recorded.hash
                 and recorded.hash != self._local.hash(name, interface)
             ):
-                why = f"{topic.origin} does not define `{interface}`{reason}"
+                why = f"{ABSENT.format(topic.origin)} `{interface}`{reason}"
                 why += ", and the local type differs"
             else:
                 yield DefinedTopic(topic, name, interface)
@@ -393,26 +427,33 @@ class RecordedTypes:
         for (recording, why), names in missing.items():
             listed = first_few((f"`{name}`" for name in names), NAMED)
             advice = f"{including('DIR')}, where DIR contains the package's sources"
-            hint = advice if "does not define" in why else None
+            if self._local.option:
+                advice = f"give the publisher's version with {self._local.option}"
+            is_undefined = "does not define" in why
             message = f"idlc does not read {listed}: {why}"
-            report.add(codes.MISSING_DEFINITION.of(recording, message, hint=hint))
+            hint = advice if is_undefined else None
+            problem = codes.MISSING_DEFINITION.of(recording, message, hint=hint)
+            report.add(problem)
+            if is_undefined:
+                self.undefined[problem] = names
 
     def _substitutions(self) -> Iterator[Diagnostic]:
         """Yield IDL652 or IDL654 for definitions that are not the recording's.
 
         A local definition that replaces a missing one and has the recorded hash is not reported.
         """
-        doubtful: dict[tuple[str, str, bool, str], set[ir.TypeName]] = {}
+        doubtful: dict[_Substitution, set[ir.TypeName]] = {}
         for typed in self.topics:
             missing = {name for name in self.names_of(typed) if name not in self.texts}
             sure = bool(missing) and typed.recorded.topic.hash == self.hash(typed)
             for name in missing:
                 why = self._broken.get(name, ABSENT)
                 if why != ABSENT or not sure:
-                    key = typed.recorded.recording, why, sure, self._local.origin(name)
+                    where = typed.recorded.recording, typed.recorded.origin
+                    key = _Substitution(*where, why, sure, self._local.origin(name))
                     doubtful.setdefault(key, set()).add(name)
         for key, undefined in doubtful.items():
-            yield _substitution(*key, undefined)
+            yield _substituted(key, undefined, self._local.option)
         partial: dict[str, set[ir.TypeName]] = {}
         for typed in self.topics:
             texts = ((name, self.texts.get(name)) for name in self.names_of(typed))

@@ -11,7 +11,7 @@ from itertools import count
 from threading import Lock
 from typing import Any
 
-from idlc.diagnostics.text import one_line
+from idlc.diagnostics.text import one_line, worded
 from idlc.robot.errors import RobotError
 from idlc.robot.graph import Graph
 from idlc.robot.transport import Transport
@@ -136,7 +136,9 @@ def open_router(
         "connect/exit_on_failure": False,
     }
     problem = f"no router can listen on {', '.join(endpoints)}"
-    hint = "is another router running? choose another port with `--listen tcp/127.0.0.1:7448`"
+    port = "tcp/127.0.0.1:7448"
+    choice = worded(f"--listen {port}", f"listen=[{port!r}]")
+    hint = f"is another router running? choose another port with `{choice}`"
     return _open(settings, None, environ, problem, hint)
 
 
@@ -145,8 +147,10 @@ def _checked(endpoint: str) -> str:
     match = _ENDPOINT.fullmatch(endpoint)
     if match and match[2]:
         return endpoint
-    good = f"{match[1] if match else 'tcp/localhost'}:{ROUTER_PORT}"
-    raise RobotError(f"`{one_line(endpoint)}` is not an endpoint", f"write `{good}`")
+    good = match[1] if match else "tcp/localhost"
+    if host := re.fullmatch(r"([\w.-]+)(?::\d{1,5})?", endpoint):
+        good = f"tcp/{host[1]}"
+    raise RobotError(f"`{one_line(endpoint)}` is not an endpoint", f"write `{good}:{ROUTER_PORT}`")
 
 
 def _open(

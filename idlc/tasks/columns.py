@@ -26,10 +26,12 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model.ir import DUMMY_FIELD
+from idlc.project.files import missing
+from idlc.project.find import is_address
 from idlc.recordings.columns.elements import MissingElementWarning
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
-from idlc.recordings.types import BORROWED, NAMED, damage_problems
+from idlc.recordings.types import NAMED, borrowed, damage_problems
 from idlc.tasks.preview import Preview
 
 if TYPE_CHECKING:
@@ -262,8 +264,13 @@ def columns(
     By default, the work is a file for each topic.
     """
     done: list[WrittenFile] = []
-    missing: dict[str, list[str]] = {}
+    undefined: dict[str, list[str]] = {}
     paths = options.recordings
+    for path in paths:
+        if is_local(path) and not os.path.lexists(path) and not is_address(path):
+            report.add(missing(path, Path(path)))
+    if report.errors:
+        return done
     with (
         _problems(options, report),
         # also for damage that opening it warns of
@@ -285,10 +292,10 @@ def columns(
             if isinstance(message, MissingElementWarning):
                 report.notes += (str(message),)
             if isinstance(message, MissingDefinitionWarning):
-                missing.setdefault(message.message, []).append(f"`{message.topic}`")
-        for problem, topics in missing.items():
+                undefined.setdefault(message.message, []).append(f"`{message.topic}`")
+        for problem, topics in undefined.items():
             text = f"{first_few(topics, NAMED)}: {problem}"
-            report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
+            report.add(codes.MISSING_DEFINITION.of("", text, hint=borrowed()))
         report.notes += recording.notes
         report.extend(damage_problems(", ".join(paths), recording.damage))
     return done

@@ -9,7 +9,10 @@ import pytest
 
 import idlc
 from idlc.cli.main import main
+from idlc.recordings.columns.elements import MissingElementWarning
 from idlc.recordings.containers.source import RecordingError
+from tests.recordings.test_elements import AMBIGUOUS
+from tests.recordings.test_elements import recorded as joints
 from tests.support import recordings as made
 
 MESSAGES = made.messages()
@@ -59,6 +62,40 @@ def test_conditions_combine_and_messages_without_the_field_are_counted(recording
     assert len(none.to_columns()) == none.to_arrow().num_rows == 0
 
 
+@pytest.mark.filterwarnings("ignore::idlc.recordings.columns.elements.MissingElementWarning")
+def test_an_element_is_selected_by_the_name_that_its_message_gives_it(tmp_path):
+    orders = [(["a", "b"], [1, 2]), (["b", "a"], [3, 4]), (["c"], [9]), (["a"], []), ([], [])]
+    messages = [joints(number, *each) for number, each in enumerate(orders * 4)]
+    with idlc.Recording(made.by_mcap(tmp_path / "rec.mcap", messages)) as recording:
+        topic = recording["/joints"]
+        expected = [
+            time
+            for time, message in topic
+            if dict(zip(message.name, message.position, strict=False)).get("a", 0) > 1
+        ]
+        chosen = topic.where("position.a", ">", 1)
+        assert [time for time, _ in chosen] == expected
+        assert len(expected) == 4
+        assert chosen.absent == 12
+        assert [time for time, _ in topic.where("position.a", ">", "1").messages()] == expected
+        with pytest.raises(ValueError, match="is a float64, which is not compared"):
+            topic.where("position.a", ">", "x")
+        chosen = topic.where("position.c", "==", 9).where("position.aa", "==", 1)
+        with pytest.warns(MissingElementWarning, match="no `aa` in any of 4 messages: it has c"):
+            assert list(chosen) == []
+
+
+@pytest.mark.parametrize("case", AMBIGUOUS)
+def test_a_condition_on_an_element_that_names_do_not_tell_is_an_error(case, tmp_path):
+    names, position, error = AMBIGUOUS[case]
+    found = [joints(0, ["a", "b"], [1, 2]), joints(1, names, position)]
+    with (
+        idlc.Recording(made.by_mcap(tmp_path / "rec.mcap", found)) as recording,
+        pytest.raises(RecordingError, match=error),
+    ):
+        list(recording["/joints"].where("position.a", ">", 0))
+
+
 def test_times_of_a_header_select_as_log_times_do(recording):
     topic = recording["/imu"]
     stamps = [
@@ -94,6 +131,7 @@ WRONG = {
     ("data", "==", 3): "not a single value",
     ("data[*]", "==", 3): "many values",
     ("header", "==", 3): "not a single value",
+    ("data.x", "==", 3): "write an index, such as `data",
     ("header.stamp", "==", True): "not compared with True",
 }
 
@@ -140,6 +178,7 @@ def test_columns_takes_conditions(tmp_path, monkeypatch, capsys):
         "position": "is not a condition",
         "__import__('os')": "is not a condition",
         "positoin[0] > 1": "did you mean `position`",
+        "name.elbow == 'x'": "`name` is a list: write `name[0]`",
     }.items():
         assert main([*words, text]) == 2
         assert problem in capsys.readouterr().err

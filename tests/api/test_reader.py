@@ -151,7 +151,7 @@ PROBLEMS = {
     "header.stap.sec": "std_msgs/msg/Header has no field `stap`; did you mean `stamp`?",
     "orientation_covariance[9]": "has at most 9 elements",
     "orientation_covariance[-10]": "has at most 9 elements",
-    "orientation_covariance.x": "add an index such as `[0]`",
+    "orientation_covariance.x": "is a list: write `orientation_covariance[0]` or `",
     "header[0]": "`header` is not a list",
     "header.frame_id.x": "there is no `x` in a string",
     "": "is not a path",

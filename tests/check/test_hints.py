@@ -1,5 +1,6 @@
 """Hints lead on: what a hint says to write is right, whatever language its reader thinks of."""
 
+import ast
 import re
 
 import pytest
@@ -12,6 +13,7 @@ from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
 from idlc.model.lowering.lower import lower
+from tests.support.paths import ROOT
 
 
 def errors(text, kind="msg"):
@@ -149,7 +151,7 @@ def test_a_letter_left_out_doubled_or_swapped_leads_to_a_basic_type(name):
         ("----", "`# ----`"),
         ("float32", "write `TYPE name`"),
         ("sensor_msgs/Lidar a", "the built-in `sensor_msgs` of ROS 2 Jazzy"),
-        ("nav2_msgs/Path a", "`nav2_msgs` is not built in; add `-I DIR`"),
+        ("nav2_msgs/Path a", "`nav2_msgs` is not built in; add `include=['DIR']`"),
     ],
 )
 def test_one_error_with_advice(text, hint):
@@ -193,3 +195,59 @@ def test_short_names_are_near_only_by_one_letter():
     assert closest("abc", ["abd", "xyz"]) == "abd"
     assert closest("abc", ["axy"]) is None
     assert closest("temperature", ["tempreture", "humidity"]) == "tempreture"
+
+
+#: The rooms that a program in Python and commands both use.
+BOTH = ("api", "recordings", "versions", "robot", "compiler", "model", "wire", "language")
+OPTION = re.compile(r"(?<![\w-])--[a-z]|`-I\b")
+ARGUMENT = re.compile(r"\b(as_|include|distro|index|fields|check|strict|rules|listen)=")
+#: Whole commands are right for both, and those of others are not hints.
+COMMAND = re.compile(r"`(idlc|git|pip|rosbags-convert) [^`]*`")
+#: Words for git, for `--ros-args` and for `idlc upgrade` alone.
+OWN = {
+    "versions/revision.py",
+    "robot/nodes/arguments.py",
+    "robot/nodes/node.py",
+    "robot/__main__.py",
+}
+
+
+def worded_for_one(module):
+    """Yield the texts of a module that name an option or an argument, and for whom they are."""
+    tree = ast.parse(module)
+    readers = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):  # a docstring
+            readers[id(node.value)] = "nobody"
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "worded":
+            for argument, reader in zip(node.args, ("command", "python"), strict=True):
+                readers |= dict.fromkeys(map(id, ast.walk(argument)), reader)
+    for node in ast.walk(tree):
+        parts = node.values if isinstance(node, ast.JoinedStr) else [node]
+        text = "".join(getattr(part, "value", "") for part in parts
+                       if isinstance(getattr(part, "value", ""), str))  # fmt: skip
+        text = COMMAND.sub("", text) if isinstance(node, ast.JoinedStr | ast.Constant) else ""
+        if isinstance(node, ast.JoinedStr):
+            readers |= dict.fromkeys(map(id, node.values), "nobody")
+        for pattern, reader in ((OPTION, "command"), (ARGUMENT, "python")):
+            if pattern.search(text) and readers.get(id(node)) not in ("nobody", reader):
+                yield text
+
+
+def test_words_for_the_command_line_and_for_python_do_not_mix():
+    found = {}
+    for room in BOTH:
+        for path in ROOT.joinpath("idlc", room).rglob("*.py"):
+            name = path.relative_to(ROOT / "idlc").as_posix()
+            texts = [*worded_for_one(path.read_text(encoding="utf-8"))]
+            if texts and name not in OWN:
+                found[name] = texts
+    assert found == {"recordings/types.py": ["the type of `--from`"]}
+
+
+@pytest.mark.parametrize("text", ["hint = 'add --distro'", "hint = f'add `-I {x}`'",
+                                  "worded('as_=x', '')", "worded('', '--type')"])  # fmt: skip
+def test_mixed_words_are_found(text):
+    assert [*worded_for_one(text)]
+    assert not [*worded_for_one("worded('--type `-I {x}`', 'as_=x') + '`idlc check --strict`'")]

@@ -392,6 +392,10 @@ def test_headings_are_bold(words, headings):
         ),
         (["check", "--format"], "option `--format` requires", "`idlc check --help`"),
         (["lsp", "x"], "unexpected argument `x`", "`idlc lsp --help`"),
+        (["echo", "tcp/robot:7447"], "missing arg", "`idlc show tcp/robot:7447` lists the topics"),
+        (["call", "dds"], "missing argument `SERVICE`", "`idlc show dds` lists the services"),
+        (["record", "dds"], "missing option `-o` / `--out`", "`idlc record --help`"),
+        (["echo", "ddss", "/odom"], "`ddss` is not an address", "did you mean `dds`?"),
     ],
 )
 def test_a_wrong_command_line_is_reported_like_every_other_problem(words, message, hint, capfd):
@@ -399,6 +403,50 @@ def test_a_wrong_command_line_is_reported_like_every_other_problem(words, messag
     first, second = capfd.readouterr().err.splitlines()
     assert first.startswith(f"error: {message}")
     assert second.startswith(f"  = hint: {hint}")
+
+
+#: Commands with a path or an address that leads nowhere.
+PATHS = (
+    "check {}",
+    "columns {}",
+    "columns {} /odom",
+    "gen {} -o out",
+    "show {}",
+    "fmt {}",
+    "docs {} -o site",
+    "breaking {} --against .",
+    "breaking --against {}",
+    "upgrade {} -o up",
+    "upgrade old/rec.mcap --to {} -o up",
+    "upgrade old/rec.mcap --from {} -o up",
+    "upgrade old/rec.mcap --rules {} -o up",
+    "gen old -I {} -o out",
+)
+
+
+@pytest.mark.parametrize("command", PATHS)
+def test_a_path_that_leads_nowhere_leads_to_the_closest_one(command, capsys):
+    make("old/msg/Drive.msg")
+    make("old/rec.mcap", "")
+    assert main(command.format("odl/rec.mcp").split()) == 2
+    shown = capsys.readouterr()
+    assert "did you mean `old/rec.mcap`?" in shown.out + shown.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *(command for command in PATHS if "--against {}" not in command),
+        *("echo {}", "call {} /x", "record {} -o x.mcap"),
+    ],
+)
+def test_the_word_graph_leads_to_commands_that_work_with_running_nodes(command, capsys):
+    make("old/msg/Drive.msg")
+    make("old/rec.mcap", "")
+    assert main(command.format("graph").split()) == 2
+    shown = capsys.readouterr()
+    hint = "`idlc show dds` lists what running nodes use, and `idlc breaking --against graph`"
+    assert f"hint: {hint} compares it" in shown.out + shown.err
 
 
 def test_a_terminal_that_knows_only_ascii_gets_ascii():

@@ -13,7 +13,7 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.source import Source
-from idlc.diagnostics.text import without_options
+from idlc.diagnostics.text import Audience, addressed_to
 from idlc.editor import protocol
 from idlc.editor.documents import Places, to_path
 from idlc.editor.parts import Position
@@ -64,7 +64,10 @@ def test_the_server_says_what_the_command_line_says(number, tmp_path, capsys, mo
     compared = 0
     for folder in sorted({tmp_path, *named}):
         monkeypatch.chdir(folder)
-        expected = by_command_line(options, capsys)
+        with monkeypatch.context() as patch:  # hints name the settings
+            path = "idlc.cli.exit_status.addressed_to"
+            patch.setattr(path, lambda _: addressed_to(Audience.SETTINGS))
+            expected = by_command_line(options, capsys)
         encoding = ENCODINGS[number % len(ENCODINGS)]
         from_disk, typed = by_server(folder, options, encoding)
         if CASES[number].stem not in MARKED:
@@ -76,8 +79,7 @@ def test_the_server_says_what_the_command_line_says(number, tmp_path, capsys, mo
 
 def by_command_line(options, capsys):
     capsys.readouterr()
-    with without_options():
-        main(["check", *(word for pair in options.items() for word in pair), "--format", "json"])
+    main(["check", *(word for pair in options.items() for word in pair), "--format", "json"])
     lines = map(json.loads, capsys.readouterr().out.splitlines())
     return sorted(
         told(one, one["path"]) for one in lines if one["type"] == "diagnostic" and shown(one)

@@ -8,6 +8,7 @@ import pytest
 
 from idlc.diagnostics.report import Report
 from idlc.model.ir import TypeName
+from idlc.project.files import near_path
 from idlc.project.find import find
 from idlc.project.library import Library
 from idlc.project.lock import meaning
@@ -40,6 +41,28 @@ def found(*paths: str) -> list[str]:
     files = find(paths, Root.here(), report)
     assert not report.had_errors, [one.message for one in report]
     return [file.shown for file in files]
+
+
+@pytest.mark.parametrize(
+    ("path", "near"),
+    [
+        ("pgk", "pkg"),
+        ("pgk/msg", "pkg/msg"),
+        ("pkg/msg/AB.mgs", "pkg/msg/AC.msg"),
+        ("pgk/./mgs//AC.msg", "pkg/msg/AC.msg"),
+        ("pkg/../pgk", "pkg/../pkg"),
+        ("{here}/pgk/msg/AC.msg", "{here}/pkg/msg/AC.msg"),
+        ("pgk/nothing", None),
+        ("nothing/msg", None),
+        ("-", None),
+        ("x/" * 2000, None),
+    ],
+)
+def test_the_closest_path_is_one_that_exists(path, near, here):
+    make("pkg/msg/AC.msg", "r/x.msg")
+    path = path.format(here=here.as_posix())
+    expected = near and f"did you mean `{near.format(here=here.as_posix())}`?"
+    assert near_path(path, Path(Root.here().path(path))) == expected
 
 
 @pytest.mark.parametrize(

@@ -18,12 +18,13 @@ from idlc.model.lowering.lower import lower
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
-from idlc.recordings.definitions import mcap_text, read_definition, type_name
+from idlc.recordings.definitions import RECORDING, ROBOT, mcap_text, read_definition, type_name
 from idlc.recordings.types import LocalTypes, contradictions, recorded_types, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
 
 LINE = "=" * 80 + "\n"
+BYTE = "RIHS01_41e1a3345f73fe93ede006da826a6ee274af23dd4653976ff249b0f44e3e798f"
 SHARE = Path(sys.prefix) / "share"
 
 
@@ -319,3 +320,29 @@ def test_what_has_errors_within_others_is_what_is_known_here():
         types, report = types_of(topic("std_msgs/msg/A", broken, hash_=hash_))
         assert [one.code for one in (*types.errors, *report)] == [code]
         assert types.hash(types.topics[0]) == (right if code == "IDL652" else None)
+
+
+#: A type, its definition and hash -> the problem; {0} is a recording or a robot.
+SUBSTITUTIONS = {
+    ("own_msgs/msg/Pair", "", None): "idlc does not read `/x`: {0.name} does not define `own_msgs",
+    ("std_msgs/msg/Byte", "", None): "{0.name} does not define `std_msgs/msg/Byte`; idlc uses",
+    ("std_msgs/msg/Byte", "int8 data\n", BYTE): "{0.hash} does not match the definition of",
+    ("std_msgs/msg/Byte", "int9 data\n", BYTE): "which has {0.hash}",
+}
+
+
+@pytest.mark.parametrize("origin", [RECORDING, ROBOT])
+@pytest.mark.parametrize("case", SUBSTITUTIONS)
+def test_problems_name_where_definitions_come_from(case, origin):
+    type_, text, hash_ = case
+    definition = topic(type_, text, hash_=hash_)._replace(origin=origin)
+    report = Report()
+    local = LocalTypes(Scope(Root.here()), report)
+    recorded_types(*versions([definition]), local, report)
+    (problem,) = report
+    assert SUBSTITUTIONS[case].format(origin) in problem.message
+    said = f"{problem.message} {problem.hint}"
+    other = RECORDING if origin is ROBOT else ROBOT
+    assert not [words for words in other if words in said]
+    if "same name" in said:
+        assert f"check that it equals {origin.type}; `distro=NAME` or" in problem.hint

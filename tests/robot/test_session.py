@@ -280,7 +280,8 @@ def listening():
     [
         (["tcp/robot"], {}, "`tcp/robot` is not an endpoint (write `tcp/robot:7447`)"),
         (["tcp/"], {}, "`tcp/` is not an endpoint (write `tcp/localhost:7447`)"),
-        (["robot:7447"], {}, "`robot:7447` is not an endpoint (write `tcp/localhost:7447`)"),
+        (["robot:7447"], {}, "`robot:7447` is not an endpoint (write `tcp/robot:7447`)"),
+        (["10.0.0.7"], {}, "`10.0.0.7` is not an endpoint (write `tcp/10.0.0.7:7447`)"),
         (["tcp/a:1,tcp/b:1"], {}, "`tcp/a:1,tcp/b:1` is not an endpoint"),
         (["tcp/127.0.0.1:99999"], {}, "`tcp/127.0.0.1:99999` does not answer: "),
         (["abc/127.0.0.1:1"], {}, "`abc/127.0.0.1:1` does not answer: "),

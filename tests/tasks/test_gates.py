@@ -122,13 +122,22 @@ def test_with_a_revision(name, here, capsys):
     assert (status, gate.last in last) == (gate.status, True), last
 
 
+def test_outside_of_a_repository_a_version_has_to_be_named(here, capsys):
+    write_all(SAME)
+    assert main(["breaking"]) == 2
+    shown = capsys.readouterr().err
+    assert "missing option `--against`: this folder is in no git repository" in shown
+
+
 @pytest.mark.parametrize("settings", ["", "[tool.idlc]\npaths = ['src']\n"])
 def test_in_a_repository_without_a_version_to_compare_with(settings, here, capsys):
     """The last commit is compared with, of the remote repository if there is one."""
     write_all({**SAME, "pyproject.toml": settings})
     git("init", "-q", "-b", "main")
     assert main(["breaking"]) == 2
-    assert "missing option `--against`" in capsys.readouterr().err
+    shown = capsys.readouterr().err
+    assert "nothing to compare with: the git repository has no commits" in shown
+    assert "commit the current version" in shown
     git("add", ".")
     git("commit", "-qm", "one")
     write_all(NEW)

@@ -107,8 +107,15 @@ def test_definitions_that_were_not_recorded_come_from_elsewhere(old, source, tmp
     write_package(tmp_path / "src", WIDER)
     write_recording(tmp_path / "a.mcap", old.Drive, [old.Drive(speed=7)], defined=False)
     words = ["upgrade", "a.mcap", "--to", "src/drive_msgs", "-o"]
-    assert main([*words, "unchanged"]) == 0
-    assert "the recording does not define `drive_msgs/msg/Drive`" in capsys.readouterr().err
+    assert main([*words, "unchanged"]) == 1
+    shown = capsys.readouterr()
+    assert "  /drive: copied, because its type is not known\n" in shown.out
+    assert "error[IDL652]: idlc does not read `/drive`: the recording does not def" in shown.err
+    assert "hint: give the publisher's version with `--from PATH`" in shown.err
+    (copied,) = messages_of(tmp_path / "unchanged" / "a.mcap", old.Drive)
+    assert copied == old.Drive(speed=7)
+    assert main(["upgrade", "a.mcap", "--dry-run"]) == 1
+    assert "no types changed" not in capsys.readouterr().out
     assert main([*words, "out", "--from", source]) == 0
     (made,) = messages_of(tmp_path / "out" / "a.mcap", idlc.load("src/drive_msgs").Drive)
     assert (made.speed, made.gear) == (7, 3)
@@ -387,7 +394,8 @@ def test_services_and_nested_types_of_a_real_recorder_are_converted(tmp_path, mo
     service.write_text(text, encoding="utf-8")
     leaf.write_text(leaf.read_text(encoding="utf-8") + "int32 extra 5\n", encoding="utf-8")
     recording = str(folder / "service_events.mcap")
-    assert main(["upgrade", recording, "--to", "kit_msgs", "-o", "out"]) == 0
+    # nothing defines the type of one topic, which is copied
+    assert main(["upgrade", recording, "--to", "kit_msgs", "-o", "out"]) == 1
     include = [str(tmp_path)]
     with (
         idlc.Recording(recording, include=[str(folder)]) as before,

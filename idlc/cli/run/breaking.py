@@ -15,7 +15,7 @@ from idlc.diagnostics.formats import notice
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.project.find import is_address
-from idlc.project.git import commit
+from idlc.project.git import commit, repository_of
 from idlc.project.root import Root
 from idlc.project.settings import Config, scope, settings_here
 from idlc.recordings.find import recordings_of
@@ -120,10 +120,7 @@ def run(
     levels = packages.levels(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
-        raise click.UsageError(
-            "missing option '--against'; give DIR, git:REF, idlc.lock, a recording, distro:NAME "
-            "or graph"
-        )
+        raise click.UsageError(_nothing_to_compare(settings.root))
     is_running = against == GRAPH or is_address(against or "")
     if timeout is not None and not is_running:
         raise click.UsageError("--timeout needs --against graph")
@@ -148,6 +145,15 @@ def _committed(root: Root, report: Report) -> str | None:
             sys.stderr.write(f"note: idlc compares with `git:{name}`\n")
             return f"git:{name}"
     return None
+
+
+def _nothing_to_compare(root: Root) -> str:
+    """Return why a version to compare with has to be named, and a hint."""
+    if repository_of(root.base) is None:
+        choices = "DIR, git:REF, idlc.lock, a recording, distro:NAME or graph"
+        return f"missing option '--against': this folder is in no git repository; give {choices}"
+    what = "nothing to compare with: the git repository has no commits"
+    return f"{what}; commit the current version, or name another one: `idlc breaking --against DIR`"
 
 
 def _comparison(

@@ -95,7 +95,7 @@ def run(
     again = shlex.join(("idlc", "upgrade", *options.typed("write_rules", "dry_run", "style")))
     where = scope(settings, package, include, exclude, distro)
     request = UpgradeOptions(recordings, where, out, again=again, **arguments)
-    result = UpgradeResult([], [], [], {})
+    result = UpgradeResult([], [], [], {}, {})
     if not report.had_errors:
         with output.progress_bar(sys.stderr) as update:
             result = upgrade_recordings(request, report, update)
@@ -125,6 +125,8 @@ def _show(result: UpgradeResult, request: UpgradeOptions, style: str, *, failed:
     for recording, path, written in result.written:
         plans = [entry for entry in result.plans if entry.recording == recording]
         lines = [f"{recording} → {path}", *_fates(plans, written)]
+        unread = result.unread[recording]
+        lines += [f"  {name}: copied, because its type is not known" for name in unread]
         if len(lines) == 1:
             lines.append("  no types changed")
         output.texts(("".join(f"{one_line(line)}\n" for line in lines),), "text", sys.stdout)

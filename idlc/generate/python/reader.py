@@ -67,7 +67,7 @@ def paths_of(texts: Sequence[str], message: ir.Message, messages: Messages) -> t
 
 def _path(text: str, message: ir.Message, messages: Messages) -> Path:
     type_: ir.FieldType = ir.Ref(message.name)
-    parts = []
+    parts: list[PathStep] = []
     for word in text.split("."):
         match = _PART.fullmatch(word)
         if match is None:
@@ -77,8 +77,9 @@ def _path(text: str, message: ir.Message, messages: Messages) -> Path:
         if not isinstance(type_, ir.Ref):
             problem = f"there is no `{name}` in a {ir.spell(type_)}"
             if isinstance(type_, (ir.Array, ir.Sequence)):
-                hint = "add an index such as `[0]`, or `[*]`"
-                problem = f"`{name}` is in the elements of a list: {hint}"
+                of = parts[-1].name
+                rest = f".{name}" if isinstance(type_.element, ir.Ref) else ""
+                problem = f"`{of}` is a list: write `{of}[0]{rest}` or `{of}[*]{rest}`"
             raise PathError(f"`{text}`: {problem}")
         fields = {field.name: field.type for field in messages[type_.target].fields}
         if name not in fields:

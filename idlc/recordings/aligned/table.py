@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from idlc.diagnostics.text import worded
 from idlc.recordings.aligned import blend
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
 from idlc.recordings.aligned.describe import leaves, metadata, quaternions
@@ -154,7 +155,8 @@ def _ordered_parts(selection: Any) -> list[Any]:
     channels = {(str(part.place), part.ids) for part in parts}
     if len(channels) > len({place for place, _ in channels}):
         what = f"a file has several versions of the messages of `{selection.topic.name}`"
-        hint = "use to_reader(), or convert the file: `idlc upgrade REC --to PATH -o OUT`"
+        hint = "convert the file: `idlc upgrade REC --to PATH -o OUT`"
+        hint = worded(hint, f"use to_reader(), or {hint}")
         raise RecordingError(f"{what}: its table has no parts", hint)
     return parts
 

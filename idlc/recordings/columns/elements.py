@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Sequence, Sized
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,6 +66,22 @@ class ListElement(NamedTuple):
         result[rows] = present
         return result
 
+    def index_in(self, names: Sequence[str], values: Sized) -> int | None:
+        """Return the index of the element in one message, or None if the message lacks it."""
+        if self.name not in names or not len(values):
+            return None
+        if names.count(self.name) > 1:
+            raise ElementError(0, self._twice())
+        if len(names) != len(values):
+            raise ElementError(0, self._unequal(len(names), len(values)))
+        return names.index(self.name)
+
+    def _twice(self) -> str:
+        return f"`{self.names}` has `{self.name}` more than once"
+
+    def _unequal(self, names: int, values: int) -> str:
+        return f"`{self.names}` has {names} names, and `{self.values}` has {values} elements"
+
     def _places(self, names: Ragged, sizes: Any) -> tuple[Any, Any]:
         """Return the messages that have the element, and its index in each."""
         texts, name = names.values, self.name.encode()
@@ -75,18 +92,18 @@ class ListElement(NamedTuple):
         indexes = places - names.offsets[rows]
         twice = rows[1:][np.diff(rows) == 0]
         if len(twice):
-            raise ElementError(int(twice[0]), f"`{self.names}` has `{self.name}` more than once")
+            raise ElementError(int(twice[0]), self._twice())
         other = rows[(sizes[rows] != names.sizes[rows]) & (sizes[rows] > 0)]
         if len(other):
             row = int(other[0])
-            counts = f"{names.sizes[row]} names, and `{self.values}` has {sizes[row]} elements"
-            raise ElementError(row, f"`{self.names}` has {counts}")
+            raise ElementError(row, self._unequal(names.sizes[row], sizes[row]))
         if not len(rows) and len(names):
-            self._warn(texts[:MOST_NAMES].to_list(), len(names))
+            self.warn(texts[:MOST_NAMES].to_list(), len(names))
         present = sizes[rows] > 0
         return rows[present], indexes[present]
 
-    def _warn(self, texts: list[str], count: int) -> None:
+    def warn(self, texts: list[str], count: int) -> None:
+        """Warn that none of so many messages has the element, but others, with these names."""
         known = sorted({text for text in texts if len(text) <= MOST_NAMES})
         hint = did_you_mean(self.name, known) or f"it has {', '.join(known) or 'none'}"
         what = f"`{self.names}` has no `{self.name}` in any of {count:,} messages"

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from idlc.diagnostics.text import worded
 from idlc.recordings.containers.source import RecordingError
 
 #: How ROS 2 writes messages.
@@ -62,7 +63,8 @@ def wrong_count(topic: str, counted: int, actual: int) -> str:
 def check_count(topic: str, counted: int, actual: int) -> None:
     """Raise RecordingError if the number of messages is not the counted one."""
     if counted != actual:
-        hint = "--no-index, or Recording(path, index=False), ignores the counts in the file"
+        hint = worded("`idlc columns --no-index`", "Recording(path, index=False)")
+        hint += " ignores the counts in the file"
         raise RecordingError(wrong_count(topic, counted, actual), hint)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from idlc.diagnostics.errors import HintedError
+from idlc.project.files import near_path
 
 
 class RecordingError(HintedError):
@@ -177,4 +178,6 @@ def first_bytes(path: Path, size: int = 16) -> bytes:
         with path.open("rb") as file:
             return file.read(size)
     except OSError as error:
-        raise RecordingError(f"`{path}` cannot be read: {error.strerror}") from None
+        is_missing = isinstance(error, FileNotFoundError)
+        hint = near_path(str(path), path.absolute()) if is_missing else None
+        raise RecordingError(f"`{path}` cannot be read: {error.strerror}", hint) from None

@@ -73,9 +73,9 @@ def find_version(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            return type_of(definition.topic, include).kind, chosen
+            return type_of(definition.topic, include, origin=definition.origin).kind, chosen
         except RecordingError as error:
-            message = error.message.replace("the recording does not", "the robot does not")
+            message = error.message
             if definition.problem:
                 message += f" ({definition.problem})"
             missing = codes.MISSING_DEFINITION.of("", message, hint=error.hint)

@@ -29,6 +29,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.file import CDR, MSG, Schema, Topic
 from idlc.recordings.definitions import (
+    ROBOT,
     RecordedDefinition,
     TextCache,
     interface_of,
@@ -156,7 +157,7 @@ def definitions(
         for name in dict.fromkeys(place_of(end)[1] for end in users[key]):
             topic = Topic(name, key[0], 0, key[1] or None, CDR, schema)
             definition = read_definition(topic, address, cache)
-            yield definition._replace(origin="the robot", problem=problem)
+            yield definition._replace(origin=ROBOT, problem=problem)
 
     for key, mine in users.items():
         type_ = type_name(key[0])

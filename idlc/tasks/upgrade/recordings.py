@@ -17,7 +17,7 @@ from idlc.api.sources import read_source
 from idlc.api.upgrade import Runner, UpgradeError
 from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Label, Report, first_few
+from idlc.diagnostics.report import Diagnostic, Label, Report, Severity, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model import ir
 from idlc.project.files import is_folder
@@ -38,7 +38,7 @@ from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import definition_text, interface_of
 from idlc.recordings.find import is_recording
-from idlc.recordings.lengths import SAMPLE, WRONG_DEFINITION, check_lengths, first_longer
+from idlc.recordings.lengths import SAMPLE, check_lengths, first_longer, wrong_definition
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
     NAMED,
@@ -62,6 +62,10 @@ from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 if TYPE_CHECKING:
     from idlc.recordings.rewrite import Rewritten
+
+
+#: The option for old types that recordings do not define.
+FROM = "--from"
 
 
 class UpgradeOptions(msgspec.Struct, frozen=True):
@@ -126,21 +130,25 @@ class UndefinedTopic(NamedTuple):
 class UpgradeResult(NamedTuple):
     """The plans of changed topics, the recordings that were written, and new files of rules.
 
-    `undefined` are unchanged topics whose definitions the recording lacks, by its path.
+    `undefined` are unchanged topics whose definitions the recording lacks, by its path; `unread`
+    are topics whose definitions nothing has, which are copied.
     """
 
     plans: list[TopicPlan]
     written: list[tuple[str, str, Rewritten]]
     stubs: list[str]
     undefined: dict[str, list[UndefinedTopic]]
+    unread: dict[str, list[str]]
 
 
 def upgrade_recordings(
     options: UpgradeOptions, report: Report, progress: Progress
 ) -> UpgradeResult:
     """Plan the upgrade of recordings, and write them unless something is in the way of it."""
-    result = UpgradeResult([], [], [], {})
+    result = UpgradeResult([], [], [], {}, {})
+    unread: list[Diagnostic] = []
     with ExitStack() as opened:
+        opened.callback(lambda: report.extend(_as_errors(unread)))  # which do not prevent writing
         target = opened.enter_context(target_of(options.to, options.scope, report))
         local = _local(options, opened, report)
         named = _read(rule_files(options.rules, options.scope.root), options.scope.root, report)
@@ -152,8 +160,12 @@ def upgrade_recordings(
         for recording in options.recordings:
             undefined = result.undefined.setdefault(recording, [])
             known_rules = Known(named)
-            every = _plans(recording, options, target, local, known_rules, report, undefined)
+            without: dict[Diagnostic, list[str]] = {}
+            lists = undefined, without
+            every = _plans(recording, options, target, local, known_rules, report, *lists)
             result.plans.extend(every)
+            result.unread[recording] = [name for names in without.values() for name in names]
+            unread += without
         if report.errors:
             return result
         if options.write_rules is not None:
@@ -169,11 +181,16 @@ def upgrade_recordings(
     return result
 
 
+def _as_errors(problems: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    for problem in problems:
+        yield msgspec.structs.replace(problem, severity=Severity.ERROR)
+
+
 def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalTypes | None:
     """Return the old types that recordings do not define; `None` after an error."""
     scope = options.scope
     if options.old is None:
-        return LocalTypes(scope, report)
+        return LocalTypes(scope, report, option=f"`{FROM} PATH`")
     is_folder_of_packages = options.to is not None and not (
         options.to.startswith((GIT, PREFIX)) or is_recording(options.to, scope.root)
     )
@@ -184,7 +201,7 @@ def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalT
     if old is None:
         return None
     scope = msgspec.structs.replace(scope, distros=(old.distro or scope.distro,))
-    return LocalTypes(scope, report, old.texts)
+    return LocalTypes(scope, report, old.texts, option=f"`{FROM} PATH`")
 
 
 def _read(files: Iterable[Path], root: Root, report: Report) -> list[Rules]:
@@ -209,10 +226,12 @@ def _plans(
     rules: Known,
     report: Report,
     undefined: list[UndefinedTopic],
+    unread: dict[Diagnostic, list[str]],
 ) -> Iterator[TopicPlan]:
     """Yield the plan of each topic of a recording whose type is another one in the target.
 
-    Unchanged topics whose definitions the recording lacks are added to `undefined`.
+    Unchanged topics whose definitions the recording lacks are added to `undefined`, and those whose
+    definitions nothing has to `unread`.
     """
     topics = topics_of(read_source, [recording], (), options.scope.root, report)
     if topics is None:
@@ -227,7 +246,10 @@ def _plans(
         )
         if not version.topics:
             continue
-        types = recorded_types(version, local, report)
+        problems = Report()
+        types = recorded_types(version, local, problems)
+        unread |= types.undefined
+        report.extend(problem for problem in problems if problem not in types.undefined)
         report.extend(types.errors)
         packages |= {name.package for name in types.interfaces}
         if not is_address(recording):
@@ -259,15 +281,12 @@ def _check_lengths(
                 if len(raws) >= SAMPLE:
                     break
             unread = unread_bytes(structure, raws)
-            hint: str | None = WRONG_DEFINITION
-            if topic.schema is None:
-                hint = "use `--from` with the publisher's version"
+            hint: str | None = wrong_definition(topic, option=FROM)
             problem = ""
             try:
                 if raws:
                     known = known_versions(topic, options.scope.include, ())
-                    option = "--from distro:"
-                    problem = check_lengths(topic, structure, unread, raws, known, option)
+                    problem = check_lengths(topic, structure, unread, raws, known, FROM)
             except RecordingError as error:
                 problem, hint = error.message, error.hint
             if problem:
