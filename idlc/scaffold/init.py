@@ -313,7 +313,7 @@ def _built(
     draft: Draft, layout: Layout, inputs: Inputs, model: Model, out: str, report: Report
 ) -> tuple[str, ...]:
     """Have the package's build install interfaces and classes; return notes."""
-    root, note, more = draft.root(), "", ""
+    root, note, more, typed = draft.root(), "", "", ""
     files = {entry.file.key: root.shown(entry.file.path) for entry in inputs.files}
     if layout.kind in ("ament_python", "empty"):
         note = _ament_python(draft, layout, model, files, report)
@@ -323,9 +323,13 @@ def _built(
         _setuptools(draft, out, files, report)
     if layout.kind == "library" and _has_arrays(model):
         note = _numpy(draft)
+    marker = f"{layout.home}/py.typed"
+    if layout.kind == "library" and not is_file(layout.folder / marker):
+        command = f"touch {shlex.quote(marker)}"
+        typed = f"type checkers of the library's users read its types after `{command}`"
     if layout.kind != "ament_cmake":
         more = _outdated_builds(draft, layout, out)
-    return tuple(filter(None, (note, more)))
+    return tuple(filter(None, (note, more, typed)))
 
 
 def _places(

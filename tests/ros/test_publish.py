@@ -21,7 +21,7 @@ PAGE = (DOCS / "ship-messages.md").read_text(encoding="utf-8").partition("## A p
 FENCES = re.findall(r"^```(\S*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 FILES = {info: text for info, text in FENCES if "." in info}
 PROJECT = {path: text for path, text in FILES.items() if path not in ("show.py", "node.py")}
-BUILD, TRY, EDITABLE, _ = (text for info, text in FENCES if info == "sh")
+TYPED, BUILD, TRY, EDITABLE, _ = (text for info, text in FENCES if info == "sh")
 ARCHIVES, SHOWN = (text for info, text in FENCES if not info)
 (SETUPTOOLS,) = (text for info, text in FENCES if info == "toml")
 HATCHLING = FILES["pyproject.toml"].partition("\n[project]")[0]
@@ -51,6 +51,7 @@ def build(backend, distributions, tmp_path):
         "PATH": f"{environment.bin}:{os.environ['PATH']}",
         "PIP_FIND_LINKS": f"{os.environ.get('PIP_FIND_LINKS', '')} {distributions}",
     }
+    programs.run("bash", "-ec", TYPED, cwd=folder, environment=variables)
     before = tree(folder)
     programs.run("bash", "-ec", BUILD, cwd=folder, environment=variables)
     after = {path: data for path, data in tree(folder).items() if "dist" not in path.parts}
@@ -69,6 +70,9 @@ def archives_are_as_shown(folder):
 
 def works_without_ros(folder, variables):
     assert programs.run("bash", "-ec", TRY, cwd=folder, environment=variables).endswith(SHOWN)
+    (folder / "user.py").write_text("from trackkit import straight\n\nstraight(2)\n")
+    mypy = [sys.executable, "-m", "mypy", "--strict", "--python-executable", "plain/bin/python"]
+    programs.run(*mypy, "user.py", cwd=folder)
 
 
 def works_with_ros(folder, prefix, environment):

@@ -515,6 +515,17 @@ def test_a_library_without_an_init_py_says_where_its_classes_are(project):
     assert Path("src/ada/kit/ros/msg/_example.py").is_file()
 
 
+def test_a_library_without_py_typed_is_told_what_its_users_need(project, unproved, capsys):
+    write_all(library(SETUPTOOLS))
+    Path("src/track_kit/py.typed").unlink()
+    assert main(["init", "--yes"]) == 0
+    (command,) = re.findall("note: type checkers .*`(.*)`", capsys.readouterr().out)
+    run("sh", "-c", command, cwd=project)
+    shutil.rmtree("src/track_kit/ros")
+    assert main(["init", "--yes"]) == 0
+    assert "note: type checkers" not in capsys.readouterr().out
+
+
 def test_a_package_for_both_versions_of_ros_is_one_of_ros_2(project, capsys):
     old = "<build_type>ament_python"
     new = f'<build_type condition="$ROS_VERSION == 1">catkin</build_type>\n    {old}'
