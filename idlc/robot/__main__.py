@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from idlc.diagnostics.text import one_line
+from idlc.project.files import near_path
 from idlc.robot.errors import RobotError
 from idlc.robot.offer import Importer
 
@@ -49,11 +50,15 @@ def run(words: list[str]) -> None:
     if not is_module:
         path = Path(target).resolve()
         if not path.is_file():
-            raise RobotError(f"`{one_line(target)}` is not a file", "name a node's .py file")
+            hint = near_path(target, path) or "name a node's .py file"
+            raise RobotError(f"`{one_line(target)}` is not a file", hint)
         folder, module = path.parent, path.stem
         while (folder / "__init__.py").is_file() and folder.parent != folder:
             folder, module = folder.parent, f"{folder.name}.{module}"
             is_module = True
+    elif target.endswith(".py"):  # to look for it would run it
+        hint = f"write `python -m idlc.robot {shlex.quote(one_line(target))}`"
+        raise RobotError(f"`{one_line(target)}` is no module, but the name of a file", hint)
     sys.path.insert(0, str(folder))
     if (spec := find_spec("rclpy")) is not None:
         problem = f"rclpy is installed ({one_line(spec.origin or 'as a folder')})"
@@ -62,9 +67,24 @@ def run(words: list[str]) -> None:
     sys.meta_path.append(Importer())
     sys.argv = words
     if is_module:
+        _check(module)
         runpy.run_module(module, run_name="__main__", alter_sys=True)
     else:
         runpy.run_path(target, run_name="__main__")
+
+
+def _check(module: str) -> None:
+    """Raise RobotError for a module that does not exist."""
+    parent = module.rpartition(".")[0]
+    try:
+        is_there = find_spec(module) is not None
+    except ModuleNotFoundError as error:
+        if error.name is None or not f"{parent}.".startswith(f"{error.name}."):
+            raise  # the package cannot import another
+        is_there = False
+    if not is_there:
+        hint = "change to the folder that contains it, or name its .py file"
+        raise RobotError(f"there is no module `{one_line(module)}` here", hint)
 
 
 if __name__ == "__main__":

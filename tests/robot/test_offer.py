@@ -289,12 +289,37 @@ def test_it_refuses_where_rclpy_can_be_imported(start, tmp_path):
     assert "ran" not in program.output
 
 
-@pytest.mark.parametrize("words", [[], ["none.py"], ["--unknown"]])
-def test_mistakes_on_the_command_line_are_errors(start, words):
-    program = start(*words)
+#: Words of a command line, and the hint.
+MISTAKES = {
+    "": "write `python -m idlc.robot my_node.py`",
+    "--unknown": "write `python -m idlc.robot my_node.py`",
+    "none.py": "name a node's .py file",
+    "talkr.py": "did you mean `talker.py`?",
+    "-m talker.py": "write `python -m idlc.robot talker.py`",
+    "-m talkr": "change to the folder that contains it, or name its .py file",
+    "-m bot.talkr": "change to the folder that contains it, or name its .py file",
+    "-m none.talker": "change to the folder that contains it, or name its .py file",
+}
+
+
+@pytest.mark.parametrize("words", MISTAKES)
+def test_mistakes_on_the_command_line_are_errors(start, words, tmp_path):
+    (tmp_path / "talker.py").write_text("raise SystemExit('ran')", encoding="utf-8")
+    (tmp_path / "bot").mkdir()
+    (tmp_path / "bot" / "__init__.py").write_text("", encoding="utf-8")
+    program = start(*words.split(), cwd=tmp_path)
     assert program.ends() == 2
-    assert program.output.startswith("error: ")
-    assert "Traceback" not in program.output
+    first, second = program.output.splitlines()
+    assert first.startswith("error: ")
+    assert second == f"  = hint: {MISTAKES[words]}"
+
+
+def test_a_package_that_cannot_import_another_shows_its_own_error(start, tmp_path):
+    (tmp_path / "bot").mkdir()
+    (tmp_path / "bot" / "__init__.py").write_text("import none.other", encoding="utf-8")
+    program = start("-m", "bot.talker", cwd=tmp_path)
+    assert program.ends() == 1
+    assert "No module named 'none'" in program.output
 
 
 NAMES = """\
