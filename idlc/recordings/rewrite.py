@@ -10,7 +10,7 @@ import re
 import secrets
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -201,6 +201,16 @@ class _Rewriting:
                 return each.type, each.type_hash
         return None
 
+    def _count(self, topic: tuple[str, str], listed: Sequence[tuple[str, str]]) -> int:
+        """Return the messages of a listed topic, only those of its type if there are others."""
+        name, kind = topic
+        is_only = [other for other, _ in listed].count(name) == 1
+        return sum(
+            fate.messages
+            for (own, (type_, _)), fate in self.definitions.items()
+            if own == name and (is_only or type_ == full_name(kind))
+        )
+
     def packed(self, path: Path, target: Path) -> None:
         """Write a file that is compressed as a whole; the new one is not."""
         known = len(self.damage)
@@ -251,12 +261,12 @@ class _Rewriting:
             _copy(metadata, target / bag.METADATA)
             return
         if self.damage:
-            by_topic = {name: topic.messages for name, topic in self.result.topics.items()}
+            listed = bag.listed_topics(metadata)
             files: dict[str, bag.FileExtent] = {}
             for name, count in counts.items():
                 with open_recording(str(target / mcap_name(Path(name)))) as written:
                     files[name] = bag.FileExtent(count, written.span())
-            data = bag.recounted(data, by_topic, files)
+            data = bag.recounted(data, [self._count(topic, listed) for topic in listed], files)
         is_mcap = all(path.suffix == ".mcap" for path in paths)
         data = data if is_mcap else as_mcap(data.decode()).encode()
         (target / bag.METADATA).write_bytes(data)

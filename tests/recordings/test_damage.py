@@ -269,6 +269,28 @@ def test_the_metadata_of_a_copy_counts_what_is_there(storage, style, loss, tmp_p
     assert sum(every) == messages.total()
 
 
+def test_the_types_of_one_topic_are_counted_apart(tmp_path):
+    kinds = ["sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"]
+    (tmp_path / "bag").mkdir()
+    for number, kind in enumerate(kinds):
+        messages = [one._replace(topic="/t") for one in MESSAGES if one.type == kind][number:]
+        made.by_mcap(tmp_path / "bag" / f"bag_{number}.mcap", messages)
+    (tmp_path / "bag" / "bag_2.mcap").touch()
+    listed = [
+        {"topic_metadata": {"name": "/t", "type": kind}, "message_count": 500} for kind in kinds
+    ]
+    files = [f"bag_{number}.mcap" for number in range(3)]
+    information = {"relative_file_paths": files, "topics_with_message_count": listed}
+    text = yaml.safe_dump({"rosbag2_bagfile_information": information})
+    (tmp_path / "bag" / "metadata.yaml").write_text(text, encoding="utf-8")
+    assert rewrite(str(tmp_path / "bag"), str(tmp_path / "copy"), {}).damage
+    text = (tmp_path / "copy" / "metadata.yaml").read_text(encoding="utf-8")
+    written = yaml.safe_load(text)["rosbag2_bagfile_information"]["topics_with_message_count"]
+    counts = {each["topic_metadata"]["type"]: each["message_count"] for each in written}
+    every = [sum(one.type == kind for one in MESSAGES) for kind in kinds]
+    assert counts == {kinds[0]: every[0], kinds[1]: every[1] - 1}
+
+
 def of_sqlite(path):
     """Return the messages that SQLite finds, each row by itself."""
     messages = Counter()

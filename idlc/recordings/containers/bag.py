@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -127,8 +127,15 @@ class FileExtent(NamedTuple):
         return {START: ("nanoseconds_since_epoch", start), DURATION: ("nanoseconds", end - start)}
 
 
-def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, FileExtent]) -> bytes:
-    """Return a metadata.yaml with the messages of topics and files, by their names, and the times.
+def listed_topics(metadata: Path) -> list[tuple[str, str]]:
+    """Return the name and the type of each topic that a metadata.yaml lists."""
+    nodes = (_values([topic], TOPIC)[:1] for topic in _listed_topics(_root(_read(metadata))))
+    topics = (_type_of(*node) if node else {} for node in nodes)
+    return [(topic.get("name", ""), topic.get("type", "")) for topic in topics]
+
+
+def recounted(metadata: bytes, counts: Sequence[int], files: Mapping[str, FileExtent]) -> bytes:
+    """Return a metadata.yaml with the messages of each listed topic and of files, and the times.
 
     Other files are left out. `metadata` is what `retyped` returns.
     """
@@ -139,10 +146,8 @@ def recounted(metadata: bytes, topics: Mapping[str, int], files: Mapping[str, Fi
     for outer, (key, time) in total.times().items():
         values.append((_values(information, outer), key, time))
     edits = [_number(node, value) for nodes, key, value in values for node in _values(nodes, key)]
-    for listed in _values(information, TOPICS):
-        for topic in listed.value if listed.id == "sequence" else ():
-            name = _type_of(*_values([topic], TOPIC)).get("name", "")
-            edits += [_number(node, topics.get(name, 0)) for node in _values([topic], COUNT)]
+    for topic, count in zip(_listed_topics(root), counts, strict=True):
+        edits += [_number(node, count) for node in _values([topic], COUNT)]
     for paths in _values(information, PATHS):
         names = [str(node.value) for node in paths.value if node.id == "scalar"]
         edits.append(_listed(paths, [name for name in names if _plain_name(name) in files]))
@@ -219,11 +224,15 @@ def _type_of(topic: Any) -> dict[str, str]:
     return {key: value.value for key, value in values.items() if value.id == "scalar"}
 
 
+def _listed_topics(root: Any) -> list[Any]:
+    """Return the nodes of topics."""
+    lists = _values(_values([root], INFORMATION), TOPICS)
+    return [topic for own in lists if own.id == "sequence" for topic in own.value]
+
+
 def _topics(root: Any) -> list[Any]:
     """Return the nodes that describe topics."""
-    lists = _values(_values([root], INFORMATION), TOPICS)
-    topics = [topic for own in lists if own.id == "sequence" for topic in own.value]
-    return _values(topics, TOPIC)
+    return _values(_listed_topics(root), TOPIC)
 
 
 def _contents(metadata: Path) -> tuple[list[str], int]:
