@@ -109,8 +109,8 @@ def test_a_folder_of_bags_is_none(here, capfd):
     made.by_rosbags(here / "bags/first", MESSAGES, "db3")
     assert run("bags", "/imu", "-o", "a.csv") == 1
     assert "pass a bag in it, such as `bags/first`" in capfd.readouterr().err
-    assert run("nothing_*.mcap", "-o", "a.csv") == 1
-    assert "`nothing_*.mcap` cannot be read" in capfd.readouterr().err
+    assert run("nothing_*.mcap", "-o", "a.csv") == 2
+    assert "no such file or folder: `nothing_*.mcap`" in capfd.readouterr().err
 
 
 def test_a_pipe_gets_the_stream_format(recording):
