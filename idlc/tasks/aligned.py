@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,8 @@ def write_aligned(
     except RecordingError:
         raise
     except ValueError as error:
-        hint = f"`idlc show {options.recordings[0]} TOPIC` lists the fields"
+        words = shlex.join(("idlc", "show", options.recordings[0], *dict.fromkeys(names)))
+        hint = f"`{words}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
         return
     style = _style(options)

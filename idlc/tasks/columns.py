@@ -6,6 +6,7 @@ import json
 import os
 import re
 import secrets
+import shlex
 import sys
 import warnings
 from base64 import b64encode
@@ -430,7 +431,8 @@ def _written(
             fields=options.fields, flat=flat, datetimes=options.datetimes, each=options.each
         )
     except ValueError as error:
-        hint = f"`idlc show {options.recordings[0]} {name}` lists the fields"
+        words = shlex.join(("idlc", "show", options.recordings[0], name))
+        hint = f"`{words}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
         return
 

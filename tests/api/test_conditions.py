@@ -3,6 +3,7 @@
 import operator
 import pickle
 from datetime import timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -182,3 +183,8 @@ def test_columns_takes_conditions(tmp_path, monkeypatch, capsys):
     }.items():
         assert main([*words, text]) == 2
         assert problem in capsys.readouterr().err
+    Path("a b").mkdir()
+    Path("rec.mcap").rename("a b/rec.mcap")
+    for more in (["/joints", "--where", "positoin > 1"], ["/joints:positoin", "--grid", "1s"]):
+        assert main(["columns", "a b/rec.mcap", *more, "-o", "b.csv"]) == 2
+        assert "`idlc show 'a b/rec.mcap' /joints` lists" in capsys.readouterr().err

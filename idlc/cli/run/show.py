@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 
@@ -111,4 +112,5 @@ def run(
     elif style in ("json", "text"):
         _recording(subject, style, scope, report)
     else:
-        raise click.UsageError(f"--format {style} needs a topic; `idlc show {subject}` lists them")
+        command = shlex.join(("idlc", "show", subject))
+        raise click.UsageError(f"--format {style} needs a topic; `{command}` lists them")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import tempfile
 import weakref
@@ -225,7 +226,7 @@ def open_recording(
     if not is_local(path):
         return Container(str(path), [McapFile(path, index, check, strict=strict)])
     if is_address(str(path)):
-        hint = f"record it first: `idlc record {path} -o robot.mcap`"
+        hint = f"record it first: `idlc record {shlex.quote(str(path))} -o robot.mcap`"
         raise RecordingError(f"`{path}` is the address of a robot", hint)
     path = Path(path)
     if not path.is_dir():
@@ -318,13 +319,16 @@ def is_db3(path: Path) -> bool:
         hint = "`git lfs pull` downloads it"
         raise DamageError(f"`{path}` is a pointer of Git LFS to a recording", hint)
     if start.startswith(GIT_ANNEX):
-        hint = f"`git annex get {path}` downloads it"
+        hint = f"`git annex get {shlex.quote(str(path))}` downloads it"
         raise DamageError(f"`{path}` is a pointer of git-annex to a recording", hint)
     if start.startswith(b"#ROSBAG"):
-        hint = f"convert it: `rosbags-convert --src {path} --dst {path.with_suffix('')}`"
+        places = ("--src", str(path), "--dst", str(path.with_suffix("")))
+        hint = f"convert it: `{shlex.join(('rosbags-convert', *places))}`"
         raise RecordingError(f"`{path}` is a recording of ROS 1, which idlc does not read", hint)
     if start.startswith(ZSTD_MAGIC):
-        raise RecordingError(f"`{path}` is compressed as a whole", f"zstd -d {path}")
+        raise RecordingError(
+            f"`{path}` is compressed as a whole", f"zstd -d {shlex.quote(str(path))}"
+        )
     kind = DamageError if path.suffix in bag.SUFFIXES else RecordingError
     raise kind(f"`{path}` is not an MCAP or .db3 recording", hint)
 
