@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from idlc.diagnostics.report import Report
-from idlc.project.find import is_address
 from idlc.project.root import Root
 from idlc.recordings.load import LoadedPackages, loaded
 from idlc.recordings.types import RecordingTopics, read_topics
+from idlc.recordings.words import is_address
 
 
 def read_source(

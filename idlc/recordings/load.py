@@ -19,7 +19,6 @@ from idlc.model import ir
 from idlc.model.distros import BY_NAME, DISTROS, Distro, titles
 from idlc.model.python_names import class_
 from idlc.model.type_data import content
-from idlc.project.find import is_path
 from idlc.project.library import resolve
 from idlc.project.requests import requested_packages
 from idlc.project.root import Root
@@ -27,7 +26,6 @@ from idlc.project.settings import Config, Scope, scope
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
-from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import KnownVersion, fits
 from idlc.recordings.memory import (
     ModelsByName,
@@ -47,6 +45,7 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
+from idlc.recordings.words import read_word
 from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import Structure, Types, structure_of
 
@@ -133,7 +132,8 @@ def _models_of(
 ) -> tuple[ModelsByName, Iterable[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
     where = scope(Config(root=Root.here()), None, include, distro=distro)
-    if is_recording(what, where.root):
+    meaning = read_word(what, where.root, "name")
+    if meaning == "recording":
         groups = versions(topics_of(read, [what], (), where.root, report) or ())
         check_versions(groups, report)
         if len(groups) != 1:
@@ -141,7 +141,7 @@ def _models_of(
         types = recorded_types(groups[0], LocalTypes(where, report), Report())
         report.extend(types.errors)
         return types.models, {topic.interface for topic in types.topics}
-    if is_path(what, where.root):
+    if meaning == "path":
         packages = requested_packages([what], [], "", where, report)
         names = [name for package in packages for name in package.names]
         compiler = Compiler(library_for(packages, where, report))

@@ -23,7 +23,6 @@ from idlc.model.ir import content
 from idlc.model.link import Model
 from idlc.model.lowering.lower import lower
 from idlc.project import inputs
-from idlc.project.find import is_address
 from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -32,7 +31,7 @@ from idlc.recordings.containers.file import CDR, Topic, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.damage import Damage
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
-from idlc.recordings.find import is_there
+from idlc.recordings.words import is_address, is_there
 from idlc.wire.layout import oversized
 
 #: The number of versions that a topic is compared with.

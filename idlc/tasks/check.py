@@ -67,7 +67,7 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
     edits are made in memory only.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
-        from idlc.recordings.find import split_recordings
+        from idlc.recordings.words import split_recordings
 
         recordings, others = split_recordings(options.paths, options.scope.root)
         if recordings:

@@ -23,7 +23,7 @@ from idlc.packaging.facts import home_of
 from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
-from idlc.project.find import is_path, root_of, unread_idl
+from idlc.project.find import root_of, unread_idl
 from idlc.project.library import InterfaceTexts, Library, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
@@ -34,7 +34,7 @@ from idlc.project.requests import (
 )
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
-from idlc.recordings.find import split_recordings
+from idlc.recordings.words import read_words
 from idlc.version import __version__
 
 
@@ -106,9 +106,8 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
 def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     root = options.scope.root
-    recordings, others = split_recordings(options.paths, root)
-    paths = [word for word in others if not is_name(word, root)]
-    words = [word for word in others if is_name(word, root)]
+    meant = read_words(options.paths, root)
+    recordings, paths, words = meant["recording"], meant["path"], meant["name"]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
     texts: InterfaceTexts = {}
     if recordings and not report.had_errors:
@@ -177,12 +176,6 @@ def _targets(
         home = next(iter(package.folders), None) if package.borrowed else package.home
         overlays.append(Overlay(prefix, package.package, home, output))
     return tuple(overlays) if overlays[0].usable() else ()
-
-
-def is_name(word: str, root: Root) -> bool:
-    """Return whether a word means a type, or a package, rather than a path that is not there."""
-    last = word.rpartition("/")[2]
-    return not is_path(word, root) and ("/" not in word or not last[:1].islower())
 
 
 def named_packages(

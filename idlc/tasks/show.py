@@ -18,10 +18,10 @@ from idlc.model.distros import later
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import find, is_path
+from idlc.project.find import find
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
-from idlc.recordings.find import split_recordings
+from idlc.recordings.words import read_words
 
 if TYPE_CHECKING:
     from idlc.recordings.definitions import RecordedDefinition
@@ -79,19 +79,17 @@ def requested_models(
 
     Interfaces with errors are left out.
     """
-    paths = [target for target in targets if is_path(target, scope.root)]
-    for target in targets:
-        if target not in paths:
-            problems = Report()
-            yield from _named(target, scope, problems)
-            report.extend(problems)
-    recordings, paths = split_recordings(paths, scope.root)
-    if recordings:
+    meant = read_words(targets, scope.root, "name")
+    for name in meant["name"]:
+        problems = Report()
+        yield from _named(name, scope, problems)
+        report.extend(problems)
+    if recordings := meant["recording"]:
         from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_models
 
         yield from recorded_models(read_source, recordings, scope, report)
-    if paths:
+    if paths := meant["path"]:
         problems = Report()
         files = find(paths, scope.root, problems, scope.exclude)
         packages = inputs.packages(files, scope, problems)

@@ -32,7 +32,6 @@ _ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTAL
 _SUBMODULE = b"160000"
 _NAMES = "`git branch --all` and `git tag` list the revisions; `git fetch` updates them"
 _DAMAGED = "`git fsck` lists missing or damaged objects"
-GIT = "git:"
 
 
 class Revision(NamedTuple):

@@ -14,17 +14,14 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.formats import notice
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import counted
-from idlc.project.find import is_address
 from idlc.project.git import commit
 from idlc.project.root import Root
 from idlc.project.settings import Config, scope, settings_here
-from idlc.recordings.find import recordings_of
+from idlc.recordings.words import is_address, read_version, recordings_of
 from idlc.tasks.breaking.files import BreakingOptions, Verdict, breaking
 from idlc.tasks.breaking.recordings import RecordedVerdict, compare_with_recordings
 from idlc.versions import packages
 from idlc.versions.changes import LEVELS
-from idlc.versions.distribution import is_distro
-from idlc.versions.revision import GIT
 
 if TYPE_CHECKING:
     from idlc.tasks.breaking.graph import GraphVerdict
@@ -160,7 +157,7 @@ def _comparison(
 ) -> BreakingOptions:
     """Return the comparison of the paths, else of those in the settings, else of this folder."""
     paths = paths or settings.paths
-    if not paths and not is_distro(against):
+    if not paths and read_version(against, settings.root).meaning != "distribution":
         paths = (".",)
     return BreakingOptions(
         paths=paths,
@@ -184,9 +181,8 @@ def _compare_files(
     import msgspec
 
     against = comparison.against
-    if is_distro(against) or against.startswith(GIT):
+    if read_version(against, settings.root).meaning in ("revision", "distribution"):
         return breaking(comparison, report)
-
     recordings, newer, files = recordings_of(against, paths, settings.root)
     if not recordings:
         return breaking(comparison, report)

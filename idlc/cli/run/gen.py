@@ -15,10 +15,10 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Paint, counted, summary
 from idlc.diagnostics.text import one_line
-from idlc.project.find import Stamp, is_address, is_path, list_files, snapshot, stamps
+from idlc.project.find import Stamp, list_files, snapshot, stamps
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope, settings_here
-from idlc.recordings.find import files, split_recordings
+from idlc.recordings.words import files, is_address, read_words
 from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
 
 if TYPE_CHECKING:
@@ -156,9 +156,9 @@ def _refuse_what_has_no_effect(request: GenOptions, package: str | None) -> None
         raise click.UsageError(message)
     root = request.scope.root
     judged = request.paths if package or request.topics else ()
-    recordings, others = split_recordings(judged, root)
-    if request.topics and not recordings:
+    meant = read_words(judged, root)
+    if request.topics and not meant["recording"]:
         raise click.UsageError("--topic needs a recording")
-    if package and not any(is_path(word, root) for word in others):
-        what = "a recording" if recordings else "an installed package"
+    if package and not meant["path"]:
+        what = "a recording" if meant["recording"] else "an installed package"
         raise click.UsageError(f"--package applies to files, but {what} keeps its own package name")

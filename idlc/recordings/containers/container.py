@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
 
 from msgspec.structs import replace
 
-from idlc.project.find import is_address
 from idlc.recordings.containers import bag, db3, records
 from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.db3 import Db3File
@@ -27,6 +26,7 @@ from idlc.recordings.containers.file import (
 from idlc.recordings.containers.mcap import McapFile
 from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes, is_local
 from idlc.recordings.damage import Damage
+from idlc.recordings.words import is_address
 
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import TopicMessages, Window

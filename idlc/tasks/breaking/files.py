@@ -33,8 +33,9 @@ from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Config, Scope
+from idlc.recordings.words import VersionWord, read_version
 from idlc.versions.changes import LEVELS, Change
-from idlc.versions.distribution import compare_with_distro, is_distro
+from idlc.versions.distribution import compare_with_distro
 from idlc.versions.packages import (
     Allowance,
     Comparison,
@@ -47,7 +48,7 @@ from idlc.versions.packages import (
     part_to_raise,
     raised,
 )
-from idlc.versions.revision import GIT, Revision, checked_out, is_revision
+from idlc.versions.revision import Revision, checked_out, is_revision
 from idlc.wire.layout import oversized
 
 #: The inputs of packages.
@@ -100,7 +101,8 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     root, exclude = options.scope.root, options.scope.exclude
     listing = list_files(options.paths, root, report, exclude)
     packages = inputs.packages(listing.files, options.scope, report)
-    comparison = None if report.had_errors else _against(options, packages, report)
+    version = read_version(options.against, root)
+    comparison = None if report.had_errors else _against(options, version, packages, report)
     if comparison is None:
         return None
     if listing.empty and not (comparison.differs or report.had_errors):
@@ -111,13 +113,13 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     skipped = report_skipped(comparison.skipped, options, report)
     # unused allowances may be for what was skipped
     judged = judge(comparison.changes, options, report, is_all=is_complete)
-    is_version = is_complete and not is_distro(options.against)
+    is_version = is_complete and version.meaning != "distribution"
     part = part_to_raise(comparison) if is_version else None
-    version = _version(packages, root, report)
-    following = raised(version, part) if version and part else None
+    current = _version(packages, root, report)
+    following = raised(current, part) if current and part else None
     allowed = judged.allowed + sum(len(each.names) for each in comparison.skipped) - len(skipped)
     facts = comparison.additions, skipped, judged.hidden, comparison.compared
-    return Verdict(judged.levels, allowed, part, version, following, *facts)
+    return Verdict(judged.levels, allowed, part, current, following, *facts)
 
 
 def report_skipped(
@@ -192,17 +194,18 @@ def not_allowed(
     return tuple(change for at, change in enumerate(changes) if at not in allowed)
 
 
-def _against(options: BreakingOptions, packages: Packages, report: Report) -> Comparison | None:
-    if is_distro(options.against):
-        comparison = compare_with_distro(options.against, packages, options.scope, report)
+def _against(
+    options: BreakingOptions, version: VersionWord, packages: Packages, report: Report
+) -> Comparison | None:
+    if version.meaning == "distribution":
+        comparison = compare_with_distro(version.name, packages, options.scope, report)
         if comparison and not (comparison.compared or comparison.additions):
             reason = "the interfaces use no standard interface"
             report_nothing(options, reason, "without PATH, idlc compares all of them", report)
             return None
         return comparison
-    if options.against.startswith(GIT):
-        name = options.against.removeprefix(GIT)
-        with checked_out(name, options.paths[0], options.scope.root, report) as revision:
+    if version.meaning == "revision":
+        with checked_out(version.name, options.paths[0], options.scope.root, report) as revision:
             comparison = revision and _compare(options, packages, revision, report)
         prefix = f"{options.against}:"
         return comparison and comparison.placed(lambda path: path.removeprefix(prefix))
@@ -210,7 +213,7 @@ def _against(options: BreakingOptions, packages: Packages, report: Report) -> Co
         return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
         message = f"no such file or folder: `{options.against}`"
-        hint = f"for the git revision, use `--against {GIT}{options.against}`"
+        hint = f"for the git revision, use `--against git:{options.against}`"
         report.add(codes.NO_SUCH_PATH.of(options.against, message, hint=hint))
         return None
     return _compare(options, packages, None, report)
@@ -544,10 +547,12 @@ class Baseline:
 
     def __init__(self, folder: Path, wished: str, settings: Config, scope: Scope) -> None:
         ignored = Report()  # `idlc breaking` reports problems of its table
-        version = wished or against(settings, ignored) or ""
-        comparable = version.startswith(GIT) or (bool(version) and is_folder(folder / version))
+        name = wished or against(settings, ignored) or ""
+        version = read_version(name, scope.root)
+        self._revision = version.name if version.meaning == "revision" else None
+        comparable = self._revision or (bool(name) and is_folder(folder / name))
         self._folder = folder
-        self.name = version if comparable else ""
+        self.name = name if comparable else ""
         self._options = BreakingOptions((), self.name, scope, allowed=allowances(settings, ignored))
         self.commit: str | None = None
         self._side: Side | None = None
@@ -562,9 +567,8 @@ class Baseline:
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = msgspec.structs.replace(self._options, paths=paths, scope=scope)
             side = None
-            if paths and self.name.startswith(GIT):
-                name = self.name.removeprefix(GIT)
-                with checked_out(name, paths[0], scope.root, report) as revision:
+            if paths and self._revision:
+                with checked_out(self._revision, paths[0], scope.root, report) as revision:
                     side = revision and _before(options, packages, revision, report)
             elif paths and self.name:
                 side = _before(options, packages, None, report)
@@ -579,10 +583,9 @@ class Baseline:
 
     def has_moved(self) -> bool:
         """Return whether the name refers to another commit than at the last call."""
-        if not self.name.startswith(GIT):
+        if not self._revision:
             return False
-        name = self.name.removeprefix(GIT)
-        before, self.commit = self.commit, git.commit(name, self._folder) or ""
+        before, self.commit = self.commit, git.commit(self._revision, self._folder) or ""
         if before == self.commit:
             return False
         self._side = None

@@ -22,9 +22,10 @@ from idlc.model import ir
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import is_address, list_files, no_interfaces
+from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
+from idlc.recordings.words import is_address
 from idlc.robot.keys import Entity as RobotEntity
 from idlc.robot.keys import EntityKind
 from idlc.robot.live.connect import (

@@ -25,8 +25,9 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.templates import RenderedFile, html, verbatim
 from idlc.project.write import apply, owned_files, plan
+from idlc.recordings.words import read_word
 from idlc.tasks.docs.view import KINDS, Home, PagePaths, Paragraph, blocks, page, prefix, words
-from idlc.tasks.gen import is_name, named_packages
+from idlc.tasks.gen import named_packages
 
 
 class About(NamedTuple):
@@ -237,9 +238,9 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
 
 
 def _packages(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:
-    names = [word for word in words if is_name(word, scope.root)]
+    names = [word for word in words if read_word(word, scope.root) == "name"]
     named = named_packages(names, scope, report, whole=False)
-    paths = [word for word in words if not is_name(word, scope.root)]
+    paths = [word for word in words if word not in names]
     if not paths or report.had_errors:
         return tuple(named)
     files = find(paths, scope.root, report, scope.exclude)

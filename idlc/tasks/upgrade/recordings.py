@@ -21,7 +21,7 @@ from idlc.diagnostics.report import Label, Report, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model import ir
 from idlc.project.files import is_folder
-from idlc.project.find import RULES, is_address
+from idlc.project.find import RULES
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.columns import unread_bytes
@@ -37,7 +37,6 @@ from idlc.recordings.containers.file import CDR, MSG
 from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import definition_text, interface_of
-from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import SAMPLE, WRONG_DEFINITION, check_lengths, first_longer
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
@@ -50,14 +49,13 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
+from idlc.recordings.words import is_address, read_version
 from idlc.runtime.typeinfo import Structure
 from idlc.tasks.upgrade.targets import UpgradeTarget, compiled, target_of
 from idlc.versions.conversion import FieldFate, Plan, Version, make_plan
 from idlc.versions.converters import RunRules
-from idlc.versions.distribution import PREFIX
 from idlc.versions.exact import Payloads
 from idlc.versions.meanings import renumbered
-from idlc.versions.revision import GIT
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 if TYPE_CHECKING:
@@ -174,10 +172,7 @@ def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalT
     scope = options.scope
     if options.old is None:
         return LocalTypes(scope, report)
-    is_folder_of_packages = options.to is not None and not (
-        options.to.startswith((GIT, PREFIX)) or is_recording(options.to, scope.root)
-    )
-    if options.to is not None and is_folder_of_packages:
+    if options.to is not None and read_version(options.to, scope.root).meaning in ("path", "name"):
         # a revision of what `--to` names
         scope = msgspec.structs.replace(scope, paths=(options.to,))
     old = opened.enter_context(target_of(options.old, scope, report))

@@ -9,21 +9,19 @@ from typing import Any, cast
 
 from idlc.api.sources import read_source
 from idlc.compiler.compiler import Compiler, sources_of
-from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
-from idlc.model.distros import BY_NAME, Distro, unknown_distro
+from idlc.model.distros import Distro
 from idlc.project import inputs
 from idlc.project.find import InterfaceFile, list_files, no_interfaces, unread_idl
 from idlc.project.library import IDL, InterfaceTexts, Library
 from idlc.project.package_xml import declared_name
 from idlc.project.settings import Scope
-from idlc.recordings.find import is_recording
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import topics_of, versions
-from idlc.versions.distribution import PREFIX, is_distro
-from idlc.versions.revision import GIT, checked_out
+from idlc.recordings.words import VersionWord, read_distro, read_version
+from idlc.versions.revision import checked_out
 from idlc.wire.layout import oversized
 
 
@@ -104,21 +102,20 @@ def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[UpgradeT
         folders = inputs.nearby_packages(scope.root)
         homes = {package: places[0] for package, places in folders.items() if places}
         yield UpgradeTarget(scope, {}, homes)
-    elif is_distro(to):
-        name = to.removeprefix(PREFIX)
-        if name not in BY_NAME:
-            message = f"no such distribution: `{name}`"
-            report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
-        yield UpgradeTarget(scope, {}, {}, distro=BY_NAME[name]) if name in BY_NAME else None
-    elif to.startswith(GIT):
-        paths = scope.paths or (".",)
-        with checked_out(to.removeprefix(GIT), paths[0], scope.root, report) as revision:
-            files = revision.files(paths, scope.exclude, report) if revision else ()
-            yield _of_files(files, scope, report) if revision else None
-    elif is_recording(to, scope.root):
-        yield _of_recording(to, scope, report)
-    else:
-        yield _of_path(to, scope, report)
+        return
+    match read_version(to, scope.root):
+        case VersionWord("distribution", name):
+            distro = read_distro(name, report)
+            yield UpgradeTarget(scope, {}, {}, distro=distro) if distro else None
+        case VersionWord("revision", name):
+            paths = scope.paths or (".",)
+            with checked_out(name, paths[0], scope.root, report) as revision:
+                files = revision.files(paths, scope.exclude, report) if revision else ()
+                yield _of_files(files, scope, report) if revision else None
+        case VersionWord("recording"):
+            yield _of_recording(to, scope, report)
+        case _:
+            yield _of_path(to, scope, report)
 
 
 def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
