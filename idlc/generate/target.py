@@ -215,7 +215,7 @@ class Target:
         """Report IDL616 for each file that is not what the command `again` would write."""
         hint = f"run `{again}`"
         if self.lock is None:
-            if self.report.had_errors:
+            if self.report.had_errors:  # the lock may be damaged
                 return
             message = f"`{self.name}` has no {self.home}{FILE} to compare with"
             self.report.add(codes.DRIFT.of(self.name, message, hint=hint))

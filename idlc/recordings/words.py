@@ -68,12 +68,12 @@ def read_version(word: str, root: Root) -> VersionWord:
     return VersionWord(read_word(word, root), word)
 
 
-def read_distro(name: str, report: Report) -> Distro | None:
-    """Return the distribution of a name; report IDL630 and return `None` if there is none."""
-    if name not in BY_NAME:
-        message = f"no such distribution: `{name}`"
-        report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
-    return BY_NAME.get(name)
+def read_distro(name: str, report: Report) -> Distro:
+    """Return the distribution of a name; report IDL630 and raise if there is none."""
+    if name in BY_NAME:
+        return BY_NAME[name]
+    message = f"no such distribution: `{name}`"
+    raise report.refused(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
 
 
 def is_address(word: str) -> bool:

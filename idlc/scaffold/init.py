@@ -21,7 +21,7 @@ from idlc.check.installation import check_setup, uninstalled_marker
 from idlc.check.select import selection
 from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, apply
+from idlc.diagnostics.report import Report, ReportedError, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.generate.package import NUMPY, Generated
 from idlc.generate.python.fields import number_info
@@ -110,11 +110,12 @@ class Draft:
     def put(self, path: str, outcome: Outcome | str, reason: str) -> None:
         """Give a file its text, which may be what it has; a refusal is reported."""
         outcome = Edited(outcome) if isinstance(outcome, str) else outcome
-        accepted = self.project.accepted({path: outcome})
-        if accepted and accepted[path] != self.text(path):
-            self._before.setdefault(path, self.project.text(path))
-            self._texts[path] = accepted[path]
-            self.reasons.setdefault(path, reason)
+        with suppress(ReportedError):  # so that a plan reports all refusals
+            text = self.project.accepted({path: outcome})[path]
+            if text != self.text(path):
+                self._before.setdefault(path, self.project.text(path))
+                self._texts[path] = text
+                self.reasons.setdefault(path, reason)
 
     def _source(self, path: str) -> Source | None:
         """Return a file as it will be, with its name for reports."""
@@ -134,8 +135,8 @@ class Draft:
             texts[self.path / path] = marked(text, old if isinstance(old, bytes) else b"")
         return Root(self.path, texts)
 
-    def write(self, report: Report, *, dry_run: bool = False) -> ScaffoldResult | None:
-        """Write all files or none, or only show the changes.
+    def write(self, report: Report, *, dry_run: bool = False) -> ScaffoldResult:
+        """Write all files or none, or only show the changes. Raises ReportedError.
 
         Reports IDL612 for a file that was edited since the changes were planned.
         """
@@ -145,8 +146,7 @@ class Draft:
             if project.text(path) != before:
                 message = f"`{path}` was changed while idlc was running"
                 report.add(codes.CANNOT_WRITE.of(path, message, hint="run it again"))
-        if report.had_errors:
-            return None
+        report.raise_errors()
         new = {path: text for path, text in self._texts.items() if not project.has(path)}
         return project.write(new, {p: text for p, text in self._texts.items() if p not in new})
 
@@ -214,8 +214,8 @@ def prepare(
     settings: ScaffoldOptions,
     report: Report,
     around: Mapping[str, Path] = MappingProxyType({}),
-) -> Preparation | None:
-    """Plan the changes to the package of a root; `None` after an error.
+) -> Preparation:
+    """Plan the changes to the package of a root. Raises ReportedError.
 
     `around` are the folders of other packages by name, which may define types that it uses.
     """
@@ -223,8 +223,7 @@ def prepare(
     if layout.kind == "empty":
         _new_package(layout, draft)
     config = load_settings(draft.root(), report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     # settings of a folder around this one are for other packages
     chosen = _Chosen()
     if config.folder == layout.folder:
@@ -233,27 +232,24 @@ def prepare(
     if not _is_below(layout.folder, out):
         message = f"the folder for the classes is outside this folder: `{out}`"
         hint = "set `out` in [tool.idlc] to a folder below it, then run `idlc init` again"
-        report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
-        return None
+        raise report.refused(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
     paths = [path for path in chosen.paths if is_folder(layout.folder / path)] or ["."]
     places = _places(draft, layout, paths, chosen.paths, report)
     if places:
         included = [] if config.include else _included(settings.root, paths, around)
         plain = {} if _is_set(draft, layout, chosen) else {"paths": places, "out": out}
         _settings(draft, layout, plain, included)
-    compiled = _compiled(draft.root(), layout, paths, report)
-    if compiled is None:
-        return None
-    inputs, model = compiled
+    inputs, model = _compiled(draft.root(), layout, paths, report)
     notes = _built(draft, layout, inputs, model, out, report)
     _ignored(draft, layout, out)
-    draft.write(report, dry_run=True)  # which reports links and others that are in the way
+    with suppress(ReportedError):  # which reports links and others that are in the way
+        draft.write(report, dry_run=True)
     _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
     module = module_of(out) if layout.kind == "library" else layout.name
     classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
     is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
-    plan = Preparation(layout, draft, out, classes, notes, is_packed)
-    return None if report.had_errors else plan
+    report.raise_errors()
+    return Preparation(layout, draft, out, classes, notes, is_packed)
 
 
 class _Chosen(NamedTuple):
@@ -289,11 +285,12 @@ def _is_below(folder: Path, path: str) -> bool:
 
 def _compiled(
     root: Root, layout: Layout, paths: Sequence[str], report: Report
-) -> tuple[Inputs, Model] | None:
-    """Return the package with its model; `None` after errors or without interfaces."""
+) -> tuple[Inputs, Model]:
+    """Return the package with its model. Raises ReportedError, also without interfaces."""
     where = scope(load_settings(root, report))
     found = list_files(paths, root, report, where.exclude)
-    read = () if report.had_errors else packages(found.files, where, report)
+    report.raise_errors()
+    read = packages(found.files, where, report)
     inner = [each for each in read if each.home != layout.folder and root.manifest(each.home)]
     for each in inner:  # its classes would become part of this package
         place = root.shown(each.home)
@@ -304,8 +301,9 @@ def _compiled(
     problems = Report()
     compiled = [*models_of(read, where, problems)] if read else []
     report.extend(problems.errors)  # `idlc check` shows the others
-    if report.had_errors or not compiled:
-        return None
+    report.raise_errors()
+    if not compiled:
+        raise ReportedError
     return next((each for each in compiled if each[0].package == layout.name), compiled[0])
 
 
@@ -683,8 +681,8 @@ def _with_lines(text: str | None, lines: Iterable[str]) -> str:
     return text + "".join(f"{line}{ending}" for line in lines if line not in present)
 
 
-def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
-    """Plan the file by which a service checks the repository; `None` after a report."""
+def continuous(service: str, layout: Layout, report: Report) -> Draft:
+    """Plan the file by which a service checks the repository. Raises ReportedError."""
     top = git.repository_of(layout.folder) or layout.folder
     path, template = SERVICES[service]
     # what CMake's packages generate for Python is not committed, and others name their folder
@@ -700,8 +698,7 @@ def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
         return draft
     message = f"`{path}` exists, and idlc does not edit it"
     hint = "add the missing lines"
-    report.add(codes.EXISTING_FILE.of(path, message, hint=hint, detail=text.rstrip()))
-    return None
+    raise report.refused(codes.EXISTING_FILE.of(path, message, hint=hint, detail=text.rstrip()))
 
 
 def obtaining(draft: Draft) -> list[str]:

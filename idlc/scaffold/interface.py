@@ -123,11 +123,9 @@ def interface(
     fields: Sequence[str],
     settings: ScaffoldOptions,
     report: Report,
-) -> ScaffoldResult | None:
-    """Write an interface file into the package that the working folder belongs to."""
+) -> ScaffoldResult:
+    """Write an interface file into the package of the working folder. Raises ReportedError."""
     project = find_package(settings, report)
-    if project is None:
-        return None
     own = project.package
     path = f"{kind}/{name}.{kind}"
     text = interface_text(kind, fields)
@@ -135,8 +133,7 @@ def interface(
     source = Source(project.shown(path), text)
     named = [(ir.TypeName(own, kind, name), source)]
     model = compile_package(own, named, project.library(), report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     added = {path: text}
     has_settings = "[tool.idlc]" in (project.text("pyproject.toml") or "")
     if has_settings and not project.has(TEST):
@@ -154,13 +151,11 @@ def interface(
         wired = add_interfaces(setup, own, keys, folders(project.path))
         edits[SETUP] = Edited(wired)
     edited = project.accepted(edits)
-    if edited is None:
-        return None
     if cmake is None:  # the file by which ROS 2's tools know a package's interfaces: language 9
         edited[f"resource/rosidl_interfaces/{own}"] = "".join(f"{key}\n" for key in sorted(keys))
     result = project.write(added, edited)
     after = project.generation() if cmake is None else ()
-    return result and result._replace(following=after)
+    return result._replace(following=after)
 
 
 def add_interfaces(

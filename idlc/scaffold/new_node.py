@@ -159,22 +159,18 @@ def _tests(planned: NodePlan) -> str:
     return TESTS if planned.short else ROBUST_TESTS
 
 
-def node(
-    requested: spec.NodeSpec, settings: ScaffoldOptions, report: Report
-) -> ScaffoldResult | None:
-    """Write a node and its test, and add it to the files that list the nodes of its package."""
+def node(requested: spec.NodeSpec, settings: ScaffoldOptions, report: Report) -> ScaffoldResult:
+    """Write a node and its test, and add it to the files that list the nodes of its package.
+
+    Raises ReportedError.
+    """
     project = changes.find_package(settings, report)
-    if project is None:
-        return None
     own, name = project.package, requested.name
     if _is_cmake(project):
-        report.add(_needs_python(project))
-        return None
+        raise report.refused(_needs_python(project))
     home = home_of(project.path, own, settings.root).relative_to(project.path).as_posix()
     load_settings(settings.root, report)  # reports what is wrong with them
     planned = _planned(requested._replace(package=own), project, report)
-    if planned is None or report.had_errors:
-        return None
     entry = NodeEntry({}, {})
     with stage("scaffold", name):
         files = {
@@ -188,10 +184,7 @@ def node(
         keys, present = project.keys(), folders(project.path)
         entry = node_entry(planned, texts, keys=keys, folders=present, home=home)
         entry = entry._replace(added={**files, **entry.added})
-    edited = project.accepted(entry.edits)
-    result = None if edited is None else project.write(entry.added, edited)
-    if result is None:
-        return None
+    result = project.write(entry.added, project.accepted(entry.edits))
     notes = _notes(planned, entry, project)
     used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
     compiled = any(interface.package == own for interface in used_names)
@@ -224,8 +217,8 @@ def _needs_python(project: Project) -> Diagnostic:
     return codes.CANNOT_EDIT.of(project.shown(MANIFEST), message, hint=hint)
 
 
-def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> NodePlan | None:
-    """Return the node with the interfaces of its endpoints; report missing ones."""
+def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> NodePlan:
+    """Return the node with the interfaces of its endpoints; report missing ones, and raise."""
     library = project.library()
     interfaces: list[ir.Interface | None] = []
     messages: dict[ir.TypeName, ir.Message] = {}
@@ -237,9 +230,10 @@ def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> Node
             continue
         problems = Report()
         model = compile_package(name.package, [(name, source)], library, problems)
-        if problems.had_errors:
+        if problems.had_errors:  # the interfaces of other endpoints are judged, too
             report.extend(problems)  # warnings were shown when the interface was written
         else:
             interfaces.append(model.interfaces[name])
             messages.update(model.messages)
-    return None if report.had_errors else plan(requested, interfaces, messages)
+    report.raise_errors()
+    return plan(requested, interfaces, messages)

@@ -150,8 +150,8 @@ def package(
     report: Report,
     starters: Mapping[str, str] | None = None,
     chosen: Collection[str] = (),
-) -> ScaffoldResult | None:
-    """Write a new package, with interfaces if it has none yet.
+) -> ScaffoldResult:
+    """Write a new package, with interfaces if it has none yet. Raises ReportedError.
 
     `chosen` are the fields of `requested`, and `starters`, that the user chose. Reports IDL620
     where files that stay as they are contradict them.

@@ -22,15 +22,13 @@ from idlc.versions.packages import Comparison, combine, compare
 
 def compare_with_distro(
     name: str, packages: Sequence[inputs.Inputs], scope: Scope, report: Report
-) -> Comparison | None:
+) -> Comparison:
     """Return the changes from a distribution's interfaces, the old version, to the local ones.
 
     They are the interfaces that packages refer to; without packages, all built-in ones. Resulting
-    changes of the packages themselves are included. `None` after an error.
+    changes of the packages themselves are included. Raises ReportedError.
     """
     other = read_distro(name, report)
-    if other is None:
-        return None
     library = library_for(packages, scope, report)
     other_library, both = (
         library_for(packages, scope, Report(), kind=partial(_LayeredLibrary, other, other_first))
@@ -39,8 +37,7 @@ def compare_with_distro(
     own = [package for package in packages if not catalog.is_standard(package.package)]
     after = _models(own, both, report)
     before = _models(own, other_library, Report())
-    if report.had_errors:
-        return None
+    report.raise_errors()
     with stage("compare", other.name):
         named = (package.names for package in packages if package not in own)
         used = set[ir.TypeName]().union(*map(_used, after), *named)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.project.root import Root
 from idlc.recordings.words import read_distro, read_version, read_word
 
@@ -62,7 +62,8 @@ def test_a_version_is_read_before_files_are_looked_for(word, version, root):
 
 def test_an_unknown_distribution_is_reported():
     report = Report()
-    assert read_distro("jazy", report) is None
+    with pytest.raises(ReportedError):
+        read_distro("jazy", report)
     ((problem,)) = report
     assert "`jazy`" in problem.message
     assert "jazzy" in str(problem.hint)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +13,7 @@ import click
 from idlc.cli import options, output
 from idlc.diagnostics import codes
 from idlc.diagnostics.formats import notice
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.project.git import commit
 from idlc.project.root import Root
@@ -125,7 +126,9 @@ def run(
     if timeout is not None and not is_running:
         raise click.UsageError("--timeout needs --against graph")
     verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
-    if against is not None and not report.had_errors:
+    with suppress(ReportedError):
+        report.raise_errors()
+        assert against is not None
         comparison = _comparison(paths, against, settings, levels, allowed, scoping)
         if is_running:
             from idlc.tasks.breaking.graph import compare_with_graph
@@ -141,6 +144,7 @@ def run(
 def _committed(root: Root, report: Report) -> str | None:
     """Return what the files of a repository are compared with if nothing is named."""
     for name in ("origin/HEAD", "HEAD"):
+        # settings with errors may have named another version
         if not report.had_errors and commit(name, root.base):
             sys.stderr.write(f"note: idlc compares with `git:{name}`\n")
             return f"git:{name}"
@@ -176,7 +180,7 @@ def _compare_files(
     settings: Config,
     levels: tuple[str, ...],
     report: Report,
-) -> Verdict | RecordedVerdict | None:
+) -> Verdict | RecordedVerdict:
     """Compare with a recording or with a version of the files; `paths` and `levels` are options."""
     import msgspec
 
@@ -189,9 +193,10 @@ def _compare_files(
 
     current = () if newer else files or settings.paths
     comparison = msgspec.structs.replace(comparison, paths=current, levels=levels)
-    verdict = compare_with_recordings(comparison, recordings, newer, report)
-    output.notes(report, sys.stderr)
-    return verdict
+    try:
+        return compare_with_recordings(comparison, recordings, newer, report)
+    finally:
+        output.notes(report, sys.stderr)
 
 
 def _show(

@@ -217,11 +217,10 @@ def _listed(folder: Path) -> dict[str, frozenset[str]]:
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     """Write a site about the interfaces of paths and names; return its number of pages.
 
-    Interfaces with errors, and interfaces that hold these, are left out.
+    Interfaces with errors, and interfaces that hold these, are left out. Raises ReportedError.
     """
     packages = _packages(paths, scope, report)
-    if report.had_errors:
-        return 0
+    report.raise_errors()
     models = [model for model, _ in sound_models(packages, scope, report) if model.own]
     if not models:
         return 0
@@ -241,7 +240,8 @@ def _packages(words: Sequence[str], scope: Scope, report: Report) -> tuple[input
     names = [word for word in words if read_word(word, scope.root) == "name"]
     named = named_packages(names, scope, report, whole=False)
     paths = [word for word in words if word not in names]
-    if not paths or report.had_errors:
+    report.raise_errors()
+    if not paths:
         return tuple(named)
     files = find(paths, scope.root, report, scope.exclude)
     packages = (*inputs.packages(files, scope, report), *named)
