@@ -14,14 +14,15 @@ from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import SETUP_PY
 from idlc.packaging.outcome import Edited, Outcome
 from idlc.packaging.setup_edits import arrange
 from idlc.project.files import entries
 from idlc.project.library import Library
 from idlc.project.lock import Tree, digest
 from idlc.project.package_xml import declared_name
-from idlc.project.root import Root
-from idlc.project.settings import load_settings, scope
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import SETTINGS_FILE, load_settings, scope
 from idlc.project.write import FileChange, WritePlan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, EndpointSpec, Role
 
@@ -105,7 +106,7 @@ class Project:
     def generation(self) -> tuple[str, ...]:
         """Return the words of the command that compiles the package's interfaces."""
         included = [word for folder in self._settings.include for word in ("-I", folder)]
-        if "[tool.idlc]" in (self.text("pyproject.toml") or ""):
+        if "[tool.idlc]" in (self.text(SETTINGS_FILE) or ""):
             return ("gen", *included)
         home = home_of(self.path, self.package, self._settings.root)
         out = self.shown(home.relative_to(self.path).as_posix())
@@ -118,7 +119,7 @@ class Project:
         for path, outcome in edits.items():
             if isinstance(outcome, Edited):
                 edited[path] = outcome.text
-                if path == "setup.py":
+                if path == SETUP_PY:
                     edited[path] = arrange(self.text(path) or "", outcome.text)
                 continue
             place = self.shown(path)
@@ -191,7 +192,7 @@ def find_package(settings: ScaffoldOptions, report: Report) -> Project:
     if path is None:
         message = "this folder is not in a package: no package.xml here or above"
         hint = "run `idlc scaffold package NAME`, then `cd NAME`"
-        raise report.refused(codes.NO_SUCH_PATH.of("package.xml", message, hint=hint))
+        raise report.refused(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
     name = declared_name(path, root, report)
     if name is None:
         raise ReportedError

@@ -29,6 +29,7 @@ from idlc.model import catalog, derive, ir
 from idlc.model.link import Model
 from idlc.packaging import dependencies
 from idlc.packaging.facts import folders
+from idlc.packaging.files import CMAKE_LISTS, SETUP_CFG, SETUP_FILES, SETUP_PY
 from idlc.packaging.layout import layout
 from idlc.packaging.outcome import Edited, Outcome, Refused
 from idlc.packaging.setup_edits import KEYWORD, append_element, step_before_setup
@@ -45,7 +46,7 @@ from idlc.project.settings import SETTINGS_FILE, load_settings, scope, toml
 from idlc.project.templates import code
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult, marked
 from idlc.scaffold.interface import implied_packages, starter
-from idlc.scaffold.layouts import SETUP, Layout, package_of, tool_of
+from idlc.scaffold.layouts import Layout, package_of, tool_of
 from idlc.scaffold.package import LICENSES, Package, package_files
 from idlc.scaffold.proof import GENERATED
 from idlc.tasks.check import check_all, checkers
@@ -124,7 +125,7 @@ class Draft:
 
     def configs(self) -> tuple[Source | None, Source | None]:
         """Return setup.cfg and pyproject.toml."""
-        return self._source("setup.cfg"), self._source(SETTINGS_FILE)
+        return self._source(SETUP_CFG), self._source(SETTINGS_FILE)
 
     def root(self) -> Root:
         """Return a root that sees the changes."""
@@ -448,8 +449,8 @@ def _ament_python(
     if not layout.backend.startswith("setuptools."):
         tool = tool_of(layout.backend)
         return (
-            f"{tool} builds the package, so idlc writes no {SETUP}; for ROS 2's tools, have {tool} "
-            f"install the interfaces into `share/{name}`, and a file that lists them as "
+            f"{tool} builds the package, so idlc writes no {SETUP_PY}; for ROS 2's tools, have "
+            f"{tool} install the interfaces into `share/{name}`, and a file that lists them as "
             f"`{INDEX}/rosidl_interfaces/{name}`"
         )
     marker = f"resource/{name}"
@@ -463,7 +464,7 @@ def _ament_python(
 
 def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) -> str:
     """Have setup.py compile and install the interfaces; return what idlc cannot see."""
-    text, others = draft.text(SETUP), draft.configs()
+    text, others = draft.text(SETUP_PY), draft.configs()
     whole = _SETUP_TEXT.replace("(", f"(name='{name}', ")
     if text is None:
         is_named = any(other and _NAME.search(other.text) for other in others)
@@ -471,33 +472,33 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
     try:
         ast.parse(text.removeprefix(BOM))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        message = f"cannot edit `{SETUP}`: {getattr(error, 'msg', 'it is nested too deeply')}"
-        place = _place(Source(SETUP, text), error)
+        message = f"cannot edit `{SETUP_PY}`: {getattr(error, 'msg', 'it is nested too deeply')}"
+        place = _place(Source(SETUP_PY, text), error)
         hint = "fix it, then run `idlc init` again"
         report.add(codes.CANNOT_EDIT.at(place, message, hint=hint))
         return ""
     existing, problems = folders(draft.path), Report()
     for _ in range(_ROUNDS):
-        source = Source(SETUP, text)
+        source = Source(SETUP_PY, text)
         problems = check_setup(source, name, files, existing, others)
         problems.extend(uninstalled_marker(Setup(source), name))
         new = apply(text, (edit for problem in problems for edit in problem.edits))[0]
         if new == text:
             break
         text = new
-    setup = Setup(Source(SETUP, text))
+    setup = Setup(Source(SETUP_PY, text))
     outcome = _with_keyword(setup, whole)
     if isinstance(outcome, Edited) and outcome.text != text:
-        edited = Source(SETUP, outcome.text)
+        edited = Source(SETUP_PY, outcome.text)
         again = check_setup(edited, name, files, existing, others)
         steps = (edit for problem in again for edit in problem.edits)
         outcome = Edited(apply(edited.text, steps)[0])
-    draft.put(SETUP, outcome, "builds compile the interfaces and install their classes")
+    draft.put(SETUP_PY, outcome, "builds compile the interfaces and install their classes")
     report.extend(problem for problem in problems if not problem.edits)
     view = layout(setup, *others, existing)
     if view is not None and view.installed is not None:
         return ""
-    note = f"idlc does not run {SETUP}, which computes `packages`; a build with idlc adds the "
+    note = f"idlc does not run {SETUP_PY}, which computes `packages`; a build with idlc adds the "
     note += "generated packages; for builds without idlc, write "
     note += (
         f"`packages=find_packages(exclude=['test', 'test.*'])`, or add `{name}` and its subpackages"
@@ -523,7 +524,7 @@ def _ament_cmake(draft: Draft, inputs: Inputs, report: Report) -> None:
     """Fix package.xml and CMakeLists.txt as `idlc check --fix` does; report why no build works."""
     reasons = {
         MANIFEST: "the package declares the packages that its interfaces use",
-        "CMakeLists.txt": "rosidl receives each interface and the packages that it uses",
+        CMAKE_LISTS: "rosidl receives each interface and the packages that it uses",
     }
     for _ in range(_ROUNDS):
         root = draft.root()
@@ -551,13 +552,14 @@ def _place(source: Source, error: BaseException) -> Span:
 
 def _setuptools(draft: Draft, out: str, files: Mapping[str, str], report: Report) -> None:
     """Have setuptools pack the classes, where its configuration would leave them out."""
-    text = draft.text(SETUP)
-    source = Source(SETUP, _PLAIN_SETUP if text is None else text)
+    text = draft.text(SETUP_PY)
+    source = Source(SETUP_PY, _PLAIN_SETUP if text is None else text)
     every = check_setup(source, module_of(out), files, folders(draft.path), draft.configs())
     problems = [each for each in every if each.code == codes.CLASSES_NOT_INSTALLED.id]
     if text is not None:
         edits = (edit for problem in problems for edit in problem.edits)
-        draft.put(SETUP, apply(text, edits)[0], "the wheel contains the classes of the interfaces")
+        reason = "the wheel contains the classes of the interfaces"
+        draft.put(SETUP_PY, apply(text, edits)[0], reason)
     for problem in problems:
         if text is None and problem.span is not None and problem.span.source is source:
             top = out.partition("/")[0]
@@ -581,13 +583,13 @@ def _outdated_builds(draft: Draft, layout: Layout, out: str) -> str:
     if tool == "setuptools" and layout.kind != "library":
         return ""  # setup.py stops the build
     if tool == "setuptools":
-        setup = Setup(Source(SETUP, draft.text(SETUP) or _PLAIN_SETUP))
+        setup = Setup(Source(SETUP_PY, draft.text(SETUP_PY) or _PLAIN_SETUP))
         edits = step_before_setup(setup, out, is_library=True)
         if edits and step not in setup.source.text:
-            draft.put(SETUP, apply(setup.source.text, edits)[0], reason)
+            draft.put(SETUP_PY, apply(setup.source.text, edits)[0], reason)
     elif tool in _HOOKS and (new := _with_setting(text, *_HOOKS[tool], step)):
         draft.put(SETTINGS_FILE, new, reason)
-    if any(step in (draft.text(path) or "") for path in (SETUP, SETTINGS_FILE)):
+    if any(step in (draft.text(path) or "") for path in (SETUP_PY, SETTINGS_FILE)):
         return ""
     return (
         f"{tool} installs the classes that the last `idlc gen` wrote, even if the interfaces have "
@@ -640,7 +642,7 @@ def _numpy(draft: Draft) -> str:
             if toml(new) == wanted and "dependencies" not in project.get("dynamic", ()):
                 draft.put(SETTINGS_FILE, new, reason)
                 return ""
-    elsewhere = (draft.text(path) or "" for path in (SETUP, "setup.cfg", SETTINGS_FILE))
+    elsewhere = (draft.text(path) or "" for path in SETUP_FILES)
     return (
         "" if "numpy" in "".join(elsewhere) else f"{reason}: add it to the library's dependencies"
     )
@@ -665,7 +667,7 @@ def _ignored(draft: Draft, layout: Layout, out: str) -> None:
     if layout.kind != "library":
         del lines[1]
     step = f"{out}/{BUILD_STEP}"
-    if not any(step in (draft.text(path) or "") for path in (SETUP, SETTINGS_FILE)):
+    if not any(step in (draft.text(path) or "") for path in (SETUP_PY, SETTINGS_FILE)):
         lines = [line for line in lines if step not in line]
     attributes = draft.text(".gitattributes")
     reason = "reviews hide generated code"

@@ -20,6 +20,7 @@ from idlc.diagnostics.source import Source
 from idlc.diagnostics.terminal import counted
 from idlc.model.names import is_module_name, why_not_package
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import CMAKE_LISTS, SETUP_PY
 from idlc.packaging.layout import SETUPTOOLS, build_backend
 from idlc.project.files import entries, is_file
 from idlc.project.find import CLOSING, KIND_FOLDERS, NOTHING, list_files
@@ -29,7 +30,6 @@ from idlc.project.settings import SETTINGS_FILE, broken_toml, load_settings, sco
 
 LayoutKind: TypeAlias = Literal["ament_python", "ament_cmake", "library", "empty", "workspace"]
 
-SETUP = "setup.py"
 #: Files that may lie in a folder in which a package begins, and in a package's `src`.
 _PLAIN = re.compile(r"(?i)\..*|(readme|licen[cs]e|copying|notice)\b.*|pyproject\.toml")
 #: Folders of a project that hold no library.
@@ -90,7 +90,7 @@ def layout_of(root: Root, report: Report) -> Layout:
         return Layout("workspace", folder, packages=listing.packages)
     if is_project:
         return _library(root, document, report)
-    if is_file(folder / SETUP):
+    if is_file(folder / SETUP_PY):
         return _library(root, {}, report)
     return _empty(root, report)
 
@@ -131,7 +131,7 @@ def _of_manifest(root: Root, report: Report) -> Layout:
     if types == ["ament_python"]:
         home = home_of(folder, name, root).relative_to(folder).as_posix()
         return Layout("ament_python", folder, name, home, backend=_backend(root, report))
-    if types in ([], ["ament_cmake"]) and is_file(folder / "CMakeLists.txt"):
+    if types in ([], ["ament_cmake"]) and is_file(folder / CMAKE_LISTS):
         return Layout("ament_cmake", folder, name, f"build/{name}")
     kind = f"of the build type `{types[0]}`" if types else "without a build type"
     message = f"`{name}` is a package {kind}, but idlc only sets up ament_python and ament_cmake"
@@ -142,7 +142,7 @@ def _of_manifest(root: Root, report: Report) -> Layout:
 def _backend(root: Root, report: Report) -> str:
     """Return the build backend of an ament_python package; colcon runs a setup.py first."""
     source = None
-    if is_file(root.base / SETTINGS_FILE) and not is_file(root.base / SETUP):
+    if is_file(root.base / SETTINGS_FILE) and not is_file(root.base / SETUP_PY):
         source = root.read_source(SETTINGS_FILE, SETTINGS_FILE, report)
     document: dict[str, Any] = {}
     with suppress(ValueError):  # the settings in it are reported later
@@ -174,7 +174,7 @@ def _library(root: Root, document: dict[str, Any], report: Report) -> Layout:
         name = name or own or PurePosixPath(out).parent.name  # without an __init__.py
         home = str(PurePosixPath(out).parent) if out else f"{base}{name}"
         return Layout("library", folder, name, home, backend)
-    place = SETTINGS_FILE if document else SETUP
+    place = SETTINGS_FILE if document else SETUP_PY
     raise report.refused(_unclear_library(root, place, base, names))
 
 

@@ -15,9 +15,11 @@ from idlc.diagnostics.source import Source, Span
 from idlc.generate.target import build_step
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
+from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
 from idlc.project.lock import BUILD_STEP
 from idlc.project.package_xml import statements
-from idlc.project.settings import load_settings, scope
+from idlc.project.root import MANIFEST
+from idlc.project.settings import SETTINGS_FILE, load_settings, scope
 from idlc.project.templates import Code, EscapedText, code
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult
 
@@ -68,7 +70,7 @@ class PackageView(NamedTuple):
 #: Templates whose names differ from those of their files.
 _TEMPLATES = {
     (PYTHON, "launch/NAME_launch.py"): "launch.py",
-    (CMAKE, "pyproject.toml"): "interfaces_pyproject.toml",
+    (CMAKE, SETTINGS_FILE): "interfaces_pyproject.toml",
 }
 #: Files of a package of nodes, and of one of interfaces; NAME stands for the package.
 _PYTHON_FILES = (
@@ -78,7 +80,7 @@ _PYTHON_FILES = (
 _CMAKE_FILES = ("package.xml", "CMakeLists.txt", "pyproject.toml", "README.md", ".gitignore")
 #: Files of a new package that are edited later on.
 GROWING = (
-    *("package.xml", "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
+    *PACKAGE_FILES,
     *("README.md", ".gitattributes", ".gitignore"),
 )
 #: Modules and folders that a package of such a name would hide.
@@ -178,7 +180,7 @@ def _contradictions(
     project: Project, requested: Package, kept: Collection[str], chosen: Collection[str]
 ) -> Iterator[Diagnostic]:
     """Yield a problem for each choice that one of the kept files contradicts."""
-    for path, choices in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
+    for path, choices in ((MANIFEST, _in_manifest), (SETUP_PY, _in_setup)):
         text = project.text(path) if path in kept else None
         if not text:
             continue

@@ -19,6 +19,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.packaging.facts import Facts, facts
+from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
 from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
@@ -27,8 +28,6 @@ from idlc.project.lock import Lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 
-#: Files that describe a package, which hooks name if they change.
-PACKAGE_FILES = frozenset({MANIFEST, "CMakeLists.txt", "setup.py", "setup.cfg", "pyproject.toml"})
 #: Problems with files and packages that are left out; the others can be fixed.
 _DUPLICATES = frozenset({codes.DUPLICATE_INTERFACE.id, codes.DUPLICATE_PACKAGE.id})
 #: Rounds of fixes: one may depend on another, or edit the same range.
@@ -144,6 +143,7 @@ def _with_packages(paths: Sequence[str], root: Root) -> tuple[str, ...]:
     described = []
     for path in paths:
         folder, name = os.path.split(path)
+        # hooks name such files if they change
         if name not in PACKAGE_FILES or not root.is_file(path):
             described.append(path)
         elif root.is_file(f"{folder or '.'}/{MANIFEST}"):
@@ -169,7 +169,7 @@ def _with_recordings(
 
 def keep_layout(name: str, old: str, new: str) -> str:
     """Return an edited file in its old layout: `idlc fmt`'s, or that of formatters of Python."""
-    if name.endswith("setup.py"):
+    if name.endswith(SETUP_PY):
         from idlc.packaging.setup_edits import arrange
 
         return arrange(old, new)

@@ -20,6 +20,7 @@ from idlc.generate.vendoring import leftovers, planned
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import SETUP_PY
 from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
@@ -80,7 +81,7 @@ def in_package(options: GenOptions) -> GenOptions:
     if path is None or (options.paths and path.parent != folder):
         return options
     name = declared_name(path, root, Report())
-    if not name or not is_file(path.parent / "setup.py"):
+    if not name or not is_file(path.parent / SETUP_PY):
         return options
     return options._replace(
         paths=options.paths or (root.shown(path.parent),),

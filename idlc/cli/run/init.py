@@ -16,6 +16,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line, printable
+from idlc.packaging.files import SETUP_PY
 from idlc.project.find import list_files
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
@@ -30,7 +31,7 @@ from idlc.scaffold.init import (
     recommendation,
     siblings,
 )
-from idlc.scaffold.layouts import SETUP, Layout, layout_of
+from idlc.scaffold.layouts import Layout, layout_of
 from idlc.scaffold.proof import Proof, installed_files, prove
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
     folder = preparation.layout.folder
     within = "" if folder == root.base else f"{one_line(root.shown(folder))}: "
     draft, backend = preparation.draft, preparation.layout.backend
-    is_edited = SETUP in draft.reasons and draft.project.has(SETUP)
+    is_edited = SETUP_PY in draft.reasons and draft.project.has(SETUP_PY)
     before = installed_files(folder, backend) if is_edited and backend else frozenset()
     done = _compile(preparation, within, report)
     if not done:
