@@ -36,7 +36,7 @@ from idlc.recordings.containers.conversion import (
     RewrittenTopic,
     RewrittenTopics,
 )
-from idlc.recordings.containers.db3_to_mcap import as_mcap
+from idlc.recordings.containers.db3_to_mcap import as_mcap, convert_db3
 from idlc.recordings.containers.file import full_name
 from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes
 from idlc.recordings.damage import Damage, DamageList
@@ -178,8 +178,6 @@ class _Rewriting:
         progress = partial(self.progress, path.name)
         with target.open("xb") as file:
             if is_db3(path):
-                from idlc.recordings.containers.db3_to_mcap import convert_db3
-
                 how = self.conversions, self.recorded, progress, self.strict
                 topics, damage = convert_db3(path, file, *how)
             else:

@@ -16,6 +16,7 @@ from idlc.generate.target import build_step
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
+from idlc.packaging.setup_py import Setup, span_of
 from idlc.project.lock import BUILD_STEP
 from idlc.project.package_xml import statements
 from idlc.project.root import MANIFEST
@@ -228,8 +229,6 @@ def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) ->
 
 def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Choice]:
     """Yield what a setup.py says of each choice, and the argument to write in its place."""
-    from idlc.packaging.setup_py import Setup, span_of
-
     setup = Setup(source)
     for field in _CHOICES:
         argument = "maintainer_email" if field == "email" else field

@@ -16,6 +16,7 @@ from idlc.compiler.verdicts import IncrementalFindings
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few, merge, without_overruled
 from idlc.diagnostics.source import Source
+from idlc.language.parse import parse
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.packaging.facts import Facts, facts
@@ -174,7 +175,6 @@ def keep_layout(name: str, old: str, new: str) -> str:
 
         return arrange(old, new)
     from idlc.language.format import format_file
-    from idlc.language.parse import parse
 
     is_interface = name.endswith(tuple(KINDS))
     if not is_interface or format_file(parse(Source(name, old))) != old:
