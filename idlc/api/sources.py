@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
+from idlc.project.words import is_address
 from idlc.recordings.load import LoadedPackages, loaded
 from idlc.recordings.types import RecordingTopics, read_topics
-from idlc.recordings.words import is_address
 
 
 def read_source(

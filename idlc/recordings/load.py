@@ -23,6 +23,7 @@ from idlc.project.library import resolve
 from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
+from idlc.project.words import read_word
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
@@ -45,7 +46,6 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
-from idlc.recordings.words import read_word
 from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import Structure, Types, structure_of
 

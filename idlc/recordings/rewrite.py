@@ -26,6 +26,7 @@ from idlc.project.atomic import (
     move_new,
     uninterrupted,
 )
+from idlc.project.words import METADATA, ZSTD
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.container import is_db3, open_recording
@@ -68,7 +69,7 @@ BESIDE = ("-journal", "-shm", "-wal")
 
 def mcap_name(path: Path) -> str:
     """Return the name of the MCAP file that a recording becomes."""
-    plain = path.with_name(path.name.removesuffix(bag.ZSTD))
+    plain = path.with_name(path.name.removesuffix(ZSTD))
     return plain.with_suffix(".mcap").name if plain.suffix == ".db3" else plain.name
 
 
@@ -203,7 +204,7 @@ class _Rewriting:
         """Write a file that is compressed as a whole; the new one is not."""
         known = len(self.damage)
         with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
-            plain = Path(folder, path.name.removesuffix(bag.ZSTD))
+            plain = Path(folder, path.name.removesuffix(ZSTD))
             problem = unpack(path, plain)
             if problem and self.strict:
                 raise DamageError(f"`{path}`: {problem}")
@@ -238,15 +239,15 @@ class _Rewriting:
                 before = self.messages
                 self.split(path, target / mcap_name(path), len(paths) == 1)
                 if (target / mcap_name(path)).exists():
-                    counts[path.name.removesuffix(bag.ZSTD)] = self.messages - before
-            elif path.name not in (*beside, bag.METADATA):
+                    counts[path.name.removesuffix(ZSTD)] = self.messages - before
+            elif path.name not in (*beside, METADATA):
                 _copy(path, target / path.name)
-        metadata = folder / bag.METADATA
+        metadata = folder / METADATA
         if not metadata.is_file():
             return
         data = bag.retyped(metadata, self._new_type)
         if data is None:
-            _copy(metadata, target / bag.METADATA)
+            _copy(metadata, target / METADATA)
             return
         if self.damage:
             by_topic = {name: topic.messages for name, topic in self.result.topics.items()}
@@ -257,7 +258,7 @@ class _Rewriting:
             data = bag.recounted(data, by_topic, files)
         is_mcap = all(path.suffix == ".mcap" for path in paths)
         data = data if is_mcap else as_mcap(data.decode()).encode()
-        (target / bag.METADATA).write_bytes(data)
+        (target / METADATA).write_bytes(data)
 
 
 def _copy(path: Path, target: Path) -> None:

@@ -26,12 +26,12 @@ from idlc.project import inputs
 from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.words import is_address, is_there
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.file import CDR, Topic, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.damage import Damage
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
-from idlc.recordings.words import is_address, is_there
 from idlc.wire.layout import report_oversized
 
 #: The number of versions that a topic is compared with.

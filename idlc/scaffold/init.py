@@ -25,6 +25,7 @@ from idlc.diagnostics.report import Report, ReportedError, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.generate.package import NUMPY, Generated
 from idlc.generate.python.fields import number_info
+from idlc.generate.templates import code
 from idlc.model import catalog, derive, ir
 from idlc.model.link import Model
 from idlc.packaging import dependencies
@@ -43,7 +44,6 @@ from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import INDEX
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, load_settings, scope, toml
-from idlc.project.templates import code
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult, marked
 from idlc.scaffold.interface import implied_packages, starter
 from idlc.scaffold.layouts import Layout, package_of, tool_of

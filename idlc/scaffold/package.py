@@ -13,6 +13,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.generate.target import build_step
+from idlc.generate.templates import Code, EscapedText, code
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
@@ -21,7 +22,6 @@ from idlc.project.lock import BUILD_STEP
 from idlc.project.package_xml import statements
 from idlc.project.root import MANIFEST
 from idlc.project.settings import SETTINGS_FILE, load_settings, scope
-from idlc.project.templates import Code, EscapedText, code
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult
 
 VERSION = "0.1.0"

@@ -28,6 +28,7 @@ from idlc.project.find import KINDS, RULES, list_files, no_interfaces, unread_id
 from idlc.project.lock import Lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
+from idlc.project.words import split_recordings
 
 #: Problems with files and packages that are left out; the others can be fixed.
 _DUPLICATES = frozenset({codes.DUPLICATE_INTERFACE.id, codes.DUPLICATE_PACKAGE.id})
@@ -67,8 +68,6 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
     edits are made in memory only.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
-        from idlc.recordings.words import split_recordings
-
         recordings, others = split_recordings(options.paths, options.scope.root)
         if recordings:
             return _with_recordings(recordings, others, options, report)

@@ -14,12 +14,12 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
 from idlc.model.distros import Distro
 from idlc.project.settings import Scope
+from idlc.project.words import is_address
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.lengths import WrongDefinitionError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.recordings.packages import check_versions, contradicted
 from idlc.recordings.types import LocalTypes, damage_problems, recorded_types, versions
-from idlc.recordings.words import is_address
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:

@@ -35,7 +35,7 @@ from idlc.project.requests import (
 )
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
-from idlc.recordings.words import read_words
+from idlc.project.words import read_words
 from idlc.version import __version__
 
 

@@ -22,7 +22,7 @@ from idlc.project import inputs
 from idlc.project.find import find
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
-from idlc.recordings.words import read_words
+from idlc.project.words import read_words
 
 if TYPE_CHECKING:
     from idlc.recordings.definitions import RecordedDefinition

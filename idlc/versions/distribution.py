@@ -16,7 +16,7 @@ from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.library import Library
 from idlc.project.settings import Scope
-from idlc.recordings.words import read_distro
+from idlc.project.words import read_distro
 from idlc.versions.packages import Comparison, combine, compare
 
 

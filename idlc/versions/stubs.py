@@ -12,11 +12,11 @@ from idlc.diagnostics.text import one_line
 from idlc.generate.python.imports import Surroundings
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.render import interface_files
+from idlc.generate.templates import Code, EscapedText, RenderedFile, code
 from idlc.model import ir, python_names
 from idlc.model.link import Model
 from idlc.project import write
 from idlc.project.root import Root
-from idlc.project.templates import Code, EscapedText, RenderedFile, code
 from idlc.recordings.definitions import interface_of
 from idlc.versions.conversion import FieldPlan, Plan, Version, VersionKey, is_list
 from idlc.versions.meanings import renumbered

@@ -18,7 +18,7 @@ from idlc.diagnostics.terminal import counted
 from idlc.project.git import commit
 from idlc.project.root import Root
 from idlc.project.settings import Config, scope, settings_here
-from idlc.recordings.words import is_address, read_version, recordings_of
+from idlc.project.words import is_address, read_version, recordings_of
 from idlc.tasks.breaking.files import BreakingOptions, Verdict, breaking
 from idlc.tasks.breaking.recordings import RecordedVerdict, compare_with_recordings
 from idlc.versions import packages

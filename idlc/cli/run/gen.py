@@ -19,7 +19,7 @@ from idlc.diagnostics.text import one_line
 from idlc.project.find import Stamp, list_files, snapshot, stamps
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope, settings_here
-from idlc.recordings.words import files, is_address, read_words
+from idlc.project.words import files, is_address, read_words
 from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
 
 if TYPE_CHECKING:

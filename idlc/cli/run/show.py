@@ -12,8 +12,8 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.project.settings import Scope
+from idlc.project.words import is_address, read_word
 from idlc.recordings.times import date_text
-from idlc.recordings.words import is_address, read_word
 from idlc.tasks import show
 from idlc.tasks.show import RecordingFacts, TopicFacts
 

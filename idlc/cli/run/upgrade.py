@@ -17,7 +17,7 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.project.settings import scope, settings_here
-from idlc.recordings.words import expand
+from idlc.project.words import expand
 from idlc.tasks.upgrade.recordings import (
     TopicPlan,
     UpgradeOptions,

@@ -33,7 +33,7 @@ from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Config, Scope
-from idlc.recordings.words import VersionWord, read_version
+from idlc.project.words import VersionWord, read_version
 from idlc.versions.changes import LEVELS, Change
 from idlc.versions.distribution import compare_with_distro
 from idlc.versions.packages import (

@@ -25,7 +25,7 @@ from idlc.project import inputs
 from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
-from idlc.recordings.words import is_address
+from idlc.project.words import is_address
 from idlc.robot.keys import Entity as RobotEntity
 from idlc.robot.keys import EntityKind
 from idlc.robot.live.connect import (

@@ -14,6 +14,7 @@ from idlc.compiler.compiler import sound_models, stage
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import printable
+from idlc.generate.templates import RenderedFile, html, verbatim
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -23,9 +24,8 @@ from idlc.project.lock import Tree
 from idlc.project.package_xml import read_statements
 from idlc.project.root import Root
 from idlc.project.settings import Scope
-from idlc.project.templates import RenderedFile, html, verbatim
+from idlc.project.words import read_word
 from idlc.project.write import apply, owned_files, plan
-from idlc.recordings.words import read_word
 from idlc.tasks.docs.view import KINDS, Home, PagePaths, Paragraph, blocks, page, prefix, words
 from idlc.tasks.gen import named_packages
 

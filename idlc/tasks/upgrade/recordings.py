@@ -24,6 +24,7 @@ from idlc.project.files import is_folder
 from idlc.project.find import RULES
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.words import is_address, read_version
 from idlc.recordings.columns import unread_bytes
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.conversion import (
@@ -49,7 +50,6 @@ from idlc.recordings.types import (
     topics_of,
     versions,
 )
-from idlc.recordings.words import is_address, read_version
 from idlc.runtime.typeinfo import Structure
 from idlc.tasks.upgrade.targets import UpgradeTarget, compiled, target_of
 from idlc.versions.conversion import FieldFate, Plan, Version, make_plan

@@ -18,9 +18,9 @@ from idlc.project.find import InterfaceFile, list_files, no_interfaces, unread_i
 from idlc.project.library import IDL, InterfaceTexts, Library
 from idlc.project.package_xml import declared_name
 from idlc.project.settings import Scope
+from idlc.project.words import VersionWord, read_distro, read_version
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import topics_of, versions
-from idlc.recordings.words import VersionWord, read_distro, read_version
 from idlc.versions.revision import checked_out
 from idlc.wire.layout import report_oversized
 

@@ -16,7 +16,6 @@ from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS
 from idlc.project.root import MANIFEST, Root
-from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES, natural
 
 #: The address of a robot stands for a recording; a name is that of a type or package.
 Meaning: TypeAlias = Literal["recording", "name", "path", "revision", "distribution"]
@@ -25,6 +24,13 @@ _VERSIONS: dict[str, Meaning] = {"git:": "revision", "distro:": "distribution"}
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
 #: DDS, a configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
 _ADDRESS = re.compile(r"dds(?:[:/]|\Z)|zenoh:|(?:tcp|tls|quic|udp|ws)/")
+#: The files of recordings.
+SUFFIXES = (".mcap", ".db3")
+#: The ending of those that rosbag2 compressed as a whole.
+ZSTD = ".zstd"
+COMPRESSED = tuple(suffix + ZSTD for suffix in SUFFIXES)
+#: The file by which a folder is a bag.
+METADATA = "metadata.yaml"
 #: Cannot be read, which opening it reports.
 _ROS_1 = ".bag"
 
@@ -120,6 +126,11 @@ def files(words: Iterable[str], root: Root) -> list[Path]:
     recordings, _ = split_recordings(words, root)
     paths = [Path(root.path(word)) for word in recordings if not is_address(word)]
     return [file for path in paths for file in (path.iterdir() if is_folder(path) else [path])]
+
+
+def natural(name: str) -> list[tuple[str, int]]:
+    """Return a key that sorts bag_9 before bag_10."""
+    return [(text, int(number or 0)) for text, number in re.findall(r"(\D*)(\d*)", name)]
 
 
 def expand(word: str) -> list[str]:

@@ -4,7 +4,7 @@ import pytest
 
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.project.root import Root
-from idlc.recordings.words import read_distro, read_version, read_word
+from idlc.project.words import read_distro, read_version, read_word
 
 
 @pytest.fixture(name="root")
