@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 import numpy as np
 from msgspec.structs import replace
 
+from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, unknown_distro
+from idlc.recordings.columns import to_arrow, to_columns, to_rows, unread_bytes
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.elements import ElementError
+from idlc.recordings.columns.read import type_of
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
@@ -34,6 +37,7 @@ from idlc.recordings.damage import Damage, DamageWarning
 from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
 from idlc.recordings.times import date_text, moment
 from idlc.runtime.codec import PAUSE
+from idlc.runtime.typeinfo import Structure, structure_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +48,6 @@ if TYPE_CHECKING:
     from idlc.api.upgrade import Upgrade
     from idlc.recordings.aligned.table import Aligned
     from idlc.recordings.load import TopicType
-    from idlc.runtime.typeinfo import Structure
     from idlc.versions.conversion import Version
 
 
@@ -67,8 +70,6 @@ def readings(as_: Any, rules: Any) -> dict[str, Reading]:
     kinds = (as_,) if isinstance(as_, type) else tuple(as_)
     if not kinds:
         return {}
-    from idlc.runtime.typeinfo import structure_of
-
     return {structure_of(kind).name: Reading(kind, rules) for kind in kinds}
 
 
@@ -219,8 +220,6 @@ class Selection:
         """Compare the lengths of the first messages with their type: see `_judge`."""
         if self._compared >= SAMPLE or self.topic.encoding != CDR:
             return
-        from idlc.recordings.columns import unread_bytes
-
         count = SAMPLE - self._compared
         raws = self._sample() if batch is None else batch.first_views(count)
         structure = self._structure(kind)
@@ -233,8 +232,6 @@ class Selection:
         is_recorded = kind is None or self.options.reading is not None
         if is_recorded:
             return self._type.structure
-        from idlc.runtime.typeinfo import structure_of
-
         return structure_of(kind)
 
     def _judge(self, structure: Structure, unread: Any, raws: Sequence[Raw]) -> None:
@@ -332,16 +329,12 @@ class Selection:
     @property
     def read_type(self) -> Structure:
         """The type that messages are read as."""
-        from idlc.recordings.columns.read import type_of
-
         return type_of(self._source(None))
 
     def table(
         self, batch: TopicMessages, fields: Iterable[str] | None, numbers: Any = 0
     ) -> pa.Table:
         """Return the columns of some messages, whose `numbers` in the recording errors name."""
-        from idlc.recordings.columns import to_arrow
-
         source, judge = self._source(None), self._on_unread(None, batch)
         with _at(self.topic, batch.views, numbers):
             return to_arrow(source, self.read_as(batch), fields, True, True, on_unread=judge)
@@ -354,8 +347,6 @@ class Selection:
         `fields` are those that are wanted, such as "header.stamp". With `datetimes`, times are
         datetime64, log_time and publish_time included, which are nanoseconds otherwise.
         """
-        from idlc.recordings.columns import to_columns
-
         source = self._source(kind)
         recorded = join_messages(list(self.recorded()))
         batch = self.read_as(recorded)
@@ -419,8 +410,6 @@ def _names(fields: list[str]) -> list[str]:
 
 def _table(source: Any, options: Any, batch: TopicMessages | None = None) -> pa.Table:
     """Return the table of some messages, or of none, with their times in front."""
-    from idlc.recordings.columns import to_arrow, to_rows
-
     pa, kind, rows = arrow(), arrow().timestamp("ns"), None
     batch = join_messages([]) if batch is None else batch
     options = dict(options)
@@ -601,8 +590,6 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
     def __getitem__(self, name: str) -> RecordedTopic:
         topics = self._topics.get(name)
         if not topics:
-            from idlc.diagnostics.text import did_you_mean
-
             hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
             raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
         return self._selected(topics)

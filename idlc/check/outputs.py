@@ -13,6 +13,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import ir
 from idlc.model.catalog import is_standard
 from idlc.model.link import Model
+from idlc.packaging.files import SETUP_FILES
 from idlc.project.files import is_file
 from idlc.project.find import CLOSING, SKIPPED
 from idlc.project.inputs import Inputs
@@ -103,9 +104,8 @@ def _fits(record: Lock, package: Inputs) -> bool:
 
 def _generated(home: Path) -> Iterator[Path]:
     """Yield the folders of generated code in the Python project around a folder."""
-    marks = ("pyproject.toml", "setup.py", "setup.cfg")
     places = (home, *home.parents)
-    projects = (place for place in places if any(is_file(place / mark) for mark in marks))
+    projects = (place for place in places if any(is_file(place / mark) for mark in SETUP_FILES))
     project = next(projects, None)
     for place, folders, names in os.walk(project) if project else ():
         if not CLOSING.isdisjoint((*folders, *names)):

@@ -17,7 +17,7 @@ from idlc.diagnostics.ci import Form
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.root import Root
-from idlc.recordings.find import expand, in_order, split_recordings
+from idlc.project.words import expand, in_order, split_recordings
 from idlc.tasks.columns import ColumnsOptions, WrittenFile, columns
 
 if TYPE_CHECKING:
