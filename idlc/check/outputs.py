@@ -16,8 +16,9 @@ from idlc.model.link import Model
 from idlc.project.files import is_file
 from idlc.project.find import CLOSING, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import FILE, Lock, load_lock, meaning
+from idlc.project.lock import FILE, Lock, load_lock
 from idlc.project.settings import Scope
+from idlc.project.step import meaning
 
 
 def outdated(

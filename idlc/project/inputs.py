@@ -14,10 +14,10 @@ from idlc.diagnostics.source import Source
 from idlc.model.ir import TypeName
 from idlc.project.files import decode, is_folder
 from idlc.project.find import InterfaceFile, find, list_files
-from idlc.project.lock import digest, meaning
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Scope, load_settings, scope
+from idlc.project.step import digest, meaning
 
 
 def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[InterfaceFile]]:

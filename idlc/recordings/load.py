@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for, sources_of
+from idlc.compiler.requests import requested_packages
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.model import ir
@@ -21,7 +22,6 @@ from idlc.model.python_names import class_
 from idlc.model.type_data import content
 from idlc.project.find import is_path
 from idlc.project.library import resolve
-from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.recordings.containers.container import Topic

@@ -9,9 +9,9 @@ import pytest
 
 from idlc.diagnostics.report import Report
 from idlc.generate import package as generated
-from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.step import digest
 from idlc.tasks.gen import GenOptions, gen
 
 PACKAGE = Path(generated.__file__).parents[1]
