@@ -24,6 +24,7 @@ from idlc.project.find import is_path
 from idlc.project.library import resolve
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
+from idlc.recordings.arguments import message_class, texts
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
@@ -119,7 +120,10 @@ def loaded(
 ) -> LoadedPackages:
     """Return the classes of what `idlc.load` names; `read` reads recordings."""
     report = Report()
-    models, names = _models_of(str(what), tuple(include), distro, report, read)
+    if distro is not None and not isinstance(distro, str):
+        raise TypeError(f"`distro` is the name of a distribution, not {distro!r}")
+    folders = texts(include, "the folders of `include`")
+    models, names = _models_of(str(what), folders, distro, report, read)
     _raise_errors(report)
     return LoadedPackages(models, names)
 
@@ -306,8 +310,8 @@ class MissingDefinitionWarning(UserWarning):
 def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return a program's class; raise RecordingError if messages are of another type."""
     try:
-        class_type = structure_of(owner_of(kind))
-    except (AttributeError, ImportError, KeyError, TypeError):
+        class_type = structure_of(owner_of(message_class(kind)))
+    except TypeError:
         hint = "omit it, or give a class that `idlc gen` generated"
         raise RecordingError(f"{kind!r} is not a message class of idlc", hint) from None
     if class_type.name != topic.type:
