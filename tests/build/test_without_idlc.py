@@ -279,8 +279,8 @@ def library(request, template, tmp_path_factory):
     """Return the tool that builds a library as `idlc init` sets it up, and where that is."""
     folder, tool = tmp_path_factory.mktemp("library") / "trackkit", request.param
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
-        patch.setattr("idlc.scaffold.proof.installed_files", lambda *_: frozenset())
+        patch.setattr("idlc.cli.run.init.prove", lambda *_: Proof(""))
+        patch.setattr("idlc.cli.run.init.installed_files", lambda *_: frozenset())
         folder.mkdir()
         patch.chdir(folder)
         settings = "" if tool == "setuptools" else "[tool.hatch.build]\n[tool.pdm.build]\n"

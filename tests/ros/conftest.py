@@ -16,12 +16,10 @@ from tests.support.installed import SHARE, generate, interfaces, interfaces_in, 
 from tests.support.paths import PROGRAMS
 from tests.support.sides import OURS
 
-HERE = Path(__file__).parent
-
 
 def pytest_collection_modifyitems(items):
     for item in items:
-        if HERE in item.path.parents:
+        if item.nodeid.startswith("tests/ros/"):
             item.add_marker(pytest.mark.ros)
 
 

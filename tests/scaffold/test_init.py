@@ -50,8 +50,8 @@ def project(here, monkeypatch):
 @pytest.fixture
 def unproved(monkeypatch):
     """Skip the proof, which takes seconds, where it has nothing to do with the tested files."""
-    monkeypatch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
-    monkeypatch.setattr("idlc.scaffold.proof.installed_files", lambda *_: frozenset())
+    monkeypatch.setattr("idlc.cli.run.init.prove", lambda *_: Proof(""))
+    monkeypatch.setattr("idlc.cli.run.init.installed_files", lambda *_: frozenset())
 
 
 def tree(folder):
@@ -130,7 +130,7 @@ def test_every_kind_of_package_is_set_up_once(name, project, monkeypatch, capsys
     assert re.search(r"^test passed: .* 1? ?\w* ?class", printed, re.MULTILINE)
     assert "next: idlc gen\n" in printed
     after = tree(project)
-    monkeypatch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
+    monkeypatch.setattr("idlc.cli.run.init.prove", lambda *_: Proof(""))
     assert main(["init", "--yes"]) == 0
     assert "nothing to do\n" in capsys.readouterr().out
     assert tree(project) == after
