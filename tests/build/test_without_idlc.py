@@ -339,8 +339,8 @@ def siblings(template, tmp_path_factory):
         "tracks/msg/Track.msg": "poses/Pose p\n",
     }
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("idlc.scaffold.proof.prove", lambda *_: Proof(""))
-        patch.setattr("idlc.scaffold.proof.installed_files", lambda *_: frozenset())
+        patch.setattr("idlc.cli.run.init.prove", lambda *_: Proof(""))
+        patch.setattr("idlc.cli.run.init.installed_files", lambda *_: frozenset())
         patch.chdir(folder)
         for name in ("poses", "tracks"):
             assert main(["scaffold", "package", name, "--maintainer", "A <a@example.com>"]) == 0
