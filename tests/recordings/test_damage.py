@@ -3,6 +3,7 @@
 import random
 import shutil
 import sqlite3
+import tracemalloc
 import warnings
 from collections import Counter
 from contextlib import closing, suppress
@@ -15,6 +16,7 @@ from mcap.stream_reader import StreamReader
 
 import idlc
 from idlc.cli.main import main
+from idlc.recordings.containers.compression import compress, decompressed
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.messages import ALWAYS, NO_TIME
 from idlc.recordings.containers.source import RecordingError
@@ -399,3 +401,16 @@ def test_a_late_time_is_null(field, late, tmp_path):
         if field == "log_time":
             assert [time for time, _ in topic][1] is None
             assert topic.between(end="0.5").to_arrow().num_rows == 2 - 1
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_of_unknown_size_needs_memory_in_proportion(compression):
+    """The size that a damaged chunk declares is not known to be right."""
+    content = random.Random(SEED).randbytes(100_000)
+    data = memoryview(compress(content, compression))
+    tracemalloc.start()
+    assert decompressed(data, compression) == content
+    assert tracemalloc.get_traced_memory()[1] < 40 * len(content)
+    tracemalloc.stop()
+    repeated = content[:2_000] * 1_000
+    assert decompressed(memoryview(compress(repeated, compression)), compression) == repeated

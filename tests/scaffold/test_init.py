@@ -716,7 +716,9 @@ CLASS = "import sys; sys.path.insert(0, sys.argv[1]); from {} import {}; print({
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [name for name in SAMPLES if name != "ament_cmake"])
+@pytest.mark.parametrize(
+    "name", ["ament: pyproject", *(name for name in SAMPLES if not name.startswith("ament"))]
+)
 def test_an_installed_package_is_imported_elsewhere(name, project, python, tmp_path, monkeypatch):
     sample = SAMPLES[name]
     monkeypatch.setenv("PATH", f"{python.parent}{os.pathsep}{os.environ['PATH']}")

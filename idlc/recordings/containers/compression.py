@@ -71,16 +71,17 @@ def decompressed(data: memoryview, compression: str) -> bytes:
     """Return a chunk of any size that is accepted; raise DamageError if there is none."""
     if not compression:
         return bytes(data)
-    target = memoryview(bytearray(min(MOST_IN_A_CHUNK, MOST_GROWTH * len(data))))
-    if compression == "zstd":
-        size = _zstd(data, target)
-    elif compression == "lz4":
-        size = _lz4(data, target)
-    else:
+    if compression not in ("zstd", "lz4"):
         raise DamageError(f"unknown compression `{compression}`; idlc reads zstd and lz4")
-    if size > len(target):
-        raise DamageError(f"a chunk holds more than {len(target):,} bytes")
-    return bytes(target[:size])
+    most, room = min(MOST_IN_A_CHUNK, MOST_GROWTH * len(data)), 16 * len(data)
+    while True:  # room for all that a chunk may hold would cost more than most chunks do
+        target = memoryview(bytearray(min(most, room)))
+        size = _zstd(data, target) if compression == "zstd" else _lz4(data, target)
+        if size <= len(target):
+            return bytes(target[:size])
+        if room >= most:
+            raise DamageError(f"a chunk holds more than {most:,} bytes")
+        room *= 16
 
 
 def _zstd(data: memoryview, target: memoryview) -> int:

@@ -89,31 +89,31 @@ class Operations:
         def read(message):
             return getattr(message, field)
 
-        named = list(fresh())
-        if few:
-            named = [one for one in named if one in FEW]
+        # each operation has values of its own, because it may change them
+        plain, checked, given, aliases = fresh(), fresh(), fresh(), fresh()
+        named = [value for value in plain if not few or value in FEW]
         for value in named:
             yield (
                 f"{name}.{field} = {value}",
-                lambda value=value: assigned(cls(), field, fresh()[value], read),
+                lambda value=value: assigned(cls(), field, plain[value], read),
             )
             yield (
                 f"{name}.{field} = {value}, checked",
-                lambda value=value: assigned(cls(check_fields=True), field, fresh()[value], read),
+                lambda value=value: assigned(cls(check_fields=True), field, checked[value], read),
             )
             if few:
                 continue
             yield (
                 f"{name}({field}={value})",
                 lambda value=value: (
-                    cls(**{field: fresh()[value]}),
+                    cls(**{field: given[value]}),
                     read,
                 ),
             )
             if shape[0] != "one":
                 yield (
                     f"{name}.{field} aliases {value}",
-                    lambda value=value: aliased(cls(), field, fresh()[value]),
+                    lambda value=value: aliased(cls(), field, aliases[value]),
                 )
         if few:
             return

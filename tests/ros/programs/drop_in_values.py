@@ -136,14 +136,15 @@ def arrays(count):
     }
     found |= {f"numpy {name}": np.array(small).astype(name) for name in DTYPES}
     for name in DTYPES:
-        some = np.array(small * 2).astype(name)
-        found[f"numpy {name} strided"] = some[::2]
-        found[f"numpy {name} reversed"] = some[:count][::-1]
-        found[f"numpy {name} swapped"] = some[:count].astype(some.dtype.newbyteorder(">"))
-        found[f"numpy {name} read-only"] = np.frombuffer(some[:count].tobytes(), some.dtype)
-        found[f"numpy 2-D {name} column"] = some[:count].reshape(-1, 1)
-        found[f"numpy 2-D {name} row"] = some[:count].reshape(1, -1)
-        found[f"numpy 2-D {name} two rows"] = some.reshape(2, -1)
+        # no two values share memory
+        some, double = (np.array(each).astype(name) for each in (small, small * 2))
+        found[f"numpy {name} strided"] = double[::2]
+        found[f"numpy {name} reversed"] = some.copy()[::-1]
+        found[f"numpy {name} swapped"] = some.astype(some.dtype.newbyteorder(">"))
+        found[f"numpy {name} read-only"] = np.frombuffer(some.tobytes(), some.dtype)
+        found[f"numpy 2-D {name} column"] = some.copy().reshape(-1, 1)
+        found[f"numpy 2-D {name} row"] = some.copy().reshape(1, -1)
+        found[f"numpy 2-D {name} two rows"] = double.copy().reshape(2, -1)
     found |= {
         "numpy object": np.array(small, object),
         "numpy text": np.array([str(one) for one in small]),
