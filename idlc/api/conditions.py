@@ -51,7 +51,7 @@ class Condition(NamedTuple):
         Times are nanoseconds, as `between` takes them. Raises ValueError for a path that the class
         does not have, and for a value that no such field equals.
         """
-        if self.operator not in OPERATORS:
+        if not (isinstance(self.operator, str) and self.operator in OPERATORS):
             raise ValueError(f"`{self.operator}` is not one of {' '.join(OPERATORS)}")
         type_ = type_at(kind, self.path)
         try:

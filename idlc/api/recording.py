@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, unknown_distro
+from idlc.recordings.arguments import message_class, texts
 from idlc.recordings.columns import to_arrow, to_columns, to_rows, unread_bytes
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.elements import ElementError
@@ -60,17 +61,18 @@ class Reading(NamedTuple):
 
 def checked_distro(name: str | None) -> str | None:
     """Return the name of a distribution; raise RecordingError if there is none of that name."""
-    if name is not None and name not in BY_NAME:
-        raise RecordingError(f"no such distribution: `{name}`", unknown_distro(name))
+    if name is not None and not (isinstance(name, str) and name in BY_NAME):
+        raise RecordingError(f"no such distribution: `{name}`", unknown_distro(str(name)))
     return name
 
 
 def readings(as_: Any, rules: Any) -> dict[str, Reading]:
     """Return the class for each type's name, of one class or several."""
-    kinds = (as_,) if isinstance(as_, type) else tuple(as_)
+    is_one = isinstance(as_, (type, str)) or not isinstance(as_, Iterable)
+    kinds = (as_,) if is_one else tuple(as_)
     if not kinds:
         return {}
-    return {structure_of(kind).name: Reading(kind, rules) for kind in kinds}
+    return {structure_of(message_class(kind)).name: Reading(kind, rules) for kind in kinds}
 
 
 KindT = TypeVar("KindT")
@@ -310,7 +312,7 @@ class Selection:
         if fields is not None:
             from idlc.api.reader import reader
 
-            read = reader(kind, *([fields] if isinstance(fields, str) else fields))
+            read = reader(kind, *texts(fields, "`fields`"))
         for recorded in self.recorded():
             self.compare_lengths(recorded, recorded_kind)
             batch = self.read_as(recorded, done)
@@ -564,7 +566,7 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         rules: Any = None,
     ) -> None:
         self._readings = readings(as_, rules)
-        names = tuple(map(str, include))
+        names = texts(include, "the folders of `include`")
         self._options = ReadOptions(names, checked_distro(distro), checks=(check, strict))
         self._container: Container = open_recording(path, index=index, check=check, strict=strict)
         _warn(self._container.damage, 0)
@@ -588,9 +590,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         return self._container.damage
 
     def __getitem__(self, name: str) -> RecordedTopic:
-        topics = self._topics.get(name)
+        topics = self._topics.get(name) if isinstance(name, str) else None
         if not topics:
-            hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
+            hint = did_you_mean(str(name), list(self)) or f"it has {', '.join(self) or 'none'}"
             raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
         return self._selected(topics)
 
@@ -599,7 +601,7 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         if type_name is None:
             return self[name]
         topics = [
-            topic for topic in self._topics.get(name, ()) if topic.type == full_name(type_name)
+            topic for topic in self._topics.get(name, ()) if topic.type == full_name(str(type_name))
         ]
         if not topics:
             kinds = ", ".join(sorted({topic.type for topic in self._topics.get(name, ())}))

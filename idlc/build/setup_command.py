@@ -13,7 +13,6 @@ from contextlib import suppress
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
-from idlc.build.step import present, remove_leftovers, stop_if_outdated
 from idlc.cli import output
 from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report, ReportedError
@@ -27,6 +26,7 @@ from idlc.project.inputs import packages
 from idlc.project.lock import FILE, load_lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
+from idlc.project.step import present, remove_leftovers, stop_if_outdated
 from idlc.tasks.gen import GenOptions, gen
 
 #: The commands of setup.py that pip runs.

@@ -17,26 +17,17 @@ from idlc.model.link import Model
 from idlc.packaging.files import SETUP_PY
 from idlc.project import inputs, prefixes, write
 from idlc.project.files import is_file, is_folder
-from idlc.project.lock import (
-    BUILD_STEP,
-    COPY_HEAD,
-    FILE,
-    Lock,
-    Runtime,
-    Tree,
-    digest,
-    encode,
-    load_lock,
-)
+from idlc.project.lock import BUILD_STEP, COPY_HEAD, FILE, Lock, Runtime, Tree, encode, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import SETTINGS_FILE
+from idlc.project.step import digest
 from idlc.project.write import FileChange, WritePlan, plan
 
 
 def build_step() -> bytes:
     """Return the file that builds without idlc run."""
-    source = Path(__file__).parents[1] / "build" / "step.py"
+    source = Path(__file__).parents[1] / "project" / "step.py"
     return (COPY_HEAD + source.read_text(encoding="utf-8")).encode()
 
 

@@ -18,7 +18,7 @@ from idlc.project.inputs import Inputs
 from idlc.project.lock import BUILD_STEP, FILE, Lock, Runtime, load_lock
 from idlc.project.package_xml import Statement, statements
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import Scope
+from idlc.project.settings import Scope, included_outside
 
 _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
@@ -48,6 +48,8 @@ class Facts(msgspec.Struct, frozen=True):
     `interfaces` are the paths of all, checked or not, .idl files included.
     `folders` are those with files by dotted name, and whether they are Python packages.
     `index` is the list of interfaces that a setup.py installs for ROS 2's tools.
+    `include` are folders outside of the base that the command line included, if the package has
+    `outputs`.
     `has_build_step` is whether idlc wrote the file that a setup.py runs where idlc is missing.
     """
 
@@ -73,6 +75,7 @@ class Facts(msgspec.Struct, frozen=True):
     files: Mapping[str, str] = {}
     interfaces: frozenset[str] = frozenset()
     folders: Mapping[str, bool] = {}
+    include: tuple[str, ...] = ()
     has_build_step: bool = False
 
     @property
@@ -156,6 +159,7 @@ def facts(
             file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
         ),
         folders=present,
+        include=included_outside(scope) if locks else (),
         has_build_step=any(file.name == BUILD_STEP for file in files),
         available=available,
         providers=neighbours.providers(available) if modules else {},

@@ -15,10 +15,10 @@ from idlc.model.ir import TypeName
 from idlc.model.names import why_not_package
 from idlc.project.files import decode, is_folder
 from idlc.project.find import InterfaceFile, find, list_files
-from idlc.project.lock import digest, meaning
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Scope, load_settings, scope
+from idlc.project.step import digest, meaning
 
 
 def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[InterfaceFile]]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for, sources_of
+from idlc.compiler.requests import requested_packages
 from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.model import ir
@@ -20,10 +21,10 @@ from idlc.model.distros import BY_NAME, DISTROS, Distro, titles
 from idlc.model.python_names import class_
 from idlc.model.type_data import content
 from idlc.project.library import resolve
-from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.project.words import read_word
+from idlc.recordings.arguments import message_class, texts
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import read_definition
@@ -120,8 +121,11 @@ def loaded(
     read: TypesReader = read_topics,
 ) -> LoadedPackages:
     """Return the classes of what `idlc.load` names; `read` reads recordings."""
+    if distro is not None and not isinstance(distro, str):
+        raise TypeError(f"`distro` is the name of a distribution, not {distro!r}")
+    folders = texts(include, "the folders of `include`")
     with _compiling() as report:
-        models, names = _models_of(str(what), tuple(include), distro, report, read)
+        models, names = _models_of(str(what), folders, distro, report, read)
     return LoadedPackages(models, names)
 
 
@@ -307,8 +311,8 @@ class MissingDefinitionWarning(UserWarning):
 def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return a program's class; raise RecordingError if messages are of another type."""
     try:
-        class_type = structure_of(owner_of(kind))
-    except (AttributeError, ImportError, KeyError, TypeError):
+        class_type = structure_of(owner_of(message_class(kind)))
+    except TypeError:
         hint = "omit it, or give a class that `idlc gen` generated"
         raise RecordingError(f"{kind!r} is not a message class of idlc", hint) from None
     if class_type.name != topic.type:

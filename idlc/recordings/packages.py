@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from idlc.compiler.compiler import derived_names
+from idlc.compiler.requests import borrowed
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report, ReportedError, first_few
 from idlc.diagnostics.source import Span
@@ -17,7 +18,6 @@ from idlc.model.link import Model, own_sections
 from idlc.model.lowering.lower_types import constant_name, field_name
 from idlc.project import inputs, prefixes
 from idlc.project.library import InterfaceTexts
-from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
 from idlc.recordings.types import (
     NAMED,

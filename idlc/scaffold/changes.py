@@ -19,10 +19,11 @@ from idlc.packaging.outcome import Edited, Outcome
 from idlc.packaging.setup_edits import arrange
 from idlc.project.files import entries
 from idlc.project.library import Library
-from idlc.project.lock import Tree, digest
+from idlc.project.lock import Tree
 from idlc.project.package_xml import declared_name
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, load_settings, scope
+from idlc.project.step import digest
 from idlc.project.write import FileChange, WritePlan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, EndpointSpec, Role
 

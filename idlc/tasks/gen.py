@@ -9,6 +9,11 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for
+from idlc.compiler.requests import (
+    borrowed,
+    completed,
+    requested_packages,
+)
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.package import Generated, PlannedPackage, generated, up_to_date, with_needs
 from idlc.generate.target import (
@@ -28,11 +33,6 @@ from idlc.project.find import root_of, unread_idl
 from idlc.project.library import InterfaceTexts, Library, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
-from idlc.project.requests import (
-    borrowed,
-    completed,
-    requested_packages,
-)
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
 from idlc.project.words import read_words

@@ -11,9 +11,9 @@ import pytest
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.generate import package as generated
 from idlc.generate.package import Generated
-from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.step import digest
 from idlc.tasks.gen import GenOptions, gen
 
 PACKAGE = Path(generated.__file__).parents[1]

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from idlc.compiler.requests import requested_packages
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.model.ir import TypeName
 from idlc.project.find import find
 from idlc.project.library import Library
-from idlc.project.lock import meaning
-from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.step import meaning
 from tests.support.files import write
 
 MSG = "float64 speed\n"

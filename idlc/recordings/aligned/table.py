@@ -14,6 +14,7 @@ import numpy as np
 from idlc.recordings.aligned import blend
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
 from idlc.recordings.aligned.describe import leaves, metadata, quaternions
+from idlc.recordings.arguments import texts
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.elements import element_of, names_of
 from idlc.recordings.columns.values import needing
@@ -340,7 +341,9 @@ def aligned(
     span: tuple[int | None, int | None],
 ) -> Aligned:
     """Return the table of `Recording.aligned`; raise RecordingError for what it cannot have."""
-    wanted = dict(topics) if isinstance(topics, Mapping) else dict.fromkeys(topics)
+    if not isinstance(topics, Mapping):
+        topics = dict.fromkeys(texts(topics, "`topics`"))
+    wanted = dict(topics)
     if (on is None) == (every is None):
         raise RecordingError("the clock is either `on` a topic or `every` so often", "give one")
     for option in (how, tolerance, clock):
