@@ -39,7 +39,7 @@ def to_numpy(
     does not fit the description, or if a compressed image has more than `pixels`.
     """
     name = type(message).__name__ if kind is None else kind
-    if name not in _KINDS:
+    if not (isinstance(name, str) and name in _KINDS):
         raise ValueError(f"{name} is not one of {', '.join(_KINDS)}: name one of them as `kind`")
     if isinstance(message, Columns):
         rows = [_row(message, prefix, row) for row in range(len(message))]

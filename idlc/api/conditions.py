@@ -53,7 +53,7 @@ class Condition(NamedTuple):
         Times are nanoseconds, as `between` takes them. Raises ValueError for a path that the class
         does not have, and for a value that no such field equals.
         """
-        if self.operator not in OPERATORS:
+        if not (isinstance(self.operator, str) and self.operator in OPERATORS):
             raise ValueError(f"`{self.operator}` is not one of {' '.join(OPERATORS)}")
         element = _named_element(kind, self.path)
         type_ = type_at(kind, f"{element.values}[0]" if element else self.path)

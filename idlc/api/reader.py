@@ -15,6 +15,7 @@ from idlc import runtime
 from idlc.generate.python.reader import Path, PathError, PathStep, is_time, paths_of, reader_source
 from idlc.model import ir
 from idlc.model.from_description import message_of
+from idlc.recordings.arguments import message_class
 from idlc.runtime.cdr import NATIVE
 from idlc.runtime.checked import validate_count, validate_element
 from idlc.runtime.codec import FAILURES, READINGS, deserialize, maker, text_of_view
@@ -55,7 +56,13 @@ def reader(kind: type, /, *paths: str, nanoseconds: bool = False) -> Callable[[B
     """
     if not paths:
         raise PathError("a reader needs the path of a field, such as `header.stamp`")
-    return field_reader(kind, paths, nanoseconds)
+    return field_reader(message_class(kind), tuple(map(_text, paths)), nanoseconds)
+
+
+def _text(path: Any) -> str:
+    if not isinstance(path, str):
+        raise PathError(f"{path!r} is not the path of a field, a text such as `position[3]`")
+    return path
 
 
 class Absent(Exception):  # noqa: N818 - an answer, which is caught where it is asked for
@@ -74,7 +81,7 @@ def field_reader(
 def type_at(kind: type, text: str) -> ir.FieldType:
     """Return the type of the single value at a path, or of a time; raise PathError for others."""
     owner = _Type(kind)
-    (path,) = owner.paths((text,))
+    (path,) = owner.paths((_text(text),))
     if path.has_many:
         raise PathError(f"`{text}` leads to many values: give an index such as `[0]`")
     if isinstance(path.type, (ir.Primitive, ir.String)) or is_time(path.type, owner.messages):
@@ -250,7 +257,13 @@ def patch(kind: type, data: Buffer, changes: Mapping[str, Any]) -> bytes:
     """
     if not changes:
         return bytes(data)
-    patcher = _patcher(kind, tuple(changes))
+    if type(changes) is not dict and not isinstance(changes, Mapping):
+        raise TypeError(f"`changes` has values by the paths of fields; {changes!r} has none")
+    try:
+        patcher = _patcher(kind, tuple(changes))
+    except (AttributeError, TypeError):
+        message_class(kind)
+        raise
     if type(data) is not bytes:
         data = memoryview(data).cast("B")
     places = patcher.locate(data)
@@ -273,7 +286,7 @@ def patch(kind: type, data: Buffer, changes: Mapping[str, Any]) -> bytes:
 
 @lru_cache(MOST)
 def _patcher(kind: type, texts: tuple[str, ...]) -> _Patcher:
-    return _Patcher(_Type(kind), texts)
+    return _Patcher(_Type(kind), tuple(map(_text, texts)))
 
 
 class _Patcher:

@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 import numpy as np
 from msgspec.structs import replace
 
-from idlc.diagnostics.text import worded
+from idlc.diagnostics.text import did_you_mean, worded
 from idlc.model.distros import BY_NAME, unknown_distro
+from idlc.recordings.arguments import message_class, texts
+from idlc.recordings.columns import to_arrow, to_columns, to_rows, unread_bytes
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.elements import ElementError
+from idlc.recordings.columns.read import type_of
 from idlc.recordings.containers.container import Container, Topic, open_pieces, open_recording
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
@@ -35,6 +38,7 @@ from idlc.recordings.damage import Damage, DamageWarning
 from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
 from idlc.recordings.times import date_text, moment
 from idlc.runtime.codec import PAUSE
+from idlc.runtime.typeinfo import Structure, structure_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +49,6 @@ if TYPE_CHECKING:
     from idlc.api.upgrade import Upgrade
     from idlc.recordings.aligned.table import Aligned
     from idlc.recordings.load import TopicType
-    from idlc.runtime.typeinfo import Structure
     from idlc.versions.conversion import Version
 
 
@@ -58,19 +61,18 @@ class Reading(NamedTuple):
 
 def checked_distro(name: str | None) -> str | None:
     """Return the name of a distribution; raise RecordingError if there is none of that name."""
-    if name is not None and name not in BY_NAME:
-        raise RecordingError(f"no such distribution: `{name}`", unknown_distro(name))
+    if name is not None and not (isinstance(name, str) and name in BY_NAME):
+        raise RecordingError(f"no such distribution: `{name}`", unknown_distro(str(name)))
     return name
 
 
 def readings(as_: Any, rules: Any) -> dict[str, Reading]:
     """Return the class for each type's name, of one class or several."""
-    kinds = (as_,) if isinstance(as_, type) else tuple(as_)
+    is_one = isinstance(as_, (type, str)) or not isinstance(as_, Iterable)
+    kinds = (as_,) if is_one else tuple(as_)
     if not kinds:
         return {}
-    from idlc.runtime.typeinfo import structure_of
-
-    return {structure_of(kind).name: Reading(kind, rules) for kind in kinds}
+    return {structure_of(message_class(kind)).name: Reading(kind, rules) for kind in kinds}
 
 
 KindT = TypeVar("KindT")
@@ -221,8 +223,6 @@ class Selection:
         """Compare the lengths of the first messages with their type: see `_judge`."""
         if self._compared >= SAMPLE or self.topic.encoding != CDR:
             return
-        from idlc.recordings.columns import unread_bytes
-
         count = SAMPLE - self._compared
         raws = self._sample() if batch is None else batch.first_views(count)
         structure = self._structure(kind)
@@ -235,8 +235,6 @@ class Selection:
         is_recorded = kind is None or self.options.reading is not None
         if is_recorded:
             return self._type.structure
-        from idlc.runtime.typeinfo import structure_of
-
         return structure_of(kind)
 
     def _judge(self, structure: Structure, unread: Any, raws: Sequence[Raw]) -> None:
@@ -315,7 +313,7 @@ class Selection:
         if fields is not None:
             from idlc.api.reader import reader
 
-            read = reader(kind, *([fields] if isinstance(fields, str) else fields))
+            read = reader(kind, *texts(fields, "`fields`"))
         for recorded in self.recorded():
             self.compare_lengths(recorded, recorded_kind)
             batch = self.read_as(recorded, done)
@@ -334,16 +332,12 @@ class Selection:
     @property
     def read_type(self) -> Structure:
         """The type that messages are read as."""
-        from idlc.recordings.columns.read import type_of
-
         return type_of(self._source(None))
 
     def table(
         self, batch: TopicMessages, fields: Iterable[str] | None, numbers: Any = 0
     ) -> pa.Table:
         """Return the columns of some messages, whose `numbers` in the recording errors name."""
-        from idlc.recordings.columns import to_arrow
-
         source, judge = self._source(None), self._on_unread(None, batch)
         with _at(self.topic, batch.views, numbers):
             return to_arrow(source, self.read_as(batch), fields, True, True, on_unread=judge)
@@ -356,8 +350,6 @@ class Selection:
         `fields` are those that are wanted, such as "header.stamp". With `datetimes`, times are
         datetime64, log_time and publish_time included, which are nanoseconds otherwise.
         """
-        from idlc.recordings.columns import to_columns
-
         source = self._source(kind)
         recorded = join_messages(list(self.recorded()))
         batch = self.read_as(recorded)
@@ -421,8 +413,6 @@ def _names(fields: list[str]) -> list[str]:
 
 def _table(source: Any, options: Any, batch: TopicMessages | None = None) -> pa.Table:
     """Return the table of some messages, or of none, with their times in front."""
-    from idlc.recordings.columns import to_arrow, to_rows
-
     pa, kind, rows = arrow(), arrow().timestamp("ns"), None
     batch = join_messages([]) if batch is None else batch
     options = dict(options)
@@ -577,7 +567,7 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         rules: Any = None,
     ) -> None:
         self._readings = readings(as_, rules)
-        names = tuple(map(str, include))
+        names = texts(include, "the folders of `include`")
         self._options = ReadOptions(names, checked_distro(distro), checks=(check, strict))
         self._container: Container = open_recording(path, index=index, check=check, strict=strict)
         _warn(self._container.damage, 0)
@@ -601,11 +591,9 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         return self._container.damage
 
     def __getitem__(self, name: str) -> RecordedTopic:
-        topics = self._topics.get(name)
+        topics = self._topics.get(name) if isinstance(name, str) else None
         if not topics:
-            from idlc.diagnostics.text import did_you_mean
-
-            hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
+            hint = did_you_mean(str(name), list(self)) or f"it has {', '.join(self) or 'none'}"
             raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
         return self._selected(topics)
 
@@ -614,7 +602,7 @@ class Recording(Mapping[str, "RecordedTopic"], AbstractContextManager["Recording
         if type_name is None:
             return self[name]
         topics = [
-            topic for topic in self._topics.get(name, ()) if topic.type == full_name(type_name)
+            topic for topic in self._topics.get(name, ()) if topic.type == full_name(str(type_name))
         ]
         if not topics:
             kinds = ", ".join(sorted({topic.type for topic in self._topics.get(name, ())}))

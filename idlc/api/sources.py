@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from idlc.diagnostics.report import Report
-from idlc.project.find import is_address
 from idlc.project.root import Root
+from idlc.project.words import is_address
 from idlc.recordings.load import LoadedPackages, loaded
 from idlc.recordings.types import RecordingTopics, read_topics
 

@@ -10,6 +10,7 @@ from typing import Any
 from idlc.api.upgraded import Upgraded
 from idlc.diagnostics.report import Report
 from idlc.project.root import Root
+from idlc.recordings.arguments import message_class, texts
 from idlc.recordings.columns import to_arrow, to_columns
 from idlc.recordings.containers.messages import Separate
 from idlc.versions.classes import version_of
@@ -34,9 +35,9 @@ def named_rules(rules: Any) -> tuple[RuleFiles, dict[str, Path]]:
     """Return the rules in a file or folder, or several of them, and the files by their names."""
     if rules is None:
         return NO_RULES, {}
-    paths = (rules,) if isinstance(rules, (str, Path)) else tuple(rules)
+    paths = texts(rules, "the files of `rules`")
     root, report = Root.here(), Report()
-    files, bad = read_rules(rule_files(map(str, paths), root), root, report)
+    files, bad = read_rules(rule_files(paths, root), root, report)
     for error in bad:
         line, _ = error.span.source.position(error.span.start)
         raise UpgradeError(f"{error.span.source.path}:{line}: {error}")
@@ -83,7 +84,8 @@ class Upgrade:
         known, files = named_rules(rules)
         self._arguments = old, new, rules
         self._run = Runner(files)
-        self.plan = complete(make_plan(version_of(old), version_of(new), known))
+        before, after = (version_of(message_class(kind)) for kind in (old, new))
+        self.plan = complete(make_plan(before, after, known))
 
     def __repr__(self) -> str:
         return f"<Upgrade from {self.plan.old.key.short} to {self.plan.new.key.short}>"
@@ -114,6 +116,9 @@ class Upgrade:
 
         Raises ValidationError for a value of a rule that does not fit.
         """
+        fields = self.old._fields_and_field_types  # noqa: SLF001
+        if getattr(type(message), "_fields_and_field_types", None) != fields:
+            raise TypeError(f"{message!r} is not a message of {self.plan.old.key.short}")
         return self._message(message)
 
     def payload(self, payload: Any) -> bytes:
@@ -130,7 +135,7 @@ class Upgrade:
         Raises idlc's RecordingError, in which `place` names the message.
         """
         if self.plan.same:
-            return [payload if type(payload) is bytes else bytes(payload) for payload in payloads]
+            return [each if type(each) is bytes else bytes(memoryview(each)) for each in payloads]
         return self._payloads.many(payloads, place)
 
     def columns(self, payloads: Iterable[Any], **options: Any) -> Any:

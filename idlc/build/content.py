@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import msgspec
 
 from idlc.compiler.compiler import models_of
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared
 from idlc.project.files import is_folder, read_bytes
 from idlc.project.find import list_files, no_interfaces
@@ -37,12 +38,10 @@ class PrefixContent(NamedTuple):
     libraries: Libraries
 
 
-def compile_package(
-    name: str, classes: Path, options: Options, report: Report
-) -> PrefixContent | None:
+def compile_package(name: str, classes: Path, options: Options, report: Report) -> PrefixContent:
     """Compile the package in the working folder, its classes into a folder of their own.
 
-    Returns `None` after a problem.
+    Raises ReportedError.
     """
     root = Root.here()
     config = load_settings(root, report)
@@ -57,14 +56,14 @@ def compile_package(
     files = list_files((".",), root, report, where.exclude)
     if files.empty:
         report.add(no_interfaces(".", root, where.exclude))
-    inputs = () if report.had_errors else packages(files.files, where, report)
+    report.raise_errors()
+    inputs = packages(files.files, where, report)
     if inputs and [package.package for package in inputs] != [name]:
         others = ", ".join(f"`{package.package}`" for package in inputs)
         message = f"the wheel is for `{name}`, but this folder contains interfaces of {others}"
         hint = "build each in its own folder, or exclude files with `exclude` in [tool.idlc]"
         report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
-    if report.had_errors:
-        return None
+    report.raise_errors()
     lock = load_lock(Path(name), name, report)
     # where classes are committed, people describe the package in the first of these
     kept = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
@@ -77,8 +76,8 @@ def compile_package(
     runtime, vendoring = config.runtime, config.vendoring
     generate(GenOptions((".",), where, str(classes), runtime=runtime, vendoring=vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
-    if report.had_errors or manifest is None:
-        return None
+    report.raise_errors()
+    assert manifest is not None  # it was read, or reported
     ((_, model),) = models_of(inputs, where, Report())
     if options.libraries:
         libraries = libraries_of(model, options.distribution)
@@ -96,16 +95,16 @@ def refuse_beside(config: Config, report: Report) -> None:
         place.wrong("vendor-deps", message, report, hint)
 
 
-def generate(request: GenOptions, report: Report) -> bool:
-    """Write classes, and return whether there were no errors.
+def generate(request: GenOptions, report: Report) -> None:
+    """Write classes, and report the problems.
 
     The environment of a build need not be able to import what the classes import.
     """
     problems = Report()
-    gen(request, problems)
+    with suppress(ReportedError):
+        gen(request, problems)
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
     report.extend(problem for problem in problems if problem.code != unimportable)
-    return not report.had_errors
 
 
 def required_prefixes() -> list[str]:

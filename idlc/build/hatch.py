@@ -44,7 +44,7 @@ class InterfacesHook(BuildHookInterface[BuilderConfig]):
         installed_path = self.build_config.get_distribution_path
         installed_path("")  # hatchling's errors about files to pack end the build as always
 
-        def build(report: Report) -> CompiledLibrary | None:
+        def build(report: Report) -> CompiledLibrary:
             for key in self.config.keys() - _SETTINGS:
                 message = f"unknown setting `{key}` of the build hook idlc"
                 hint = "write settings for idlc into [tool.idlc]"

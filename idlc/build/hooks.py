@@ -11,14 +11,15 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from idlc.check.manifest import names_runtime
 from idlc.cli import output
 from idlc.cli.exit_status import status_of
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.diagnostics.text import Audience, addressed_to, did_you_mean
 from idlc.project import prefixes, settings
 from idlc.project.files import reason
@@ -34,13 +35,15 @@ if TYPE_CHECKING:
     from idlc.build.content import Options
 
 _Built = TypeVar("_Built")
+#: The name of a package, and its `[project]` table.
+_Package: TypeAlias = tuple[str, dict[str, Any]]
 #: Outputs of a workspace or an earlier build in the folder.
 _NO_SOURCES = ["/build", "/dist", "/install", "/log"]
 #: Files that are needed even if version control ignores them.
 _SOURCES = ["/package.xml", "/msg/*.msg", "/srv/*.srv", "/action/*.action"]
 
 
-def archive(build: Callable[[Report], str | None]) -> str:
+def archive(build: Callable[[Report], str]) -> str:
     """Return the name of the archive that was built; end the process after a problem."""
     if importlib.util.find_spec("hatchling") is None:
         sys.stderr.write(
@@ -51,16 +54,15 @@ def archive(build: Callable[[Report], str | None]) -> str:
     return finished(build)
 
 
-def finished(build: Callable[[Report], _Built | None]) -> _Built:
+def finished(build: Callable[[Report], _Built]) -> _Built:
     """Return what was built; end the process with a report after a problem."""
     built: list[_Built] = []
 
     def command() -> int:
         report = Report()
         try:
-            with addressed_to(Audience.SETTINGS):
-                product = build(report)
-            built.extend(() if product is None else (product,))
+            with addressed_to(Audience.SETTINGS), suppress(ReportedError):
+                built.append(build(report))
         except OSError as error:
             message = f"cannot write the archive: {reason(error)}"
             report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
@@ -75,7 +77,7 @@ def finished(build: Callable[[Report], _Built | None]) -> _Built:
     return built[0]
 
 
-def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
+def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str:
     """Write the archive of the working folder, without what version control ignores.
 
     Links that lead out of the folder are left out, and noted: an archive is given to others.
@@ -105,10 +107,8 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
             files = super().recurse_included_files()
             yield from (file for file in files if not leads_out(file.path))
 
-    declared, _ = _declared(report), _options(settings, report)
-    if declared is None or report.had_errors:
-        return None
-    settings = {"project": declared[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
+    (_, project), _ = _declared(settings, report)
+    settings = {"project": project, **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
     name = _written(PackageSdist(str(root), config=settings), directory, report)
     if outside:
         names = first_few((f"`{path}`" for path in sorted(outside)), 5)
@@ -116,21 +116,16 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
     return name
 
 
-def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
+def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str:
     """Compile the package in the working folder into a wheel."""
     from hatchling.builders.wheel import WheelBuilder
 
     from idlc.build.content import compile_package
 
-    declared, options = _declared(report), _options(settings, report)
-    if declared is None or report.had_errors:
-        return None
-    name, project = declared
+    (name, project), options = _declared(settings, report)
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
         classes, prefix = Path(folder) / "classes" / name, Path(folder) / "prefix"
         content = compile_package(name, classes, options, report)
-        if content is None:
-            return None
         native, tag = content.libraries.files, content.libraries.build_tag
 
         platform = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
@@ -166,16 +161,25 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
         Path(directory).mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".idlc-", dir=directory) as beside:
             built = _written(builder, beside, report)
-            if built is None:
-                return None
             stem, python, rest = built.partition("-py3-")
             archive = f"{stem}-{tag}{python}{rest}" if tag else built
             Path(beside, built).replace(Path(directory, archive))
     return archive
 
 
-def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
-    """Return the package's name and its `[project]` table; `None` after a problem."""
+def _declared(settings: Mapping[str, Any], report: Report) -> tuple[_Package, Options]:
+    """Return the package, and what a frontend's settings say. Raises ReportedError."""
+    package = None
+    with suppress(ReportedError):  # so that problems of both are reported
+        package = _package(report)
+    options = _options(settings, report)
+    report.raise_errors()
+    assert package is not None
+    return package, options
+
+
+def _package(report: Report) -> _Package:
+    """Return the package's name and its `[project]` table. Raises ReportedError."""
     from idlc.build import manifest
 
     config = load_settings(Root.here(), report)
@@ -183,12 +187,12 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
         message = f"there is no {MANIFEST} next to pyproject.toml"
         hint = "`idlc scaffold package NAME --interfaces` creates a folder that you can build"
         report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
-    if report.had_errors:
-        return None
+    report.raise_errors()
     declared = manifest.project(config.runtime, report)
-    project = manifest.complete_table(declared, report) if declared else {}
+    project = manifest.complete_table(declared, report)
     require_runtime(config, project.get("dependencies", ()), report)
-    return None if report.had_errors else (declared["name"], project)
+    report.raise_errors()
+    return declared["name"], project
 
 
 def require_runtime(config: Config, requirements: Iterable[str], report: Report) -> None:
@@ -224,11 +228,11 @@ def _target(name: str, **settings: Any) -> dict[str, Any]:
     return {"tool": {"hatch": {"build": {"targets": {name: {**every, **settings}}}}}}
 
 
-def _written(builder: BuilderInterface[Any, Any], directory: str, report: Report) -> str | None:
+def _written(builder: BuilderInterface[Any, Any], directory: str, report: Report) -> str:
     """Return the name of an archive, written; report IDL611 for a `[project]` that is wrong."""
     try:
         builder.metadata.validate_fields()
     except (OSError, TypeError, ValueError) as error:
-        report.add(codes.BAD_CONFIG.of(settings.SETTINGS_FILE, f"{error}"))
-        return None
+        problem = codes.BAD_CONFIG.of(settings.SETTINGS_FILE, f"{error}")
+        raise report.refused(problem) from None
     return Path(next(iter(builder.build(directory=directory, versions=["standard"])))).name

@@ -16,7 +16,7 @@ import msgspec
 from idlc.build.content import generate, refuse_beside, required_prefixes
 from idlc.build.hooks import require_runtime
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.generate.package import NUMPY
 from idlc.model.distros import DEFAULT
 from idlc.model.names import is_module_name
@@ -76,8 +76,8 @@ def compile_library(
     installed_path: Callable[[str], str],
     requirements: Iterable[str],
     report: Report,
-) -> CompiledLibrary | None:
-    """Compile the interfaces of a library into a folder; return `None` after a problem.
+) -> CompiledLibrary:
+    """Compile the interfaces of a library into a folder. Raises ReportedError.
 
     `installed_path` returns the path below site-packages of a path in the project. `requirements`
     are those of the library.
@@ -85,14 +85,14 @@ def compile_library(
     root = Root.at(project)
     config = load_settings(root, report)
     missing = [key for key in ("paths", "out") if not getattr(config, key)]
-    if report.had_errors and missing:
-        return None
+    if missing:
+        report.raise_errors()
     for key in missing:
         hint = "set `paths` to the interfaces, and `out` to the folder for the library's classes"
         message = f"[tool.idlc] has no `{key}`, so the build cannot compile interfaces"
         report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
     if missing or config.source is None:
-        return None
+        raise ReportedError
     out = os.path.normpath(config.out)
     parts = Path(installed_path(out)).parts
     if not parts or not all(map(is_module_name, parts)) or (root.base / out).is_file():
@@ -107,8 +107,9 @@ def compile_library(
     where = msgspec.structs.replace(where, include=(*where.include, *required_prefixes()))
     target, runtime, vendoring = folder / out, config.runtime, config.vendoring
     request = GenOptions(config.paths, where, str(target), runtime=runtime, vendoring=vendoring)
-    if report.had_errors or not generate(request, report):
-        return None
+    report.raise_errors()
+    generate(request, report)
+    report.raise_errors()
     files = dict(_compiled_files(target, project / out))
     uses_numpy = any(_ARRAYS in path.read_bytes() for path in files.values())
     if uses_numpy and not any(map(NUMPY.match, requirements)):

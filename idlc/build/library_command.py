@@ -34,7 +34,7 @@ def build_command() -> type:
         package_dir = self.distribution.package_dir or {}
         with TemporaryDirectory(prefix="idlc-") as folder:
 
-            def build(report: Report) -> CompiledLibrary | None:
+            def build(report: Report) -> CompiledLibrary:
                 installed_path = partial(_installed_path, package_dir)
                 return compile_library(project, Path(folder), installed_path, requirements, report)
 

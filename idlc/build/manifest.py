@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.model.names import why_not_package
 from idlc.project.lock import Runtime
 from idlc.project.package_xml import Statement, declared_name, read_statements
@@ -27,19 +27,17 @@ _READMES = ("README.md", "README.rst", "README.txt")
 
 
 def project(runtime: Runtime | None, report: Report) -> dict[str, Any]:
-    """Return the table by the working folder's package.xml; empty after a problem."""
+    """Return the table by the working folder's package.xml. Raises ReportedError."""
     root = Root.here()
     name = declared_name(root.base / MANIFEST, root, report)
     if name is None:
-        return {}
+        raise ReportedError
     if why := why_not_package(name):
         hint = "change `<name>`, and its uses in other packages"
-        report.add(codes.UNIMPORTABLE_PACKAGE.of(MANIFEST, f"`{name}` {why}", hint=hint))
-        return {}
+        raise report.refused(codes.UNIMPORTABLE_PACKAGE.of(MANIFEST, f"`{name}` {why}", hint=hint))
     statements = read_statements(root.base / MANIFEST, MANIFEST, root, report)
-    version = None if report.had_errors else _version(statements, report)
-    if version is None:
-        return {}
+    report.raise_errors()
+    version = _version(statements, report)
     table = {
         "name": name,
         "version": version,
@@ -61,7 +59,7 @@ def _texts(statements: Iterable[Statement], tag: str) -> list[str]:
     return list(dict.fromkeys(filter(None, texts)))
 
 
-def _version(statements: Iterable[Statement], report: Report) -> str | None:
+def _version(statements: Iterable[Statement], report: Report) -> str:
     """Return the version; report IDL610 if there is none, or one that ROS 2 does not know."""
     hint = "write three numbers, as in `<version>0.1.0</version>`"
     for statement in statements:
@@ -69,10 +67,8 @@ def _version(statements: Iterable[Statement], report: Report) -> str | None:
             if _VERSION.fullmatch(statement.text):
                 return statement.text
             message = f"`{statement.text}` is not a version of a ROS 2 package"
-            report.add(codes.BAD_PACKAGE_XML.at(statement.span, message, hint=hint))
-            return None
-    report.add(codes.BAD_PACKAGE_XML.of(MANIFEST, "no version in this file", hint=hint))
-    return None
+            raise report.refused(codes.BAD_PACKAGE_XML.at(statement.span, message, hint=hint))
+    raise report.refused(codes.BAD_PACKAGE_XML.of(MANIFEST, "no version in this file", hint=hint))
 
 
 def _license(names: Sequence[str]) -> str | dict[str, str] | None:

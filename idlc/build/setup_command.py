@@ -9,13 +9,13 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, TypeAlias
 
-from idlc.build.step import present, remove_leftovers, stop_if_outdated
 from idlc.cli import output
 from idlc.compiler.compiler import models_of
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.generate.prefix import libraries_of, shared
 from idlc.packaging.facts import home_of
 from idlc.project import prefixes
@@ -26,6 +26,7 @@ from idlc.project.inputs import packages
 from idlc.project.lock import FILE, load_lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
+from idlc.project.step import present, remove_leftovers, stop_if_outdated
 from idlc.tasks.gen import GenOptions, gen
 
 #: The commands of setup.py that pip runs.
@@ -57,7 +58,8 @@ def compiled_class(package: str, base: Any) -> type:
     home = folder.relative_to(where.root.base).as_posix()
     runtime, vendoring = settings.runtime, settings.vendoring
     before = _packages(package, folder)
-    gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
+    with suppress(ReportedError):
+        gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)

@@ -28,12 +28,13 @@ def obstacles(facts: Facts, model: Model) -> Iterator[Diagnostic]:
     """Report what keeps ROS 2's tools from building the package with its interfaces."""
     script = Script(facts.cmake) if facts.cmake else None
     types = facts.declared("build_type")
-    if _is_of_ros1(facts, script) and model.own:
+    if _is_of_ros1(facts, script):
+        port = f"call `{GENERATE}`" if model.own else "replace catkin's commands"
         yield codes.CANNOT_BUILD.at(
             facts.place,
             f"`{facts.name}` is a package for ROS 1: it is built with catkin, which ROS 2 lacks",
-            hint=f"for ROS 2, write `{_LINE.format('ament_cmake')}` in package.xml, and call "
-            f"`{GENERATE}` in CMakeLists.txt",
+            hint=f"for ROS 2, write `{_LINE.format('ament_cmake')}` in package.xml, and {port} in "
+            "CMakeLists.txt",
         )
     elif not types and (build_type := _probable_type(facts, script)):
         yield codes.CANNOT_BUILD.at(

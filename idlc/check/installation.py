@@ -376,8 +376,9 @@ def current_output(facts: Facts, model: Model) -> Iterator[Diagnostic]:
                 hint += f"except `{BUILD_STEP}`, which the build runs"
                 yield codes.STALE_GENERATED_CODE.of(output.path, message, hint=hint)
         elif output.package == facts.name and facts.whole:
-            words = ("gen", folder, "-o", home, *include_options(model))
+            words = ("gen", folder, "-o", home, *include_options(model, facts.include))
             recorded, used = output.dependencies, dependencies(model)
             before = with_dependencies(output.inputs, recorded, used)
             now = with_dependencies(facts.inputs, used, recorded)
-            yield from outdated(output.path, before, now, words)
+            project = None if facts.setup_py else facts.pyproject
+            yield from outdated(output.path, before, now, words, project)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 
 from idlc.diagnostics import codes
@@ -13,19 +14,30 @@ from idlc.diagnostics.source import Source
 from idlc.model import ir
 from idlc.model.catalog import is_standard
 from idlc.model.link import Model
+from idlc.packaging.files import SETUP_FILES
+from idlc.packaging.layout import build_backend
 from idlc.project.files import is_file
 from idlc.project.find import CLOSING, SKIPPED
 from idlc.project.inputs import Inputs
-from idlc.project.lock import FILE, Lock, load_lock, meaning
-from idlc.project.settings import Scope
+from idlc.project.lock import FILE, Lock, load_lock
+from idlc.project.settings import SETTINGS_FILE, Scope, included_outside, toml
+from idlc.project.step import meaning
+
+#: The tools of build backends that run nothing of the project, and so notice nothing.
+_UNAWARE = {"flit_core": "flit", "poetry": "poetry", "uv_build": "uv"}
 
 
 def outdated(
-    path: str, before: Mapping[str, str], now: Mapping[str, str], words: Sequence[str]
+    path: str,
+    before: Mapping[str, str],
+    now: Mapping[str, str],
+    words: Sequence[str],
+    project: Source | None,
 ) -> Iterator[Diagnostic]:
     """Yield the problem of generated code whose lock at `path` records other interfaces.
 
-    `words` are the arguments of idlc that generate it again.
+    `words` are the arguments of idlc that generate it again, `project` is the pyproject.toml of
+    what contains the code.
     """
     changed = []
     for name in sorted(before.keys() | now.keys()):
@@ -38,6 +50,10 @@ def outdated(
     if changed:
         message = f"the generated code is out of date: {first_few(changed, 3)}"
         hint = f"run `idlc {shlex.join(words)}`"
+        with suppress(ValueError):
+            backend = build_backend(toml(project.text)) if project else ""
+            if tool := _UNAWARE.get(backend.partition(".")[0]):
+                hint += f"; until then, {tool} builds wheels with the old classes"
         yield codes.STALE_GENERATED_CODE.of(path, message, hint=hint)
 
 
@@ -50,14 +66,16 @@ def dependencies(model: Model) -> dict[str, str]:
     return {str(name): meaning(source.text, name.package) for name, source in used.items()}
 
 
-def include_options(model: Model) -> list[str]:
+def include_options(model: Model, included: Sequence[str]) -> list[str]:
     """Return the options by which `idlc gen` finds the packages that a model uses.
 
-    Packages with absolute paths are installed, or found by settings.
+    Packages with absolute paths are installed, found by settings, or in folders outside of the base
+    that the command line `included`.
     """
-    paths = (PurePosixPath(source.path) for source in _used(model).values())
+    paths = [PurePosixPath(source.path) for source in _used(model).values()]
     folders = {path.parent.parent.as_posix() for path in paths if not path.is_absolute()}
-    return [word for folder in sorted(folders) for word in ("-I", folder)]
+    outside = included if any(path.is_absolute() for path in paths) else ()
+    return [word for folder in (*outside, *sorted(folders)) for word in ("-I", folder)]
 
 
 def _used(model: Model) -> dict[ir.TypeName, Source]:
@@ -103,9 +121,8 @@ def _fits(record: Lock, package: Inputs) -> bool:
 
 def _generated(home: Path) -> Iterator[Path]:
     """Yield the folders of generated code in the Python project around a folder."""
-    marks = ("pyproject.toml", "setup.py", "setup.cfg")
     places = (home, *home.parents)
-    projects = (place for place in places if any(is_file(place / mark) for mark in marks))
+    projects = (place for place in places if any(is_file(place / mark) for mark in SETUP_FILES))
     project = next(projects, None)
     for place, folders, names in os.walk(project) if project else ():
         if not CLOSING.isdisjoint((*folders, *names)):
@@ -135,9 +152,12 @@ def current_outputs(
         words = ["gen"]
         if not (scope.paths and scope.out and folder.is_relative_to(root.absolute(scope.out))):
             words += [root.shown(package.home), "-o", root.shown(folder)]
-            words += include_options(model)
+            words += include_options(model, included_outside(scope))
             words += [] if manifest else ["--package", record.package]
             words += {"": [], "private": ["--vendor-deps"], "beside": ["--vendor-deps=beside"]}[
                 record.vendoring
             ]
-        yield from outdated(root.shown(folder / FILE), before, now, words)
+        around = (place / SETTINGS_FILE for place in folder.parents)
+        file = next(filter(is_file, around), None)
+        project = root.read_source(file, root.shown(file), Report()) if file else None
+        yield from outdated(root.shown(folder / FILE), before, now, words, project)

@@ -18,6 +18,7 @@ from idlc.cli import completion, options
         "idlc columns rec.mcap /imu --where 'linear_acceleration.z > 12'",
         "idlc columns rec.mcap -o columns/",
         "idlc columns rec.mcap /imu /joints:position --grid /imu -o train.parquet",
+        "idlc columns 'ep_*.mcap' /image /joints:position --grid 30Hz --lerobot train/",
     ),
 )
 @click.argument("subject", metavar="REC", type=click.Path())
@@ -88,6 +89,28 @@ from idlc.cli import completion, options
     multiple=True,
     help="With --grid: use the time of recording (`log`) or of `header.stamp` (`header`).",
 )
+@click.option(
+    "--lerobot",
+    metavar="DIR",
+    type=click.Path(),
+    help="With --grid PERIOD: write a new data set for LeRobot, in version 3.0 of its format, with "
+    "an episode for each REC. Images become videos.",
+)
+@click.option(
+    "--feature",
+    "features",
+    metavar="NAME=COLUMN,...",
+    multiple=True,
+    help="With --lerobot: name the columns of a feature, such as `action=/cmd_vel.linear`. Each "
+    "other TOPIC becomes a feature, such as `observation.imu`.",
+)
+@click.option(
+    "--episodes",
+    metavar="TOPIC",
+    help="With --lerobot: begin an episode at each message of TOPIC. Its field `data` can contain "
+    "the task. An empty text, or false, ends an episode.",
+)
+@click.option("--task", metavar="TEXT", help="With --lerobot: describe what the robot does.")
 @click.option(
     "--each",
     metavar="FIELD",

@@ -1,6 +1,6 @@
 """Diagnostics as values: a problem, its location, and a hint.
 
-Passes append to one `Report`; nothing here prints, raises or knows a file system.
+Passes append to one `Report`; nothing here prints or knows a file system.
 Messages are lower-case, without a final stop, with the user's words in backticks.
 """
 
@@ -100,6 +100,10 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
         return path, self.code, start, end, about
 
 
+class ReportedError(Exception):
+    """A task cannot go on, for reasons that are in its report."""
+
+
 class Report:
     """The problems of one run, one per cause: the same code at the same location counts once.
 
@@ -121,6 +125,16 @@ class Report:
         """Add several problems."""
         for diagnostic in diagnostics:
             self.add(diagnostic)
+
+    def refused(self, diagnostic: Diagnostic) -> ReportedError:
+        """Add a problem after which the task cannot go on, and return what to raise."""
+        self.add(diagnostic)
+        return ReportedError()
+
+    def raise_errors(self) -> None:
+        """Raise ReportedError if any problem is an error, after a pass has reported all of them."""
+        if self.had_errors:
+            raise ReportedError
 
     def __iter__(self) -> Iterator[Diagnostic]:
         """Yield problems by file, offset and code."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from idlc.check.manifest import dependency
 from idlc.check.select import REMARK
-from idlc.diagnostics.report import Edit, Report, Severity, apply, first_few
+from idlc.diagnostics.report import Edit, Report, ReportedError, Severity, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.editor import parts, protocol
 from idlc.editor.elements import by_uri, differences, workspace_edit
@@ -234,18 +234,18 @@ def _update(state: ServerState, uri: str) -> None:
             REQUEST_FAILED, f"save first, because idlc compiles the files on disk: {names}"
         )
     report = Report()
+    kind = _INFO
     try:
         generated = run.make(report)
-    except OSError as error:
-        raise RequestError(REQUEST_FAILED, f"nothing was generated: {error}") from error
-    state.forget()
-    if report.had_errors:
-        texts = (f"{each.where[0]}: {each.code}: {each.message}" for each in report.errors)
-        message = f"idlc gen: nothing was written: {first_few(texts, NAMED)}"
-    else:
         outcomes = (f"{each.package}: {each.changes} in {each.out}" for each in generated)
         message = f"idlc gen: {first_few(outcomes, NAMED)}"
-    kind = _ERROR if report.had_errors else _INFO
+    except OSError as error:
+        raise RequestError(REQUEST_FAILED, f"nothing was generated: {error}") from error
+    except ReportedError:
+        kind = _ERROR
+        texts = (f"{each.where[0]}: {each.code}: {each.message}" for each in report.errors)
+        message = f"idlc gen: nothing was written: {first_few(texts, NAMED)}"
+    state.forget()
     state.notify("window/showMessage", {"type": kind, "message": message})
 
 

@@ -23,8 +23,8 @@ from idlc.model import ir
 from idlc.project.atomic import write_whole
 from idlc.project.files import cache_folder
 from idlc.project.find import KINDS
-from idlc.project.lock import digest
 from idlc.project.root import Root
+from idlc.project.step import digest
 
 # `file:` URIs, as editors on any system write them.
 

@@ -20,13 +20,13 @@ from idlc.editor.protocol import REQUEST_FAILED, RequestError
 from idlc.editor.state import InterfaceContext, Renaming, ServerState
 from idlc.model import derive, ir, names
 from idlc.packaging.cmake import calls
+from idlc.packaging.files import CMAKE_LISTS
 from idlc.project.files import is_file
 from idlc.project.root import Root
 from idlc.versions.changes import Change, levels_of
 from idlc.versions.packages import compare, renamed_interface
 
 #: The file that lists the interface files of a package.
-BUILD = "CMakeLists.txt"
 #: Letters of the longest name that a file can have on usual disks.
 LONGEST_NAME = 255
 #: Users that a warning names.
@@ -137,7 +137,9 @@ def rename_interface(
     report = Report()
     edits = _edits_of_users(home, new, report)
     if problem := next(iter(report), None):
-        raise RequestError(REQUEST_FAILED, f"idlc renamed nothing: {BUILD}: {problem.message}")
+        raise RequestError(
+            REQUEST_FAILED, f"idlc renamed nothing: {CMAKE_LISTS}: {problem.message}"
+        )
     used = users(old, home.snapshot, state)
     spans = (_last(span) for snapshot, span in used if snapshot.path_of(span.source) == asking.path)
     own = dict.fromkeys(Edit(Span(asking.source, span.start, span.end), new) for span in spans)
@@ -174,7 +176,7 @@ def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | 
             if not is_own or uri in state.documents:
                 edits.setdefault(uri, []).extend(some)
     for problem in report:
-        message = f"idlc did not edit {BUILD}: {problem.message}"
+        message = f"idlc did not edit {CMAKE_LISTS}: {problem.message}"
         state.notify("window/showMessage", {"type": 2, "message": message})
     return workspace_edit(edits, state) if edits else None
 
@@ -201,7 +203,7 @@ def _edits_of_users(
 
 def _in_cmake(context: InterfaceContext, report: Report) -> Iterator[Span]:
     """Yield the spans in which a package's CMakeLists.txt names an interface file."""
-    name, cmake = context.interface.name, context.path.parent.parent / BUILD
+    name, cmake = context.interface.name, context.path.parent.parent / CMAKE_LISTS
     root = Root(cmake.parent, context.state.texts())
     if not root.is_file(cmake):
         return

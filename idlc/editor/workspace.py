@@ -22,10 +22,12 @@ from idlc.compiler.compiler import internal_error
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import Audience, addressed_to
 from idlc.model import ir
+from idlc.packaging.files import PACKAGE_FILES
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
 from idlc.project.find import RULES, DiskSnapshot, FileListing, InterfaceFile, list_files, root_of
 from idlc.project.inputs import Inputs, output_folders
+from idlc.project.lock import FILE
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 from idlc.tasks.check import check_all, checkers
@@ -40,14 +42,7 @@ if TYPE_CHECKING:
 
 _BUG = "this is a bug in idlc, please report it"
 #: Files that a check of a package may read beside its interfaces.
-OTHER_INPUTS = (
-    MANIFEST,
-    settings.SETTINGS_FILE,
-    "CMakeLists.txt",
-    "setup.py",
-    "setup.cfg",
-    "idlc.lock",
-)
+OTHER_INPUTS = (*PACKAGE_FILES, FILE)
 
 
 class EditorSettings(msgspec.Struct, frozen=True, rename="camel"):

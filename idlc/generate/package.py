@@ -20,7 +20,8 @@ from idlc.model.ir import TypeName
 from idlc.model.link import Model
 from idlc.project import lock, write
 from idlc.project.library import Library
-from idlc.project.lock import BUILD_STEP, COPY_HEAD, FILE, Lock, Tree, Vendoring, digest, meaning
+from idlc.project.lock import BUILD_STEP, COPY_HEAD, FILE, Lock, Tree, Vendoring
+from idlc.project.step import digest, meaning
 from idlc.project.write import WritePlan
 from idlc.version import __version__
 

@@ -162,7 +162,7 @@ class Overlay(Target):
 
         They are in the order in which to write them: files come after those that they refer to.
         """
-        from idlc.project.templates import Code
+        from idlc.generate.templates import Code
 
         manifest = self.manifest or _rendered(
             "overlay/package.xml.jinja",
@@ -176,7 +176,7 @@ class Overlay(Target):
 
 def write_setup_scripts(overlay: Target) -> bool:
     """Write the setup files for shells; foreign files stay, with a note."""
-    from idlc.project.templates import EscapedText
+    from idlc.generate.templates import EscapedText
 
     prefix = EscapedText(quote(overlay.path.as_posix()))
     tree, changes = Tree(overlay.path), []
@@ -196,6 +196,6 @@ def write_setup_scripts(overlay: Target) -> bool:
 
 
 def _rendered(template: str, **variables: object) -> str:
-    from idlc.project.templates import code
+    from idlc.generate.templates import code
 
     return code().get_template(template).render(**variables)

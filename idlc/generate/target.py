@@ -14,28 +14,20 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.model.link import Model
+from idlc.packaging.files import SETUP_PY
 from idlc.project import inputs, prefixes, write
 from idlc.project.files import is_file, is_folder
-from idlc.project.lock import (
-    BUILD_STEP,
-    COPY_HEAD,
-    FILE,
-    Lock,
-    Runtime,
-    Tree,
-    digest,
-    encode,
-    load_lock,
-)
+from idlc.project.lock import BUILD_STEP, COPY_HEAD, FILE, Lock, Runtime, Tree, encode, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import SETTINGS_FILE
+from idlc.project.step import digest
 from idlc.project.write import FileChange, WritePlan, plan
 
 
 def build_step() -> bytes:
     """Return the file that builds without idlc run."""
-    source = Path(__file__).parents[1] / "build" / "step.py"
+    source = Path(__file__).parents[1] / "project" / "step.py"
     return (COPY_HEAD + source.read_text(encoding="utf-8")).encode()
 
 
@@ -126,7 +118,7 @@ class Target:
         """The file that the package's build runs; empty if there is no such build."""
         root = self._output.root
         manifest = root.manifest(self.path)
-        if manifest is not None and is_file(manifest.parent / "setup.py"):
+        if manifest is not None and is_file(manifest.parent / SETUP_PY):
             is_run = declared_name(manifest, root, Report()) == self.package
         else:
             is_run = self._is_step_named()
@@ -137,7 +129,7 @@ class Target:
         root = self._output.root
         for folder in self.path.parents:
             named = f"{self.path.relative_to(folder).as_posix()}/{BUILD_STEP}"
-            files = [folder / name for name in ("setup.py", SETTINGS_FILE)]
+            files = [folder / name for name in (SETUP_PY, SETTINGS_FILE)]
             sources = [root.read_source(file, "", Report()) for file in files if is_file(file)]
             if any(named in source.text for source in sources if source):
                 return True
@@ -215,7 +207,7 @@ class Target:
         """Report IDL616 for each file that is not what the command `again` would write."""
         hint = f"run `{again}`"
         if self.lock is None:
-            if self.report.had_errors:
+            if self.report.had_errors:  # the lock may be damaged
                 return
             message = f"`{self.name}` has no {self.home}{FILE} to compare with"
             self.report.add(codes.DRIFT.of(self.name, message, hint=hint))

@@ -9,6 +9,7 @@ from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.packaging.outcome import Edited, Outcome, Refused
 from idlc.project.package_xml import NOT_XML, Manifest, Statement, read, statements
+from idlc.project.root import MANIFEST
 
 #: The elements of a package.xml in the order of the schema: dependencies come after the head.
 HEAD = ("name", "version", "description", "maintainer", "license", "url", "author")
@@ -61,7 +62,7 @@ def add_dependencies(
         present = manifest.texts("member_of_group")
         new += [("member_of_group", GROUP)] if GROUP not in present else []
     for kind, name in new:
-        source = Source("package.xml", text)
+        source = Source(MANIFEST, text)
         text = apply(text, addition(source, statements(source), kind, name))[0]
     return Edited(text)
 

@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
+from idlc.packaging.files import SETUP_CFG, SETUP_PY
 from idlc.packaging.layout import PackageLayout
 from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused, already_taken, split
 from idlc.packaging.setup_edits import (
@@ -25,7 +26,7 @@ from idlc.packaging.setup_edits import (
     step_of,
 )
 from idlc.packaging.setup_py import DataFiles, Setup, name_of_call, parse, range_of
-from idlc.project.settings import toml
+from idlc.project.settings import SETTINGS_FILE, toml
 
 SECTION = "options.entry_points"
 KEY = "console_scripts"
@@ -115,7 +116,7 @@ EntryPointEdits: TypeAlias = tuple[Edit, ...] | str
 
 def add_to_setup(text: str, script: ConsoleScript) -> Outcome:
     """Return the file with a console script."""
-    setup = Setup(Source("setup.py", text))
+    setup = Setup(Source(SETUP_PY, text))
     if parse(text) is None:
         return _refusal(script, "this is not valid Python")
     lines = _lines(setup)
@@ -127,7 +128,7 @@ def add_to_setup(text: str, script: ConsoleScript) -> Outcome:
     if isinstance(change, str):
         return _refusal(script, change)
     new = apply(text, change)[0]
-    after = _lines(Setup(Source("setup.py", new)))
+    after = _lines(Setup(Source(SETUP_PY, new)))
     if not any(map(script.same, after)) or not lines <= after:
         return _refusal(script, UNKNOWN)
     return Edited(new)
@@ -236,23 +237,18 @@ def _in_literal(
     return (Edit(Span(setup.source, start + literal.start(2), end - 3), new.text),)
 
 
-PYPROJECT = "pyproject.toml"
-SETUP_CFG = "setup.cfg"
-SETUP_PY = "setup.py"
-
-
 def add_console_script(files: Mapping[str, str], script: ConsoleScript) -> tuple[str, Outcome]:
     """Return the file of a package to edit, and the edit; `files` are the existing ones.
 
     The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
     """
     for name in ("project", "tool.poetry"):
-        project = _table(files.get(PYPROJECT, ""), name)
+        project = _table(files.get(SETTINGS_FILE, ""), name)
         if isinstance(project, Refused):
-            return PYPROJECT, project._replace(line=_line(script))
+            return SETTINGS_FILE, project._replace(line=_line(script))
         dynamic = project.get("dynamic", ())
         if project and not {"scripts", "entry-points"}.intersection(dynamic):
-            return PYPROJECT, _in_pyproject(files[PYPROJECT], name, project, script)
+            return SETTINGS_FILE, _in_pyproject(files[SETTINGS_FILE], name, project, script)
     in_cfg = _section(files.get(SETUP_CFG, "").splitlines(), SECTION)
     if SETUP_PY in files and not in_cfg:
         return SETUP_PY, add_to_setup(files[SETUP_PY], script)
@@ -302,7 +298,7 @@ def add_launch(text: str, package: str, path: str) -> tuple[str, str]:
     The line is for a setup.py that idlc cannot edit or that computes its `data_files`.
     """
     element = f"('share/{package}/launch', ['{path}'])"
-    setup = Setup(Source("setup.py", text))
+    setup = Setup(Source(SETUP_PY, text))
     entries, listed = setup.data_files, setup.list_of("data_files")
     if any(_installs(entry, path) for entry in entries or ()):
         return text, ""
@@ -329,7 +325,7 @@ def add_package(text: str, package: str, view: PackageLayout | None) -> tuple[st
 
     `view` is setuptools' view of the folders, the package's included. What is computed stays.
     """
-    setup = Setup(Source("setup.py", text))
+    setup = Setup(Source(SETUP_PY, text))
     missing = f"add `{package}` to `packages`, unless the code that computes it does so"
     if view is None or (view.installed is None and "packages" in setup.arguments):
         return text, missing

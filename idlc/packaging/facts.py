@@ -11,15 +11,15 @@ import msgspec
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.packaging.cmake import GENERATE, calls
+from idlc.packaging.files import PackageFiles, read_package_files
 from idlc.packaging.neighbours import Neighbours
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
 from idlc.project.lock import BUILD_STEP, FILE, Lock, Runtime, load_lock
 from idlc.project.package_xml import Statement, statements
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import Scope
+from idlc.project.settings import Scope, included_outside
 
-_SETUP_FILES = ("setup.py", "setup.cfg", "pyproject.toml")
 _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
 
@@ -48,6 +48,8 @@ class Facts(msgspec.Struct, frozen=True):
     `interfaces` are the paths of all, checked or not, .idl files included.
     `folders` are those with files by dotted name, and whether they are Python packages.
     `index` is the list of interfaces that a setup.py installs for ROS 2's tools.
+    `include` are folders outside of the base that the command line included, if the package has
+    `outputs`.
     `has_build_step` is whether idlc wrote the file that a setup.py runs where idlc is missing.
     """
 
@@ -73,6 +75,7 @@ class Facts(msgspec.Struct, frozen=True):
     files: Mapping[str, str] = {}
     interfaces: frozenset[str] = frozenset()
     folders: Mapping[str, bool] = {}
+    include: tuple[str, ...] = ()
     has_build_step: bool = False
 
     @property
@@ -125,7 +128,7 @@ def facts(
     files = list(_files(folder))
     locks = _locks(files)
     generated = {at.parent / path for at, record in locks.items() for path in record.outputs}
-    cmake = _optional(folder / "CMakeLists.txt", root)
+    texts = _package_files(folder, root)
     modules = _modules(folder, [file for file in files if file not in generated], root)
     available = frozenset(ros_packages() if modules else ())
     present = folders(folder, files)
@@ -135,12 +138,9 @@ def facts(
         statements=declared,
         inputs=package.digests if locks else {},
         modules=modules,
-        setup_py=_optional(folder / "setup.py", root),
-        setup_cfg=_optional(folder / "setup.cfg", root),
-        pyproject=_optional(folder / "pyproject.toml", root),
-        cmake=cmake,
+        **texts._asdict(),
         index=_optional(folder / "resource/rosidl_interfaces" / package.package, root),
-        generates=cmake is not None and _generates(cmake),
+        generates=texts.cmake is not None and _generates(texts.cmake),
         native=any(file.suffix in _NATIVE for file in files),
         whole=_is_whole(package, files, scope),
         marker=(folder / "resource" / package.package).is_file(),
@@ -159,6 +159,7 @@ def facts(
             file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
         ),
         folders=present,
+        include=included_outside(scope) if locks else (),
         has_build_step=any(file.name == BUILD_STEP for file in files),
         available=available,
         providers=neighbours.providers(available) if modules else {},
@@ -238,13 +239,13 @@ def home_of(folder: Path, package: str, root: Root) -> Path:
     for home in homes:
         if (home / FILE).is_file():
             return home
-    setup, cfg, pyproject = (_optional(folder / name, root) for name in _SETUP_FILES)
-    if setup is not None:
+    texts = _package_files(folder, root)
+    if texts.setup_py is not None:
         from idlc.packaging.layout import layout
         from idlc.packaging.setup_py import Setup
 
         sources = {"src": False} if (folder / "src").is_dir() else {}
-        view = layout(Setup(setup), cfg, pyproject, sources)
+        view = layout(Setup(texts.setup_py), texts.setup_cfg, texts.pyproject, sources)
         if view is not None:
             return folder / view.folder(package)
     return homes[not homes[0].is_dir() and homes[1].is_dir()]
@@ -263,6 +264,10 @@ def _files(folder: Path) -> Iterator[Path]:
         for name in sorted(names):
             if name[0] != "." and name not in SKIPPED and (file := current / name).is_file():
                 yield file
+
+
+def _package_files(folder: Path, root: Root) -> PackageFiles:
+    return read_package_files(lambda name: _optional(folder / name, root))
 
 
 def _optional(path: Path, root: Root) -> Source | None:

@@ -10,7 +10,7 @@ from idlc.diagnostics.report import Report
 from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import KIND_FOLDERS
 from idlc.project.package_xml import read_statements
-from idlc.project.root import Root
+from idlc.project.root import MANIFEST, Root
 
 #: Python modules of ROS 2 without interfaces, and the package that provides each.
 LIBRARIES = {
@@ -52,7 +52,7 @@ class Neighbours:
         """The packages that each one depends on, for whatever purpose."""
         needs = {}
         for name, home in self._homes.items():
-            declared = read_statements(home / "package.xml", "package.xml", self._root, Report())
+            declared = read_statements(home / MANIFEST, MANIFEST, self._root, Report())
             needs[name] = {each.text for each in declared if each.tag.endswith("depend")}
         return needs
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import stat
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -91,10 +90,6 @@ RULES = "upgrade"
 SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
 #: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
-#: The name of a type or package, as ROS 2, Python or C++ writes it.
-_NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
-#: DDS, a configuration file of Zenoh, or an endpoint with a protocol of Zenoh.
-_ADDRESS = re.compile(r"dds(?:[:/]|\Z)|zenoh:|(?:tcp|tls|quic|udp|ws)/")
 NOTHING = Exclusions()
 
 
@@ -116,20 +111,6 @@ class InterfaceFile(msgspec.Struct, frozen=True):
     def key(self) -> str:
         """The name within the package, such as `msg/RobotCommand.msg`."""
         return f"{self.kind}/{self.name}.{self.kind}"
-
-
-def is_path(text: str, root: Root) -> bool:
-    """Return whether a word on the command line means a path rather than a type or package."""
-    named = _NAME.fullmatch(text) and Path(text).suffix not in KINDS
-    return not named or os.path.lexists(root.path(text))
-
-
-def is_address(word: str) -> bool:
-    """Return whether a word on the command line means a robot; a path that exists does not.
-
-    Malformed addresses count as well, so that connecting reports them.
-    """
-    return _ADDRESS.match(word) is not None and not os.path.lexists(word)
 
 
 class FileListing(msgspec.Struct, frozen=True):

@@ -13,12 +13,13 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import worded
 from idlc.model.ir import TypeName
+from idlc.model.names import why_not_package
 from idlc.project.files import decode, is_folder
 from idlc.project.find import InterfaceFile, find, list_files
-from idlc.project.lock import digest, meaning
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Scope, load_settings, scope
+from idlc.project.step import digest, meaning
 
 
 def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[InterfaceFile]]:
@@ -93,8 +94,6 @@ def _by_lock(home: Path, root: Root, digests: Callable[[], Mapping[str, str]]) -
 
 def accept_name(name: str, origin: str, report: Report) -> bool:
     """Return whether a package can have a name and be imported; reports IDL607."""
-    from idlc.model.names import why_not_package  # a check needs no emitter
-
     what = why_not_package(name)
     if not what:
         return True

@@ -5,7 +5,6 @@ The file is JSON, sorted and indented, and holds nothing specific to the machine
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import stat
@@ -21,6 +20,7 @@ from idlc.diagnostics.text import one_line
 from idlc.model.ir import TypeName
 from idlc.model.names import is_package_name
 from idlc.project.files import content, is_file, kind_of, read_bytes, reason
+from idlc.project.step import plain
 
 #: A path of a file that idlc may have written below a folder: a few plain names.
 _OWN = re.compile(r"(?:[\w-][\w.-]*/){0,7}[\w-][\w.-]*", re.ASCII)
@@ -169,54 +169,9 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         return self.vendoring == vendoring
 
 
-def digest(data: bytes) -> str:
-    """Return the SHA-256 of a file, for a text with line ends normalized.
-
-    On Windows, git checks texts out with other ones.
-    """
-    import hashlib  # loads OpenSSL, which a check does without
-
-    return hashlib.sha256(_plain(data)).hexdigest()
-
-
 def is_same(old: bytes | None, new: bytes | None) -> bool:
     """Return whether a file has a content already, with any line ends."""
-    return old == new or (old is not None and new is not None and _plain(old) == new)
-
-
-def _plain(data: bytes) -> bytes:
-    if b"\r" not in data or b"\0" in data:  # one byte is found much faster than two
-        return data
-    return data.replace(b"\r\n", b"\n")
-
-
-def meaning(text: str, package: str) -> str:
-    """Return a SHA-256 of an interface's text that ignores its comments and spelling.
-
-    Dependencies are recorded by it: the built-in catalogue has no comments and spells out what
-    an installed package abbreviates, and both compile to the same.
-    """
-    constants: list[str] = []
-    fields: list[str] = []
-    for line in text.splitlines():
-        code = line.partition("#")[0].replace("\t", " ").rstrip()
-        kind, _, rest = code.removeprefix(f"{package}/").partition(" ")
-        name, sign, value = rest.lstrip(" ").partition("=")
-        if sign:
-            constants.append(f"{kind} {name.rstrip(' ')}={_value(kind, value.strip(' '))}")
-        elif code:
-            name, _, value = name.partition(" ")
-            fields.append(f"{kind} {name} {_value(kind, value.strip(' '))}")
-        if kind.startswith("---"):
-            constants.append(kind)
-    return digest("\n".join((*constants, *fields)).encode())
-
-
-def _value(kind: str, text: str) -> str:
-    if kind in ("float32", "float64"):
-        with contextlib.suppress(ValueError):
-            return repr(float(text))
-    return text.lower() if kind == "bool" else text
+    return old == new or (old is not None and new is not None and plain(old) == new)
 
 
 def encode(lock: Lock) -> bytes:

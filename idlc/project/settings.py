@@ -288,6 +288,14 @@ class Scope(msgspec.Struct, frozen=True):
         return self.distros[0] if self.distros else BY_NAME.get(distribution().name, DEFAULT)
 
 
+def included_outside(scope: Scope) -> tuple[str, ...]:
+    """Return the folders outside of the base that the command line included."""
+    settings = load_settings(scope.root, Report())
+    given = (path for path in scope.include if path not in settings.include)
+    base = scope.root.base
+    return tuple(path for path in given if not scope.root.absolute(path).is_relative_to(base))
+
+
 def scope(
     settings: Config,
     package: str | None = None,

@@ -19,7 +19,8 @@ from idlc.diagnostics import report as diagnostics
 from idlc.diagnostics.report import Diagnostic, Edit, Report
 from idlc.project.atomic import create, exclusive, make_folder, move_over, uninterrupted
 from idlc.project.files import entries, reason
-from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
+from idlc.project.lock import Obstacle, Tree, is_same, may_be_own
+from idlc.project.step import digest
 
 #: Files of a package that are the user's where they exist already.
 YIELDING = frozenset({"__init__.py", "py.typed"})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cached_property, lru_cache
 from importlib import import_module
 from types import ModuleType
@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for, sources_of
-from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.compiler.requests import requested_packages
+from idlc.diagnostics import codes, terminal
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DISTROS, Distro, titles
 from idlc.model.python_names import class_
 from idlc.model.type_data import content
-from idlc.project.find import is_path
 from idlc.project.library import resolve
-from idlc.project.requests import requested_packages
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
+from idlc.project.words import read_word
+from idlc.recordings.arguments import message_class, texts
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import RECORDING, Origin, read_definition
-from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import KnownVersion, fits
 from idlc.recordings.memory import (
     ModelsByName,
@@ -61,9 +61,8 @@ def known_spec(package: str, module: str) -> Any:
     too. Raises CompileError.
     """
     if not is_kept(package):
-        report = Report()
-        models, _ = _models_of(package, (), None, report)
-        _raise_errors(report)
+        with _compiling() as report:
+            models, _ = _models_of(package, (), None, report)
         keep_as_named(models[package])
     return find_spec(module)
 
@@ -103,11 +102,15 @@ class LoadedPackages(ModuleType):
         return f"<loaded: {', '.join(dir(self))}>"
 
 
-def _raise_errors(report: Report) -> None:
-    if report.had_errors:
-        from idlc.diagnostics import terminal
-
-        raise CompileError("\n" + "\n".join(terminal.text(report)))
+@contextmanager
+def _compiling() -> Iterator[Report]:
+    """Give a report, and raise CompileError for errors in it."""
+    report = Report()
+    try:
+        yield report
+        report.raise_errors()
+    except ReportedError:
+        raise CompileError("\n" + "\n".join(terminal.text(report))) from None
 
 
 def loaded(
@@ -118,9 +121,11 @@ def loaded(
     read: TypesReader = read_topics,
 ) -> LoadedPackages:
     """Return the classes of what `idlc.load` names; `read` reads recordings."""
-    report = Report()
-    models, names = _models_of(str(what), tuple(include), distro, report, read)
-    _raise_errors(report)
+    if distro is not None and not isinstance(distro, str):
+        raise TypeError(f"`distro` is the name of a distribution, not {distro!r}")
+    folders = texts(include, "the folders of `include`")
+    with _compiling() as report:
+        models, names = _models_of(str(what), folders, distro, report, read)
     return LoadedPackages(models, names)
 
 
@@ -133,15 +138,16 @@ def _models_of(
 ) -> tuple[ModelsByName, Iterable[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
     where = scope(Config(root=Root.here()), None, include, distro=distro)
-    if is_recording(what, where.root):
-        groups = versions(topics_of(read, [what], (), where.root, report) or ())
+    meaning = read_word(what, where.root, "name")
+    if meaning == "recording":
+        groups = versions(topics_of(read, [what], (), where.root, report))
         check_versions(groups, report)
         if len(groups) != 1:
             return {}, ()
         types = recorded_types(groups[0], LocalTypes(where, report), Report())
         report.extend(types.errors)
         return types.models, {topic.interface for topic in types.topics}
-    if is_path(what, where.root):
+    if meaning == "path":
         packages = requested_packages([what], [], "", where, report)
         names = [name for package in packages for name in package.names]
         compiler = Compiler(library_for(packages, where, report))
@@ -151,8 +157,7 @@ def _models_of(
         library, definitions = resolve(what, where, report)
         names = [definition.interface for definition in definitions]
         compiler = Compiler(library)
-    if report.had_errors:
-        return {}, ()
+    report.raise_errors()
     every = Report()
     models = compiler.models(compiler.reached(names), every)
     report.extend(every.errors)
@@ -314,8 +319,8 @@ class MissingDefinitionWarning(UserWarning):
 def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return a program's class; raise RecordingError if messages are of another type."""
     try:
-        class_type = structure_of(owner_of(kind))
-    except (AttributeError, ImportError, KeyError, TypeError):
+        class_type = structure_of(owner_of(message_class(kind)))
+    except TypeError:
         hint = "omit it, or give a class that `idlc gen` generated"
         raise RecordingError(f"{kind!r} is not a message class of idlc", hint) from None
     if class_type.name != topic.type:

@@ -6,7 +6,7 @@ import copyreg
 import json
 import sys
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
@@ -84,9 +84,6 @@ def _keep(home: str, texts: Mapping[str, str]) -> None:
 
 def home_of(models: ModelsByName) -> str:
     """Return the package that holds the packages of models, after they are rendered if need be."""
-    from idlc.generate.python.imports import Surroundings
-    from idlc.generate.python.render import interface_files
-
     definitions = [
         (str(own.name), own.source and own.source.text, model.distro.converts_values)
         for model in models.values()
@@ -96,9 +93,8 @@ def home_of(models: ModelsByName) -> str:
     if home not in _IMPORTER.texts:
         texts = dict.fromkeys(models, "")
         for package, model in models.items():
-            for file in interface_files(model, Surroundings(others=f"{home}.", enums="none")):
-                module = file.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-                texts[f"{package}.{module}"] = file.text
+            for module, text in _modules(model, f"{home}."):
+                texts[f"{package}.{module}"] = text
         _keep(home, texts)
     return home
 
@@ -110,15 +106,21 @@ def is_kept(module: str) -> bool:
 
 def keep_as_named(model: Model) -> None:
     """Make a package importable under its own name, as other packages are for its classes."""
-    from idlc.generate.python.imports import Surroundings
-    from idlc.generate.python.render import interface_files
-
     package = model.package
     _IMPORTER.texts[package] = ""
     sys.modules[f"{package}._idlc"] = runtime
-    for file in interface_files(model, Surroundings(enums="none")):
-        name = file.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-        _IMPORTER.texts[f"{package}.{name}"] = file.text
+    for module, text in _modules(model):
+        _IMPORTER.texts[f"{package}.{module}"] = text
+
+
+def _modules(model: Model, others: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the modules of a package by dotted name; `others` is before the names of others."""
+    from idlc.generate.python.imports import Surroundings  # classes that are kept need no templates
+    from idlc.generate.python.render import interface_files
+
+    for file in interface_files(model, Surroundings(others=others, enums="none")):
+        path = file.path.removesuffix(".py").removesuffix("/__init__")
+        yield path.replace("/", "."), file.text
 
 
 def find_spec(module: str) -> ModuleSpec | None:

@@ -8,8 +8,9 @@ from pathlib import Path
 import msgspec
 
 from idlc.compiler.compiler import derived_names
+from idlc.compiler.requests import borrowed
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Label, Report, first_few
+from idlc.diagnostics.report import Diagnostic, Label, Report, ReportedError, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import including
 from idlc.model import ir
@@ -17,7 +18,6 @@ from idlc.model.link import Model, own_sections
 from idlc.model.lowering.lower_types import constant_name, field_name
 from idlc.project import inputs, prefixes
 from idlc.project.library import InterfaceTexts
-from idlc.project.requests import borrowed
 from idlc.project.settings import Scope
 from idlc.recordings.types import (
     NAMED,
@@ -93,14 +93,13 @@ def recorded_packages(
 ) -> tuple[list[inputs.Inputs], InterfaceTexts]:
     """Return the packages of recorded types with all that these need, and their definitions.
 
-    `whole` packages are for a prefix, where they hide those of the same name in others.
+    `whole` packages are for a prefix, where they hide those of the same name in others. Raises
+    ReportedError.
     """
-    topics = topics_of(read, paths, topics_wanted, scope.root, report)
-    if topics is None:
-        return [], {}
-    groups = versions(topics)
+    groups = versions(topics_of(read, paths, topics_wanted, scope.root, report))
     check_versions(groups, report)
-    if report.had_errors or not groups:
+    report.raise_errors()
+    if not groups:
         return [], {}
     types = recorded_types(groups[0], LocalTypes(scope, report), report)
     report.extend(contradicted(types))
@@ -137,21 +136,20 @@ def write_definitions(
 ) -> list[str]:
     """Write each definition of a recording, or of some topics, to its file; return their paths.
 
-    Files that exist with another content are an error, and nothing is written.
+    Files that exist with another content are an error, and nothing is written: ReportedError.
     """
     from idlc.project import write  # all readers of recordings import this module
 
-    groups = versions(topics_of(read, [recording], topics, scope.root, report) or ())
+    groups = versions(topics_of(read, [recording], topics, scope.root, report))
     check_versions(groups, report)
-    if report.had_errors:
-        return []
+    report.raise_errors()
     files: dict[str, bytes] = {}
     for name, source in groups[0].texts.items() if groups else ():
         suffix = "idl" if source.is_idl else name.kind
         files[f"{name.package}/{name.kind}/{name.name}.{suffix}"] = source.text.encode()
     if not files:
-        report.add(codes.NO_INTERFACES.of(recording, f"`{recording}` contains no definitions"))
-        return []
+        message = f"`{recording}` contains no definitions"
+        raise report.refused(codes.NO_INTERFACES.of(recording, message))
     folder, shown = Path(scope.root.path(out)).absolute(), out.rstrip("/")
     changes = write.compare(folder, shown, files, {}, report)
     for change in changes:
@@ -160,6 +158,7 @@ def write_definitions(
             hint = "choose another folder with -o"
             report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint=hint))
     plan = write.WritePlan(folder, tuple(changes), {})
-    if report.had_errors or not write.apply(plan, shown, report):
-        return []
+    report.raise_errors()
+    if not write.apply(plan, shown, report):
+        raise ReportedError
     return [write.shown(shown, path) for path in files]

@@ -26,6 +26,7 @@ from idlc.project.atomic import (
     move_new,
     uninterrupted,
 )
+from idlc.project.words import METADATA, ZSTD
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.container import is_db3, open_recording
@@ -36,7 +37,7 @@ from idlc.recordings.containers.conversion import (
     RewrittenTopic,
     RewrittenTopics,
 )
-from idlc.recordings.containers.db3_to_mcap import as_mcap
+from idlc.recordings.containers.db3_to_mcap import as_mcap, convert_db3
 from idlc.recordings.containers.file import full_name
 from idlc.recordings.containers.source import DamageError, RecordingError, first_bytes
 from idlc.recordings.damage import Damage, DamageList
@@ -68,7 +69,7 @@ BESIDE = ("-journal", "-shm", "-wal")
 
 def mcap_name(path: Path) -> str:
     """Return the name of the MCAP file that a recording becomes."""
-    plain = path.with_name(path.name.removesuffix(bag.ZSTD))
+    plain = path.with_name(path.name.removesuffix(ZSTD))
     return plain.with_suffix(".mcap").name if plain.suffix == ".db3" else plain.name
 
 
@@ -178,8 +179,6 @@ class _Rewriting:
         progress = partial(self.progress, path.name)
         with target.open("xb") as file:
             if is_db3(path):
-                from idlc.recordings.containers.db3_to_mcap import convert_db3
-
                 how = self.conversions, self.recorded, progress, self.strict
                 topics, damage = convert_db3(path, file, *how)
             else:
@@ -215,7 +214,7 @@ class _Rewriting:
         """Write a file that is compressed as a whole; the new one is not."""
         known = len(self.damage)
         with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
-            plain = Path(folder, path.name.removesuffix(bag.ZSTD))
+            plain = Path(folder, path.name.removesuffix(ZSTD))
             problem = unpack(path, plain)
             if problem and self.strict:
                 raise DamageError(f"`{path}`: {problem}")
@@ -250,15 +249,15 @@ class _Rewriting:
                 before = self.messages
                 self.split(path, target / mcap_name(path), len(paths) == 1)
                 if (target / mcap_name(path)).exists():
-                    counts[path.name.removesuffix(bag.ZSTD)] = self.messages - before
-            elif path.name not in (*beside, bag.METADATA):
+                    counts[path.name.removesuffix(ZSTD)] = self.messages - before
+            elif path.name not in (*beside, METADATA):
                 _copy(path, target / path.name)
-        metadata = folder / bag.METADATA
+        metadata = folder / METADATA
         if not metadata.is_file():
             return
         data = bag.retyped(metadata, self._new_type)
         if data is None:
-            _copy(metadata, target / bag.METADATA)
+            _copy(metadata, target / METADATA)
             return
         if self.damage:
             listed = bag.listed_topics(metadata)
@@ -269,7 +268,7 @@ class _Rewriting:
             data = bag.recounted(data, [self._count(topic, listed) for topic in listed], files)
         is_mcap = all(path.suffix == ".mcap" for path in paths)
         data = data if is_mcap else as_mcap(data.decode()).encode()
-        (target / bag.METADATA).write_bytes(data)
+        (target / METADATA).write_bytes(data)
 
 
 def _copy(path: Path, target: Path) -> None:

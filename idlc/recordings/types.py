@@ -14,7 +14,7 @@ import msgspec
 
 from idlc.compiler.compiler import Compiler
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.report import Diagnostic, Report, ReportedError, first_few
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.text import did_you_mean, including, worded
 from idlc.language.parse import parse_any
@@ -28,6 +28,7 @@ from idlc.project.files import missing
 from idlc.project.library import Folders, InterfaceTexts, Library
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.words import is_there
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.file import CDR, Topic, UnreadTopic
 from idlc.recordings.containers.source import RecordingError, is_local
@@ -40,8 +41,7 @@ from idlc.recordings.definitions import (
     TextCache,
     read_definition,
 )
-from idlc.recordings.find import is_there
-from idlc.wire.layout import oversized
+from idlc.wire.layout import report_oversized
 
 #: The number of versions that a topic is compared with.
 TRIED = 16
@@ -127,14 +127,14 @@ def read_topics(
 
 def topics_of(
     read: TypesReader, paths: Sequence[str], selected: Sequence[str], root: Root, report: Report
-) -> list[RecordedDefinition] | None:
-    """Return the topics of what `read` reads, or the selected ones; `None` after an error.
+) -> list[RecordedDefinition]:
+    """Return the topics of what `read` reads, or the selected ones.
 
-    Reports IDL655 for a topic that is in none of them.
+    Reports IDL655 for a topic that is in none of them, and raises ReportedError.
     """
     recordings = [read(path, root, report) for path in paths]
     if None in recordings:
-        return None
+        raise ReportedError
     topics = [topic for recording in recordings if recording for topic in recording.topics]
     names = dict.fromkeys(topic.topic.name for topic in topics)
     missing = [name for name in selected if name not in names]
@@ -144,7 +144,7 @@ def topics_of(
         message = f"no topic `{name}` in {' or '.join(f'`{path}`' for path in paths)}"
         report.add(codes.NO_SUCH_TOPIC.of("", message, hint=hint))
     if missing:
-        return None
+        raise ReportedError
     return [topic for topic in topics if not selected or topic.topic.name in selected]
 
 
@@ -387,8 +387,7 @@ class RecordedTypes:
         self.interfaces = compiler.reached(typed.interface for typed in self.topics)
         every = Report()
         self.models = compiler.models(self.interfaces, every)
-        if not every.had_errors:
-            every.extend(oversized(*self.models.values()))
+        report_oversized(self.models.values(), every)
         self.errors = Report()
         self.errors.extend(every.errors)
         faulty = {diagnostic.where[0] for diagnostic in self.errors}

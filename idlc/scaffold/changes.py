@@ -10,18 +10,20 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import SETUP_PY
 from idlc.packaging.outcome import Edited, Outcome
 from idlc.packaging.setup_edits import arrange
 from idlc.project.files import entries
 from idlc.project.library import Library
-from idlc.project.lock import Tree, digest
+from idlc.project.lock import Tree
 from idlc.project.package_xml import declared_name
-from idlc.project.root import Root
-from idlc.project.settings import load_settings, scope
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import SETTINGS_FILE, load_settings, scope
+from idlc.project.step import digest
 from idlc.project.write import FileChange, WritePlan, apply, compare, difference, shown
 from idlc.scaffold.roles import ROLES, EndpointSpec, Role
 
@@ -105,21 +107,20 @@ class Project:
     def generation(self) -> tuple[str, ...]:
         """Return the words of the command that compiles the package's interfaces."""
         included = [word for folder in self._settings.include for word in ("-I", folder)]
-        if "[tool.idlc]" in (self.text("pyproject.toml") or ""):
+        if "[tool.idlc]" in (self.text(SETTINGS_FILE) or ""):
             return ("gen", *included)
         home = home_of(self.path, self.package, self._settings.root)
         out = self.shown(home.relative_to(self.path).as_posix())
         return ("gen", self.name, "-o", out, *included)
 
-    def accepted(self, edits: Mapping[str, Outcome]) -> dict[str, str] | None:
-        """Return the edited texts; report IDL621 for each refusal and return `None`."""
-        if self._report.had_errors:  # a file that cannot be read is not missing
-            return None
+    def accepted(self, edits: Mapping[str, Outcome]) -> dict[str, str]:
+        """Return the edited texts; report IDL621 for each refusal. Raises ReportedError."""
+        self._report.raise_errors()  # a file that cannot be read is not missing
         edited = {}
         for path, outcome in edits.items():
             if isinstance(outcome, Edited):
                 edited[path] = outcome.text
-                if path == "setup.py":
+                if path == SETUP_PY:
                     edited[path] = arrange(self.text(path) or "", outcome.text)
                 continue
             place = self.shown(path)
@@ -127,15 +128,16 @@ class Project:
             lines = "these lines" if "\n" in outcome.line else "this line"
             hint = f"add {lines} {outcome.where}, then run the command again"
             self._report.add(codes.CANNOT_EDIT.of(place, message, hint=hint, detail=outcome.line))
-        return None if self._report.had_errors else edited
+        self._report.raise_errors()
+        return edited
 
     def write(
         self, added: Mapping[str, str], edited: Mapping[str, str] = MappingProxyType({})
-    ) -> ScaffoldResult | None:
-        """Write all files or none, or only show the changes; `None` after a problem.
+    ) -> ScaffoldResult:
+        """Write all files or none, or only show the changes.
 
         `edited` texts replace what was read before; `added` ones only an equal file, unless the
-        command runs with force. Reports IDL614 and IDL620.
+        command runs with force. Reports IDL614 and IDL620, and raises ReportedError.
         """
         files = {path: text.encode("utf-8") for path, text in sorted({**added, **edited}.items())}
         tree, owned = Tree(self.path), {}
@@ -162,14 +164,12 @@ class Project:
                     problem = codes.EXISTING_FILE.of(place, message, hint=hint, detail=detail)
                     self._report.add(problem)
             done.append(FileOutcome(path, what))
-        if self._report.had_errors:
-            return None
+        self._report.raise_errors()
         if self._settings.dry_run:
             return ScaffoldResult(self.name, tuple(done), tuple(self._diff(changes.values())))
-        plan = WritePlan(self.path, (*changes.values(),), {})
-        return (
-            ScaffoldResult(self.name, tuple(done)) if apply(plan, self.name, self._report) else None
-        )
+        if not apply(WritePlan(self.path, (*changes.values(),), {}), self.name, self._report):
+            raise ReportedError
+        return ScaffoldResult(self.name, tuple(done))
 
     def _diff(self, changes: Iterable[FileChange]) -> Iterator[str]:
         """Yield the lines of a unified diff of planned changes."""
@@ -186,26 +186,28 @@ class Project:
                 yield f"--- {before}\n+++ b/{path}\n"
 
 
-def find_package(settings: ScaffoldOptions, report: Report) -> Project | None:
-    """Return the package that the working folder belongs to; report a missing one."""
+def find_package(settings: ScaffoldOptions, report: Report) -> Project:
+    """Return the package that the working folder belongs to. Raises ReportedError."""
     root = settings.root
     path = root.manifest(root.base)
     if path is None:
         message = "this folder is not in a package: no package.xml here or above"
         hint = "run `idlc scaffold package NAME`, then `cd NAME`"
-        report.add(codes.NO_SUCH_PATH.of("package.xml", message, hint=hint))
-        return None
+        raise report.refused(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
     name = declared_name(path, root, report)
+    if name is None:
+        raise ReportedError
     folder = root.shown(path.parent) if path.parent != root.base else "."
-    return None if name is None else Project(folder, settings, report, name)
+    return Project(folder, settings, report, name)
 
 
 def check(role: Role, type_: str, settings: ScaffoldOptions) -> None:
     """Raise ValueError if there is no such interface for the package of the working folder."""
     report = Report()
-    project = find_package(settings, report)
-    if project is None or role.kind is None:
-        return  # a missing package is reported when the node is written
+    try:
+        project = find_package(settings, report)
+    except ReportedError:
+        return  # it is reported when the node is written
     type_name(EndpointSpec(role, type_, ""), project.package, project.library(), report)
     for problem in report:
         raise ValueError("; ".join(filter(None, (problem.message, problem.hint))))

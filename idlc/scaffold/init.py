@@ -21,14 +21,16 @@ from idlc.check.installation import check_setup, uninstalled_marker
 from idlc.check.select import selection
 from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, apply
+from idlc.diagnostics.report import Report, ReportedError, apply
 from idlc.diagnostics.source import Source, Span
 from idlc.generate.package import NUMPY, Generated
 from idlc.generate.python.fields import number_info
+from idlc.generate.templates import code
 from idlc.model import catalog, derive, ir
 from idlc.model.link import Model
 from idlc.packaging import dependencies
 from idlc.packaging.facts import folders
+from idlc.packaging.files import CMAKE_LISTS, SETUP_CFG, SETUP_FILES, SETUP_PY
 from idlc.packaging.layout import layout
 from idlc.packaging.outcome import Edited, Outcome, Refused
 from idlc.packaging.setup_edits import KEYWORD, append_element, step_before_setup
@@ -42,10 +44,9 @@ from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import INDEX
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE, load_settings, scope, toml
-from idlc.project.templates import code
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult, marked
 from idlc.scaffold.interface import implied_packages, starter
-from idlc.scaffold.layouts import SETUP, Layout, package_of, tool_of
+from idlc.scaffold.layouts import Layout, package_of, tool_of
 from idlc.scaffold.package import LICENSES, Package, package_files
 from idlc.scaffold.proof import GENERATED
 from idlc.tasks.check import check_all, checkers
@@ -110,11 +111,12 @@ class Draft:
     def put(self, path: str, outcome: Outcome | str, reason: str) -> None:
         """Give a file its text, which may be what it has; a refusal is reported."""
         outcome = Edited(outcome) if isinstance(outcome, str) else outcome
-        accepted = self.project.accepted({path: outcome})
-        if accepted and accepted[path] != self.text(path):
-            self._before.setdefault(path, self.project.text(path))
-            self._texts[path] = accepted[path]
-            self.reasons.setdefault(path, reason)
+        with suppress(ReportedError):  # so that a plan reports all refusals
+            text = self.project.accepted({path: outcome})[path]
+            if text != self.text(path):
+                self._before.setdefault(path, self.project.text(path))
+                self._texts[path] = text
+                self.reasons.setdefault(path, reason)
 
     def _source(self, path: str) -> Source | None:
         """Return a file as it will be, with its name for reports."""
@@ -123,7 +125,7 @@ class Draft:
 
     def configs(self) -> tuple[Source | None, Source | None]:
         """Return setup.cfg and pyproject.toml."""
-        return self._source("setup.cfg"), self._source(SETTINGS_FILE)
+        return self._source(SETUP_CFG), self._source(SETTINGS_FILE)
 
     def root(self) -> Root:
         """Return a root that sees the changes."""
@@ -134,8 +136,8 @@ class Draft:
             texts[self.path / path] = marked(text, old if isinstance(old, bytes) else b"")
         return Root(self.path, texts)
 
-    def write(self, report: Report, *, dry_run: bool = False) -> ScaffoldResult | None:
-        """Write all files or none, or only show the changes.
+    def write(self, report: Report, *, dry_run: bool = False) -> ScaffoldResult:
+        """Write all files or none, or only show the changes. Raises ReportedError.
 
         Reports IDL612 for a file that was edited since the changes were planned.
         """
@@ -145,8 +147,7 @@ class Draft:
             if project.text(path) != before:
                 message = f"`{path}` was changed while idlc was running"
                 report.add(codes.CANNOT_WRITE.of(path, message, hint="run it again"))
-        if report.had_errors:
-            return None
+        report.raise_errors()
         new = {path: text for path, text in self._texts.items() if not project.has(path)}
         return project.write(new, {p: text for p, text in self._texts.items() if p not in new})
 
@@ -214,8 +215,8 @@ def prepare(
     settings: ScaffoldOptions,
     report: Report,
     around: Mapping[str, Path] = MappingProxyType({}),
-) -> Preparation | None:
-    """Plan the changes to the package of a root; `None` after an error.
+) -> Preparation:
+    """Plan the changes to the package of a root. Raises ReportedError.
 
     `around` are the folders of other packages by name, which may define types that it uses.
     """
@@ -223,8 +224,7 @@ def prepare(
     if layout.kind == "empty":
         _new_package(layout, draft)
     config = load_settings(draft.root(), report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     # settings of a folder around this one are for other packages
     chosen = _Chosen()
     if config.folder == layout.folder:
@@ -233,27 +233,24 @@ def prepare(
     if not _is_below(layout.folder, out):
         message = f"the folder for the classes is outside this folder: `{out}`"
         hint = "set `out` in [tool.idlc] to a folder below it, then run `idlc init` again"
-        report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
-        return None
+        raise report.refused(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
     paths = [path for path in chosen.paths if is_folder(layout.folder / path)] or ["."]
     places = _places(draft, layout, paths, chosen.paths, report)
     if places:
         included = [] if config.include else _included(settings.root, paths, around)
         plain = {} if _is_set(draft, layout, chosen) else {"paths": places, "out": out}
         _settings(draft, layout, plain, included)
-    compiled = _compiled(draft.root(), layout, paths, report)
-    if compiled is None:
-        return None
-    inputs, model = compiled
+    inputs, model = _compiled(draft.root(), layout, paths, report)
     notes = _built(draft, layout, inputs, model, out, report)
     _ignored(draft, layout, out)
-    draft.write(report, dry_run=True)  # which reports links and others that are in the way
+    with suppress(ReportedError):  # which reports links and others that are in the way
+        draft.write(report, dry_run=True)
     _in_the_way(layout.folder, out, {name.kind for name in inputs.names}, report)
     module = module_of(out) if layout.kind == "library" else layout.name
     classes = tuple(f"{module}.{name.kind}.{name.name}" for name in sorted(inputs.names))
     is_packed = all(problem.code != codes.CLASSES_NOT_INSTALLED.id for problem in report)
-    plan = Preparation(layout, draft, out, classes, notes, is_packed)
-    return None if report.had_errors else plan
+    report.raise_errors()
+    return Preparation(layout, draft, out, classes, notes, is_packed)
 
 
 class _Chosen(NamedTuple):
@@ -289,11 +286,12 @@ def _is_below(folder: Path, path: str) -> bool:
 
 def _compiled(
     root: Root, layout: Layout, paths: Sequence[str], report: Report
-) -> tuple[Inputs, Model] | None:
-    """Return the package with its model; `None` after errors or without interfaces."""
+) -> tuple[Inputs, Model]:
+    """Return the package with its model. Raises ReportedError, also without interfaces."""
     where = scope(load_settings(root, report))
     found = list_files(paths, root, report, where.exclude)
-    read = () if report.had_errors else packages(found.files, where, report)
+    report.raise_errors()
+    read = packages(found.files, where, report)
     inner = [each for each in read if each.home != layout.folder and root.manifest(each.home)]
     for each in inner:  # its classes would become part of this package
         place = root.shown(each.home)
@@ -304,8 +302,9 @@ def _compiled(
     problems = Report()
     compiled = [*models_of(read, where, problems)] if read else []
     report.extend(problems.errors)  # `idlc check` shows the others
-    if report.had_errors or not compiled:
-        return None
+    report.raise_errors()
+    if not compiled:
+        raise ReportedError
     return next((each for each in compiled if each[0].package == layout.name), compiled[0])
 
 
@@ -454,8 +453,8 @@ def _ament_python(
     if not layout.backend.startswith("setuptools."):
         tool = tool_of(layout.backend)
         return (
-            f"{tool} builds the package, so idlc writes no {SETUP}; for ROS 2's tools, have {tool} "
-            f"install the interfaces into `share/{name}`, and a file that lists them as "
+            f"{tool} builds the package, so idlc writes no {SETUP_PY}; for ROS 2's tools, have "
+            f"{tool} install the interfaces into `share/{name}`, and a file that lists them as "
             f"`{INDEX}/rosidl_interfaces/{name}`"
         )
     marker = f"resource/{name}"
@@ -469,7 +468,7 @@ def _ament_python(
 
 def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) -> str:
     """Have setup.py compile and install the interfaces; return what idlc cannot see."""
-    text, others = draft.text(SETUP), draft.configs()
+    text, others = draft.text(SETUP_PY), draft.configs()
     whole = _SETUP_TEXT.replace("(", f"(name='{name}', ")
     if text is None:
         is_named = any(other and _NAME.search(other.text) for other in others)
@@ -477,33 +476,33 @@ def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) ->
     try:
         ast.parse(text.removeprefix(BOM))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        message = f"cannot edit `{SETUP}`: {getattr(error, 'msg', 'it is nested too deeply')}"
-        place = _place(Source(SETUP, text), error)
+        message = f"cannot edit `{SETUP_PY}`: {getattr(error, 'msg', 'it is nested too deeply')}"
+        place = _place(Source(SETUP_PY, text), error)
         hint = "fix it, then run `idlc init` again"
         report.add(codes.CANNOT_EDIT.at(place, message, hint=hint))
         return ""
     existing, problems = folders(draft.path), Report()
     for _ in range(_ROUNDS):
-        source = Source(SETUP, text)
+        source = Source(SETUP_PY, text)
         problems = check_setup(source, name, files, existing, others)
         problems.extend(uninstalled_marker(Setup(source), name))
         new = apply(text, (edit for problem in problems for edit in problem.edits))[0]
         if new == text:
             break
         text = new
-    setup = Setup(Source(SETUP, text))
+    setup = Setup(Source(SETUP_PY, text))
     outcome = _with_keyword(setup, whole)
     if isinstance(outcome, Edited) and outcome.text != text:
-        edited = Source(SETUP, outcome.text)
+        edited = Source(SETUP_PY, outcome.text)
         again = check_setup(edited, name, files, existing, others)
         steps = (edit for problem in again for edit in problem.edits)
         outcome = Edited(apply(edited.text, steps)[0])
-    draft.put(SETUP, outcome, "builds compile the interfaces and install their classes")
+    draft.put(SETUP_PY, outcome, "builds compile the interfaces and install their classes")
     report.extend(problem for problem in problems if not problem.edits)
     view = layout(setup, *others, existing)
     if view is not None and view.installed is not None:
         return ""
-    note = f"idlc does not run {SETUP}, which computes `packages`; a build with idlc adds the "
+    note = f"idlc does not run {SETUP_PY}, which computes `packages`; a build with idlc adds the "
     note += "generated packages; for builds without idlc, write "
     note += (
         f"`packages=find_packages(exclude=['test', 'test.*'])`, or add `{name}` and its subpackages"
@@ -529,7 +528,7 @@ def _ament_cmake(draft: Draft, inputs: Inputs, report: Report) -> None:
     """Fix package.xml and CMakeLists.txt as `idlc check --fix` does; report why no build works."""
     reasons = {
         MANIFEST: "the package declares the packages that its interfaces use",
-        "CMakeLists.txt": "rosidl receives each interface and the packages that it uses",
+        CMAKE_LISTS: "rosidl receives each interface and the packages that it uses",
     }
     for _ in range(_ROUNDS):
         root = draft.root()
@@ -557,13 +556,14 @@ def _place(source: Source, error: BaseException) -> Span:
 
 def _setuptools(draft: Draft, out: str, files: Mapping[str, str], report: Report) -> None:
     """Have setuptools pack the classes, where its configuration would leave them out."""
-    text = draft.text(SETUP)
-    source = Source(SETUP, _PLAIN_SETUP if text is None else text)
+    text = draft.text(SETUP_PY)
+    source = Source(SETUP_PY, _PLAIN_SETUP if text is None else text)
     every = check_setup(source, module_of(out), files, folders(draft.path), draft.configs())
     problems = [each for each in every if each.code == codes.CLASSES_NOT_INSTALLED.id]
     if text is not None:
         edits = (edit for problem in problems for edit in problem.edits)
-        draft.put(SETUP, apply(text, edits)[0], "the wheel contains the classes of the interfaces")
+        reason = "the wheel contains the classes of the interfaces"
+        draft.put(SETUP_PY, apply(text, edits)[0], reason)
     for problem in problems:
         if text is None and problem.span is not None and problem.span.source is source:
             top = out.partition("/")[0]
@@ -587,13 +587,13 @@ def _outdated_builds(draft: Draft, layout: Layout, out: str) -> str:
     if tool == "setuptools" and layout.kind != "library":
         return ""  # setup.py stops the build
     if tool == "setuptools":
-        setup = Setup(Source(SETUP, draft.text(SETUP) or _PLAIN_SETUP))
+        setup = Setup(Source(SETUP_PY, draft.text(SETUP_PY) or _PLAIN_SETUP))
         edits = step_before_setup(setup, out, is_library=True)
         if edits and step not in setup.source.text:
-            draft.put(SETUP, apply(setup.source.text, edits)[0], reason)
+            draft.put(SETUP_PY, apply(setup.source.text, edits)[0], reason)
     elif tool in _HOOKS and (new := _with_setting(text, *_HOOKS[tool], step)):
         draft.put(SETTINGS_FILE, new, reason)
-    if any(step in (draft.text(path) or "") for path in (SETUP, SETTINGS_FILE)):
+    if any(step in (draft.text(path) or "") for path in (SETUP_PY, SETTINGS_FILE)):
         return ""
     return (
         f"{tool} installs the classes that the last `idlc gen` wrote, even if the interfaces have "
@@ -646,7 +646,7 @@ def _numpy(draft: Draft) -> str:
             if toml(new) == wanted and "dependencies" not in project.get("dynamic", ()):
                 draft.put(SETTINGS_FILE, new, reason)
                 return ""
-    elsewhere = (draft.text(path) or "" for path in (SETUP, "setup.cfg", SETTINGS_FILE))
+    elsewhere = (draft.text(path) or "" for path in SETUP_FILES)
     return (
         "" if "numpy" in "".join(elsewhere) else f"{reason}: add it to the library's dependencies"
     )
@@ -671,7 +671,7 @@ def _ignored(draft: Draft, layout: Layout, out: str) -> None:
     if layout.kind != "library":
         del lines[1]
     step = f"{out}/{BUILD_STEP}"
-    if not any(step in (draft.text(path) or "") for path in (SETUP, SETTINGS_FILE)):
+    if not any(step in (draft.text(path) or "") for path in (SETUP_PY, SETTINGS_FILE)):
         lines = [line for line in lines if step not in line]
     attributes = draft.text(".gitattributes")
     reason = "reviews hide generated code"
@@ -687,8 +687,8 @@ def _with_lines(text: str | None, lines: Iterable[str]) -> str:
     return text + "".join(f"{line}{ending}" for line in lines if line not in present)
 
 
-def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
-    """Plan the file by which a service checks the repository; `None` after a report."""
+def continuous(service: str, layout: Layout, report: Report) -> Draft:
+    """Plan the file by which a service checks the repository. Raises ReportedError."""
     top = git.repository_of(layout.folder) or layout.folder
     path, template = SERVICES[service]
     # what CMake's packages generate for Python is not committed, and others name their folder
@@ -704,8 +704,7 @@ def continuous(service: str, layout: Layout, report: Report) -> Draft | None:
         return draft
     message = f"`{path}` exists, and idlc does not edit it"
     hint = "add the missing lines"
-    report.add(codes.EXISTING_FILE.of(path, message, hint=hint, detail=text.rstrip()))
-    return None
+    raise report.refused(codes.EXISTING_FILE.of(path, message, hint=hint, detail=text.rstrip()))
 
 
 def obtaining(draft: Draft) -> list[str]:

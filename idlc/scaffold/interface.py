@@ -14,8 +14,10 @@ from idlc.model.link import Model
 from idlc.packaging import dependencies
 from idlc.packaging.cmake import calls
 from idlc.packaging.facts import folders
+from idlc.packaging.files import CMAKE_LISTS, SETUP_PY
 from idlc.packaging.outcome import Edited, Outcome, Refused
-from idlc.project.settings import load_settings
+from idlc.project.root import MANIFEST
+from idlc.project.settings import SETTINGS_FILE, load_settings
 from idlc.scaffold.changes import ScaffoldOptions, ScaffoldResult, find_package
 from idlc.scaffold.package import rendered_for
 
@@ -88,7 +90,7 @@ _LIST = "dependencies"
 
 def add_cmake_dependencies(text: str, names: Sequence[str]) -> Outcome:
     """Return the file with packages added to its list of dependencies."""
-    commands = list(calls(Source("CMakeLists.txt", text)))
+    commands = list(calls(Source(CMAKE_LISTS, text)))
     words = {word for command in commands for word in command.words}
     missing = [name for name in names if name not in words]
     if not missing:
@@ -102,9 +104,6 @@ def add_cmake_dependencies(text: str, names: Sequence[str]) -> Outcome:
     return Edited(apply(text, edits)[0])
 
 
-CMAKE = "CMakeLists.txt"
-MANIFEST = "package.xml"
-SETUP = "setup.py"
 #: The test that `colcon test` runs, for a package with [tool.idlc].
 TEST = "test/test_interfaces.py"
 
@@ -123,11 +122,9 @@ def interface(
     fields: Sequence[str],
     settings: ScaffoldOptions,
     report: Report,
-) -> ScaffoldResult | None:
-    """Write an interface file into the package that the working folder belongs to."""
+) -> ScaffoldResult:
+    """Write an interface file into the package of the working folder. Raises ReportedError."""
     project = find_package(settings, report)
-    if project is None:
-        return None
     own = project.package
     path = f"{kind}/{name}.{kind}"
     text = interface_text(kind, fields)
@@ -135,10 +132,9 @@ def interface(
     source = Source(project.shown(path), text)
     named = [(ir.TypeName(own, kind, name), source)]
     model = compile_package(own, named, project.library(), report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     added = {path: text}
-    has_settings = "[tool.idlc]" in (project.text("pyproject.toml") or "")
+    has_settings = "[tool.idlc]" in (project.text(SETTINGS_FILE) or "")
     if has_settings and not project.has(TEST):
         with stage("scaffold", name):
             added[TEST] = rendered_for(own, "package/test_interfaces.py.jinja")
@@ -146,21 +142,19 @@ def interface(
     manifest = project.text(MANIFEST) or ""
     declared = dependencies.add_dependencies(manifest, depends=needed, tests=tests, group=True)
     edits: dict[str, Outcome] = {MANIFEST: declared}
-    keys, setup = {*project.keys(), path}, project.text(SETUP)
-    cmake = project.text(CMAKE)
+    keys, setup = {*project.keys(), path}, project.text(SETUP_PY)
+    cmake = project.text(CMAKE_LISTS)
     if cmake is not None:
-        edits[CMAKE] = add_cmake_dependencies(cmake, needed)
+        edits[CMAKE_LISTS] = add_cmake_dependencies(cmake, needed)
     elif setup is not None:
         wired = add_interfaces(setup, own, keys, folders(project.path))
-        edits[SETUP] = Edited(wired)
+        edits[SETUP_PY] = Edited(wired)
     edited = project.accepted(edits)
-    if edited is None:
-        return None
     if cmake is None:  # the file by which ROS 2's tools know a package's interfaces: language 9
         edited[f"resource/rosidl_interfaces/{own}"] = "".join(f"{key}\n" for key in sorted(keys))
     result = project.write(added, edited)
     after = project.generation() if cmake is None else ()
-    return result and result._replace(following=after)
+    return result._replace(following=after)
 
 
 def add_interfaces(
@@ -170,5 +164,5 @@ def add_interfaces(
 
     Computed values stay; `idlc check` and the build report missing ones then.
     """
-    problems = check_setup(Source("setup.py", text), package, {key: key for key in keys}, folders)
+    problems = check_setup(Source(SETUP_PY, text), package, {key: key for key in keys}, folders)
     return apply(text, (edit for problem in problems for edit in problem.edits))[0]

@@ -15,11 +15,12 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.report import Diagnostic, Report, ReportedError, first_few
 from idlc.diagnostics.source import Source
 from idlc.diagnostics.terminal import counted
 from idlc.model.names import is_module_name, why_not_package
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import CMAKE_LISTS, SETUP_PY
 from idlc.packaging.layout import SETUPTOOLS, build_backend
 from idlc.project.files import entries, is_file
 from idlc.project.find import CLOSING, KIND_FOLDERS, NOTHING, list_files
@@ -29,7 +30,6 @@ from idlc.project.settings import SETTINGS_FILE, broken_toml, load_settings, sco
 
 LayoutKind: TypeAlias = Literal["ament_python", "ament_cmake", "library", "empty", "workspace"]
 
-SETUP = "setup.py"
 #: Files that may lie in a folder in which a package begins, and in a package's `src`.
 _PLAIN = re.compile(r"(?i)\..*|(readme|licen[cs]e|copying|notice)\b.*|pyproject\.toml")
 #: Folders of a project that hold no library.
@@ -68,14 +68,13 @@ class Layout(NamedTuple):
         return f"this folder has no package yet; idlc creates the ament_python package {self.name}"
 
 
-def layout_of(root: Root, report: Report) -> Layout | None:
-    """Return the layout of a root's folder; `None` after a report on one that is not clear."""
+def layout_of(root: Root, report: Report) -> Layout:
+    """Return the layout of a root's folder; ReportedError if it is not clear."""
     folder = root.base
     if is_file(folder / MANIFEST):
         return _of_manifest(root, report)
     document = _document(root, report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     tool = document.get("tool", {})
     is_poetry = isinstance(tool, dict) and "poetry" in tool
     is_project = "project" in document or "build-system" in document or is_poetry
@@ -91,7 +90,7 @@ def layout_of(root: Root, report: Report) -> Layout | None:
         return Layout("workspace", folder, packages=listing.packages)
     if is_project:
         return _library(root, document, report)
-    if is_file(folder / SETUP):
+    if is_file(folder / SETUP_PY):
         return _library(root, {}, report)
     return _empty(root, report)
 
@@ -112,18 +111,19 @@ def _is_in(file: Path, packages: Iterable[Path]) -> bool:
     return any(file.is_relative_to(package) for package in packages)
 
 
-def _of_manifest(root: Root, report: Report) -> Layout | None:
+def _of_manifest(root: Root, report: Report) -> Layout:
     folder = root.base
     name = declared_name(folder / MANIFEST, root, problems := Report())
     if not name:
         hint = "fix it, then run `idlc init` again"
         report.extend(msgspec.structs.replace(problem, hint=hint) for problem in problems)
-        return None
+        raise ReportedError
     why = why_not_package(name)
     if why:
         message = f"`{name}` {why}"
-        report.add(codes.BAD_PACKAGE_XML.of(MANIFEST, message, hint="change its `<name>`"))
-        return None
+        raise report.refused(
+            codes.BAD_PACKAGE_XML.of(MANIFEST, message, hint="change its `<name>`")
+        )
     declared = read_statements(folder / MANIFEST, MANIFEST, root, report)
     types = [statement.text for statement in declared if statement.tag == "build_type"]
     # packages for both ROS versions have two, each with a condition
@@ -131,19 +131,18 @@ def _of_manifest(root: Root, report: Report) -> Layout | None:
     if types == ["ament_python"]:
         home = home_of(folder, name, root).relative_to(folder).as_posix()
         return Layout("ament_python", folder, name, home, backend=_backend(root, report))
-    if types in ([], ["ament_cmake"]) and is_file(folder / "CMakeLists.txt"):
+    if types in ([], ["ament_cmake"]) and is_file(folder / CMAKE_LISTS):
         return Layout("ament_cmake", folder, name, f"build/{name}")
     kind = f"of the build type `{types[0]}`" if types else "without a build type"
     message = f"`{name}` is a package {kind}, but idlc only sets up ament_python and ament_cmake"
     hint = f"generate its classes with `idlc gen . -o build/{name}`"
-    report.add(codes.CANNOT_EDIT.of(MANIFEST, message, hint=hint))
-    return None
+    raise report.refused(codes.CANNOT_EDIT.of(MANIFEST, message, hint=hint))
 
 
 def _backend(root: Root, report: Report) -> str:
     """Return the build backend of an ament_python package; colcon runs a setup.py first."""
     source = None
-    if is_file(root.base / SETTINGS_FILE) and not is_file(root.base / SETUP):
+    if is_file(root.base / SETTINGS_FILE) and not is_file(root.base / SETUP_PY):
         source = root.read_source(SETTINGS_FILE, SETTINGS_FILE, report)
     document: dict[str, Any] = {}
     with suppress(ValueError):  # the settings in it are reported later
@@ -151,7 +150,7 @@ def _backend(root: Root, report: Report) -> str:
     return build_backend(document)
 
 
-def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | None:
+def _library(root: Root, document: dict[str, Any], report: Report) -> Layout:
     """Return the layout of a project without package.xml, by the Python package that it holds."""
     folder = root.base
     system, project = (
@@ -163,8 +162,7 @@ def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | N
     if backend == "idlc.backend":
         message = f"`{backend}` builds ROS 2 packages, but there is no {MANIFEST}"
         hint = "`idlc scaffold package my_msgs --interfaces` creates a folder that you can build"
-        report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
-        return None
+        raise report.refused(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
     base, names = "src/", _python_packages(folder / "src")
     if not names:
         base, names = "", _python_packages(folder)
@@ -176,9 +174,8 @@ def _library(root: Root, document: dict[str, Any], report: Report) -> Layout | N
         name = name or own or PurePosixPath(out).parent.name  # without an __init__.py
         home = str(PurePosixPath(out).parent) if out else f"{base}{name}"
         return Layout("library", folder, name, home, backend)
-    place = SETTINGS_FILE if document else SETUP
-    report.add(_unclear_library(root, place, base, names))
-    return None
+    place = SETTINGS_FILE if document else SETUP_PY
+    raise report.refused(_unclear_library(root, place, base, names))
 
 
 def _unclear_library(root: Root, place: str, base: str, names: Sequence[str]) -> Diagnostic:
@@ -233,7 +230,7 @@ def _belongs_to_empty(path: Path) -> bool:
     return any((path / marker).exists() for marker in CLOSING)
 
 
-def _empty(root: Root, report: Report) -> Layout | None:
+def _empty(root: Root, report: Report) -> Layout:
     """Return the layout of a folder that holds at most interfaces; its name is the package's."""
     folder = root.base
     others = [path.name for path in entries(folder) if not _belongs_to_empty(path)]
@@ -246,10 +243,8 @@ def _empty(root: Root, report: Report) -> Layout | None:
             "this folder has no package.xml, setup.py or project in pyproject.toml, but other "
         )
         message += f"files: {listed}"
-        report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
-    elif why:
+        raise report.refused(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
+    if why:
         message = f"the folder's name is not a valid package name: `{name or folder.name}` {why}"
-        report.add(codes.UNIMPORTABLE_PACKAGE.of("", message, hint=hint))
-    else:
-        return Layout("empty", folder, name, name, backend=SETUPTOOLS)
-    return None
+        raise report.refused(codes.UNIMPORTABLE_PACKAGE.of("", message, hint=hint))
+    return Layout("empty", folder, name, name, backend=SETUPTOOLS)

@@ -17,11 +17,13 @@ from idlc.model import ir
 from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.packaging import dependencies, entry_points, launch_py
 from idlc.packaging.facts import folders, home_of
+from idlc.packaging.files import CMAKE_LISTS, SETUP_FILES, SETUP_PY, read_package_files
 from idlc.packaging.layout import layout
 from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused
 from idlc.packaging.setup_py import Setup
 from idlc.project.package_xml import statements
 from idlc.project.prefixes import distribution, python_folders
+from idlc.project.root import MANIFEST
 from idlc.project.settings import load_settings
 from idlc.scaffold import changes, interface, spec
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult
@@ -29,9 +31,6 @@ from idlc.scaffold.node import render, render_test, test_packages
 from idlc.scaffold.package import rendered_for
 from idlc.scaffold.spec import NodePlan, plan
 
-MANIFEST = "package.xml"
-SETUP = "setup.py"
-SETUP_FILES = ("pyproject.toml", "setup.cfg", SETUP)
 TESTS = "test"
 #: Tests of robust nodes have fixtures of their own.
 ROBUST_TESTS = "test/robust"
@@ -80,9 +79,9 @@ def node_entry(
     node = planned.node
     script = ConsoleScript(node.name, f"{node.package}.{node.name}:main")
     described = {name: texts[name] for name in SETUP_FILES if name in texts}
-    if (own := tuple(keys)) and SETUP in described:
-        text = described[SETUP]
-        described[SETUP] = interface.add_interfaces(text, node.package, own, folders)
+    if (own := tuple(keys)) and SETUP_PY in described:
+        text = described[SETUP_PY]
+        described[SETUP_PY] = interface.add_interfaces(text, node.package, own, folders)
     path, outcome = entry_points.add_console_script(described, script)
     launch = not planned.once
     manifest = dependencies.add_dependencies(
@@ -120,13 +119,13 @@ def _with_launch(entry: NodeEntry, node: spec.NodeSpec, texts: Mapping[str, str]
         edits[path] = started
     else:
         added[path] = started.text
-    before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
-    if SETUP in texts and isinstance(before, Edited):
+    before = edits.get(SETUP_PY, Edited(texts.get(SETUP_PY, "")))
+    if SETUP_PY in texts and isinstance(before, Edited):
         text, line = entry_points.add_launch(before.text, node.package, path)
-        edits[SETUP] = Edited(text)
+        edits[SETUP_PY] = Edited(text)
         if line:
             why = f"does not show whether it installs `{path}`"
-            notes.append((SETUP, f"{why}: if not, add {line} to `data_files`"))
+            notes.append((SETUP_PY, f"{why}: if not, add {line} to `data_files`"))
     return NodeEntry(added, edits, tuple(notes))
 
 
@@ -141,17 +140,17 @@ def _installed_package(
 
     `start` is the file that makes the folder a package.
     """
-    before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
-    if SETUP not in texts or not isinstance(before, Edited):
+    before = edits.get(SETUP_PY, Edited(texts.get(SETUP_PY, "")))
+    if SETUP_PY not in texts or not isinstance(before, Edited):
         return
-    sources = [Source(name, texts[name]) if name in texts else None for name in SETUP_FILES]
+    files = read_package_files(lambda name: Source(name, texts[name]) if name in texts else None)
     home = start.rpartition("/")[0].replace("/", ".")
-    setup = Setup(Source(SETUP, before.text))
-    view = layout(setup, sources[1], sources[0], {**folders, home: True})
+    setup = Setup(Source(SETUP_PY, before.text))
+    view = layout(setup, files.setup_cfg, files.pyproject, {**folders, home: True})
     text, missing = entry_points.add_package(before.text, package, view)
-    edits[SETUP] = Edited(text)
+    edits[SETUP_PY] = Edited(text)
     if missing and start not in texts:
-        yield SETUP, f"may not install the node: {missing}"
+        yield SETUP_PY, f"may not install the node: {missing}"
 
 
 def _tests(planned: NodePlan) -> str:
@@ -159,22 +158,18 @@ def _tests(planned: NodePlan) -> str:
     return TESTS if planned.short else ROBUST_TESTS
 
 
-def node(
-    requested: spec.NodeSpec, settings: ScaffoldOptions, report: Report
-) -> ScaffoldResult | None:
-    """Write a node and its test, and add it to the files that list the nodes of its package."""
+def node(requested: spec.NodeSpec, settings: ScaffoldOptions, report: Report) -> ScaffoldResult:
+    """Write a node and its test, and add it to the files that list the nodes of its package.
+
+    Raises ReportedError.
+    """
     project = changes.find_package(settings, report)
-    if project is None:
-        return None
     own, name = project.package, requested.name
     if _is_cmake(project):
-        report.add(_needs_python(project))
-        return None
+        raise report.refused(_needs_python(project))
     home = home_of(project.path, own, settings.root).relative_to(project.path).as_posix()
     load_settings(settings.root, report)  # reports what is wrong with them
     planned = _planned(requested._replace(package=own), project, report)
-    if planned is None or report.had_errors:
-        return None
     entry = NodeEntry({}, {})
     with stage("scaffold", name):
         files = {
@@ -188,10 +183,7 @@ def node(
         keys, present = project.keys(), folders(project.path)
         entry = node_entry(planned, texts, keys=keys, folders=present, home=home)
         entry = entry._replace(added={**files, **entry.added})
-    edited = project.accepted(entry.edits)
-    result = None if edited is None else project.write(entry.added, edited)
-    if result is None:
-        return None
+    result = project.write(entry.added, project.accepted(entry.edits))
     notes = _notes(planned, entry, project)
     used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
     compiled = any(interface.package == own for interface in used_names)
@@ -215,7 +207,7 @@ def _is_cmake(project: Project) -> bool:
     """Return whether CMake builds a package, which then has no console scripts."""
     declared = statements(Source(MANIFEST, project.text(MANIFEST) or ""))
     types = {each.text for each in declared if each.tag == "build_type"}
-    return types == {"ament_cmake"} or (not types and project.has("CMakeLists.txt"))
+    return types == {"ament_cmake"} or (not types and project.has(CMAKE_LISTS))
 
 
 def _needs_python(project: Project) -> Diagnostic:
@@ -224,8 +216,8 @@ def _needs_python(project: Project) -> Diagnostic:
     return codes.CANNOT_EDIT.of(project.shown(MANIFEST), message, hint=hint)
 
 
-def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> NodePlan | None:
-    """Return the node with the interfaces of its endpoints; report missing ones."""
+def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> NodePlan:
+    """Return the node with the interfaces of its endpoints; report missing ones, and raise."""
     library = project.library()
     interfaces: list[ir.Interface | None] = []
     messages: dict[ir.TypeName, ir.Message] = {}
@@ -237,9 +229,10 @@ def _planned(requested: spec.NodeSpec, project: Project, report: Report) -> Node
             continue
         problems = Report()
         model = compile_package(name.package, [(name, source)], library, problems)
-        if problems.had_errors:
+        if problems.had_errors:  # the interfaces of other endpoints are judged, too
             report.extend(problems)  # warnings were shown when the interface was written
         else:
             interfaces.append(model.interfaces[name])
             messages.update(model.messages)
-    return None if report.had_errors else plan(requested, interfaces, messages)
+    report.raise_errors()
+    return plan(requested, interfaces, messages)

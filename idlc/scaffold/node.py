@@ -7,8 +7,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from idlc.generate.templates import Code, code
 from idlc.model import derive, ir
-from idlc.project.templates import Code, code
 from idlc.scaffold import roles, samples, spec
 from idlc.scaffold.samples import Page
 from idlc.scaffold.spec import NodePlan, ResolvedEndpoint

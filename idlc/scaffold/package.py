@@ -14,14 +14,17 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.generate.target import build_step
+from idlc.generate.templates import Code, EscapedText, code
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
+from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
+from idlc.packaging.setup_py import Setup, span_of
 from idlc.project.files import is_file
 from idlc.project.lock import BUILD_STEP
 from idlc.project.lock import FILE as LOCK
 from idlc.project.package_xml import statements
-from idlc.project.settings import load_settings, scope
-from idlc.project.templates import Code, EscapedText, code
+from idlc.project.root import MANIFEST
+from idlc.project.settings import SETTINGS_FILE, load_settings, scope
 from idlc.scaffold.changes import Project, ScaffoldOptions, ScaffoldResult
 
 VERSION = "0.1.0"
@@ -71,7 +74,7 @@ class PackageView(NamedTuple):
 #: Templates whose names differ from those of their files.
 _TEMPLATES = {
     (PYTHON, "launch/NAME_launch.py"): "launch.py",
-    (CMAKE, "pyproject.toml"): "interfaces_pyproject.toml",
+    (CMAKE, SETTINGS_FILE): "interfaces_pyproject.toml",
 }
 #: Files of a package of nodes, and of one of interfaces; NAME stands for the package.
 _PYTHON_FILES = (
@@ -81,7 +84,7 @@ _PYTHON_FILES = (
 _CMAKE_FILES = ("package.xml", "CMakeLists.txt", "pyproject.toml", "README.md", ".gitignore")
 #: Files of a new package that are edited later on.
 GROWING = (
-    *("package.xml", "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
+    *PACKAGE_FILES,
     *("README.md", ".gitattributes", ".gitignore"),
 )
 #: Modules and folders that a package of such a name would hide.
@@ -153,8 +156,10 @@ def package(
     report: Report,
     starters: Mapping[str, str] | None = None,
     chosen: Collection[str] = (),
-) -> ScaffoldResult | None:
+) -> ScaffoldResult:
     """Write a new package, with interfaces if it has none yet, but not among generated code.
+
+    Raises ReportedError.
 
     `chosen` are the fields of `requested`, and `starters`, that the user chose. Reports IDL620
     where files that stay as they are contradict them.
@@ -165,7 +170,7 @@ def package(
         hint = f"change to a folder of sources: `cd {shlex.quote(relpath(generated.parent, base))}`"
         message = f"`{generated}` contains generated code"
         report.add(codes.FOREIGN_FILE.of(requested.name, message, hint=hint))
-        return None
+        report.raise_errors()
     project = Project(requested.name, settings, report)
     with stage("scaffold", requested.name):
         available = catalog.packages(scope(load_settings(settings.root, report)).distro)
@@ -188,7 +193,7 @@ def _contradictions(
     project: Project, requested: Package, kept: Collection[str], chosen: Collection[str]
 ) -> Iterator[Diagnostic]:
     """Yield a problem for each choice that one of the kept files contradicts."""
-    for path, choices in (("package.xml", _in_manifest), ("setup.py", _in_setup)):
+    for path, choices in ((MANIFEST, _in_manifest), (SETUP_PY, _in_setup)):
         text = project.text(path) if path in kept else None
         if not text:
             continue
@@ -236,8 +241,6 @@ def _in_manifest(source: Source, requested: Package, chosen: Collection[str]) ->
 
 def _in_setup(source: Source, requested: Package, _: Collection[str]) -> Iterator[_Choice]:
     """Yield what a setup.py says of each choice, and the argument to write in its place."""
-    from idlc.packaging.setup_py import Setup, span_of
-
     setup = Setup(source)
     for field in _CHOICES:
         argument = "maintainer_email" if field == "email" else field

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from idlc.generate.templates import Code, EscapedText
 from idlc.model import ir, python_names
-from idlc.project.templates import Code, EscapedText
 from idlc.wire.layout import Messages
 
 #: The width of comments, which may be indented far.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from idlc.api.recording import Recording
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Progress
-from idlc.recordings.aligned.table import ClockFit
+from idlc.recordings.aligned.table import Aligned, ClockFit
 from idlc.recordings.containers.source import RecordingError
 from idlc.tasks.columns import (
     STDOUT,
@@ -50,30 +50,15 @@ def write_aligned(
     progress: Progress,
 ) -> Iterator[WrittenFile]:
     """Announce how well the topics fit the clock, and write their table."""
-    topics = dict(_topic(word, recording) for word in options.topics or recording)
+    topics = dict(topic_of(word, recording) for word in options.topics or recording)
     rows = grid.clock_of_rows
-    is_topic = rows in recording or rows.startswith("/")
-    names = [*topics, rows] if is_topic else [*topics]
     try:
-        table = recording.aligned(
-            topics,
-            on=rows if is_topic else None,
-            every=None if is_topic else rows,
-            how=_by_topic(grid.how, names, "last"),
-            tolerance=_by_topic(grid.tolerance, names, None),
-            clock=_by_topic(grid.clock, names, "log"),
-            start=options.start,
-            end=options.end,
-        )
-    except RecordingError:
-        raise
+        table = table_of(grid, topics, recording, options)
     except ValueError as error:
-        words = shlex.join(("idlc", "show", options.recordings[0], *dict.fromkeys(names)))
-        hint = f"`{words}` lists the fields"
-        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
+        field_problem(error, options, report)
         return
     style = _style(options)
-    job = Job(recording[names[0]], options.out, style)
+    job = Job(recording[[*topics, rows][0]], options.out, style)
     if style != TEXT and not checked([job], options, report):
         return
     announce(table.summary())
@@ -93,6 +78,35 @@ def write_aligned(
     yield WrittenFile(", ".join(topics), job.path, len(table))
 
 
+def field_problem(error: ValueError, options: ColumnsOptions, report: Report) -> None:
+    """Report a field that a topic does not have; raise other errors."""
+    if isinstance(error, RecordingError):
+        raise error
+    topics = dict.fromkeys(word.partition(":")[0] for word in options.topics)
+    words = shlex.join(("idlc", "show", options.recordings[0], *topics))
+    hint = f"`{words}` lists the fields"
+    report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
+
+
+def table_of(
+    grid: Grid, topics: Mapping[str, Any], recording: Recording, options: ColumnsOptions
+) -> Aligned:
+    """Return the table of topics, each with its fields."""
+    rows = grid.clock_of_rows
+    is_topic = rows in recording or rows.startswith("/")
+    names = [*topics, rows] if is_topic else [*topics]
+    return recording.aligned(
+        topics,
+        on=rows if is_topic else None,
+        every=None if is_topic else rows,
+        how=_by_topic(grid.how, names, "last"),
+        tolerance=_by_topic(grid.tolerance, names, None),
+        clock=_by_topic(grid.clock, names, "log"),
+        start=options.start,
+        end=options.end,
+    )
+
+
 def _style(options: ColumnsOptions) -> str:
     """Return the format of the file; a terminal sees only the summary."""
     if options.out == STDOUT:
@@ -100,7 +114,7 @@ def _style(options: ColumnsOptions) -> str:
     return options.style or STYLES.get(Path(options.out).suffix.lower(), "")
 
 
-def _topic(word: str, recording: Recording) -> tuple[str, list[str] | None]:
+def topic_of(word: str, recording: Recording) -> tuple[str, list[str] | None]:
     """Return a topic and its fields, as `/joints:position,velocity` has them."""
     name, colon, fields = word.partition(":")
     if word in recording or not colon:

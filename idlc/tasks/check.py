@@ -16,9 +16,11 @@ from idlc.compiler.verdicts import IncrementalFindings
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few, merge, without_overruled
 from idlc.diagnostics.source import Source
+from idlc.language.parse import parse
 from idlc.model import link
 from idlc.model.link import Model
 from idlc.packaging.facts import Facts, facts
+from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
 from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
@@ -26,9 +28,8 @@ from idlc.project.find import KINDS, RULES, list_files, no_interfaces, unread_id
 from idlc.project.lock import Lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
+from idlc.project.words import split_recordings
 
-#: Files that describe a package, which hooks name if they change.
-PACKAGE_FILES = frozenset({MANIFEST, "CMakeLists.txt", "setup.py", "setup.cfg", "pyproject.toml"})
 #: Problems with files and packages that are left out; the others can be fixed.
 _DUPLICATES = frozenset({codes.DUPLICATE_INTERFACE.id, codes.DUPLICATE_PACKAGE.id})
 #: Rounds of fixes: one may depend on another, or edit the same range.
@@ -67,8 +68,6 @@ def check(options: CheckOptions, report: Report) -> CheckResult:
     edits are made in memory only.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
-        from idlc.recordings.find import split_recordings
-
         recordings, others = split_recordings(options.paths, options.scope.root)
         if recordings:
             return _with_recordings(recordings, others, options, report)
@@ -144,6 +143,7 @@ def _with_packages(paths: Sequence[str], root: Root) -> tuple[str, ...]:
     described = []
     for path in paths:
         folder, name = os.path.split(path)
+        # hooks name such files if they change
         if name not in PACKAGE_FILES or not root.is_file(path):
             described.append(path)
         elif root.is_file(f"{folder or '.'}/{MANIFEST}"):
@@ -169,12 +169,11 @@ def _with_recordings(
 
 def keep_layout(name: str, old: str, new: str) -> str:
     """Return an edited file in its old layout: `idlc fmt`'s, or that of formatters of Python."""
-    if name.endswith("setup.py"):
+    if name.endswith(SETUP_PY):
         from idlc.packaging.setup_edits import arrange
 
         return arrange(old, new)
     from idlc.language.format import format_file
-    from idlc.language.parse import parse
 
     is_interface = name.endswith(tuple(KINDS))
     if not is_interface or format_file(parse(Source(name, old))) != old:

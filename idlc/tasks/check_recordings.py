@@ -13,8 +13,8 @@ from idlc.api.sources import read_source
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
 from idlc.model.distros import Distro
-from idlc.project.find import is_address
 from idlc.project.settings import Scope
+from idlc.project.words import is_address
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.lengths import WrongDefinitionError
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning

@@ -28,7 +28,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import Progress
 from idlc.model.ir import DUMMY_FIELD
 from idlc.project.files import missing
-from idlc.project.find import is_address
+from idlc.project.words import is_address
 from idlc.recordings.columns.elements import MissingElementWarning
 from idlc.recordings.containers.source import RecordingError, is_local
 from idlc.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
@@ -273,7 +273,7 @@ def columns(
     if report.errors:
         return done
     with (
-        _problems(options, report),
+        problems(options, report),
         # also for damage that opening it warns of
         warnings.catch_warnings(record=True) as caught,
         Recording(
@@ -307,12 +307,12 @@ def _each_topic(
 ) -> Iterator[WrittenFile]:
     """Write each topic; one that cannot be read does not keep others from being written."""
     for job in _jobs(recording, options, report):
-        with _problems(options, report):
+        with problems(options, report):
             yield from _written(job, options, report, progress)
 
 
 @contextmanager
-def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
+def problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
     """Report problems of a recording, or of the topics that were selected."""
     try:
         yield
@@ -329,7 +329,7 @@ def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequ
     topics = []
     for name in names:
         # a topic that was not selected by name does not keep others from being written
-        with nullcontext() if options.topics else _problems(options, report):
+        with nullcontext() if options.topics else problems(options, report):
             topic = recording.topic(name, options.type_name)
             topics.append(topic.between(options.start, options.end))
     files = _file_names([topic.topic.name for topic in topics])

@@ -16,12 +16,13 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, enumerated, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import SETUP_PY
 from idlc.project import inputs, prefixes
 from idlc.project.files import entries, is_file, is_folder
 from idlc.project.find import list_files
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import declared_version
-from idlc.project.root import Root
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Scope
 from idlc.tasks.check import CheckOptions, check
 from idlc.tasks.check_prefix import check_prefix
@@ -104,7 +105,7 @@ def _ros() -> Iterator[Finding]:
 
 def _middleware() -> Iterator[Finding]:
     installed = {
-        path.name: declared_version(prefix / "share" / path.name / "package.xml")
+        path.name: declared_version(prefix / "share" / path.name / MANIFEST)
         for prefix in reversed(prefixes.ament_prefixes())
         for path in entries(prefix / prefixes.INDEX / "rmw_typesupport")
         if path.name != "rmw_implementation"
@@ -169,7 +170,7 @@ def _packages(scope: Scope) -> Iterator[Finding]:
 def _importable(package: inputs.Inputs, home: Path, root: Root) -> Iterator[Finding]:
     """Yield the reason why this Python does not find a package of ROS 2, or finds another one."""
     name, kinds = package.package, sorted({file.file.kind for file in package.files})
-    if is_file(home / "setup.py"):
+    if is_file(home / SETUP_PY):
         yield from _ungenerated(name, kinds, home, root)
     elif not kinds:
         return  # Python need not find it

@@ -9,6 +9,11 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.compiler.compiler import Compiler, library_for
+from idlc.compiler.requests import (
+    borrowed,
+    completed,
+    requested_packages,
+)
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.package import Generated, PlannedPackage, generated, up_to_date, with_needs
 from idlc.generate.target import (
@@ -20,21 +25,17 @@ from idlc.generate.vendoring import leftovers, planned
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.packaging.facts import home_of
+from idlc.packaging.files import SETUP_PY
 from idlc.project import inputs, lock, settings
 from idlc.project.atomic import exclusive
 from idlc.project.files import is_file
-from idlc.project.find import is_path, root_of, unread_idl
+from idlc.project.find import root_of, unread_idl
 from idlc.project.library import InterfaceTexts, Library, resolve
 from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
-from idlc.project.requests import (
-    borrowed,
-    completed,
-    requested_packages,
-)
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
-from idlc.recordings.find import split_recordings
+from idlc.project.words import read_words
 from idlc.version import __version__
 
 
@@ -80,7 +81,7 @@ def in_package(options: GenOptions) -> GenOptions:
     if path is None or (options.paths and path.parent != folder):
         return options
     name = declared_name(path, root, Report())
-    if not name or not is_file(path.parent / "setup.py"):
+    if not name or not is_file(path.parent / SETUP_PY):
         return options
     return options._replace(
         paths=options.paths or (root.shown(path.parent),),
@@ -89,29 +90,31 @@ def in_package(options: GenOptions) -> GenOptions:
 
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    """Write, or with `check` compare, packages and what they vendor; empty after an error."""
+    """Write, or with `check` compare, packages and what they vendor. Raises ReportedError."""
     runs = [options._replace(ament="")] if options.out else []
     if options.ament:  # last, because the package may be named by OUT
         # all that is in a prefix is beside each other
         runs.append(options._replace(vendoring="beside" if options.vendoring else ""))
     done: list[Generated] = []
-    for run in runs:
-        if not report.had_errors:
+    try:
+        for run in runs:
             root = options.scope.root.on_disk()  # a run sees the output of the one before
             scope = msgspec.structs.replace(options.scope, root=root)
             done += _run_once(run._replace(scope=scope), report)
-    report.notes[:] = dict.fromkeys(report.notes)
-    return () if report.had_errors else tuple(done)
+            report.raise_errors()
+    finally:
+        report.notes[:] = dict.fromkeys(report.notes)
+    return tuple(done)
 
 
 def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     root = options.scope.root
-    recordings, others = split_recordings(options.paths, root)
-    paths = [word for word in others if not is_name(word, root)]
-    words = [word for word in others if is_name(word, root)]
+    meant = read_words(options.paths, root)
+    recordings, paths, words = meant["recording"], meant["path"], meant["name"]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
+    report.raise_errors()
     texts: InterfaceTexts = {}
-    if recordings and not report.had_errors:
+    if recordings:
         from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_packages
 
@@ -124,9 +127,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
             whole=bool(options.ament),
         )
         named += recorded
-    if report.had_errors:
-        return ()
-    if recordings:
+        report.raise_errors()
         from idlc.tasks.check_recordings import note_fitting
 
         note_fitting(recordings, options.scope, report)
@@ -179,12 +180,6 @@ def _targets(
     return tuple(overlays) if overlays[0].usable() else ()
 
 
-def is_name(word: str, root: Root) -> bool:
-    """Return whether a word means a type, or a package, rather than a path that is not there."""
-    last = word.rpartition("/")[2]
-    return not is_path(word, root) and ("/" not in word or not last[:1].islower())
-
-
 def named_packages(
     words: Sequence[str], scope: Scope, report: Report, *, whole: bool
 ) -> list[inputs.Inputs]:
@@ -211,6 +206,7 @@ def _compile_and_write(
     report: Report,
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(requested.values()), options.scope, report, texts)
+    # recorded types may have errors, with which those of the files are reported
     if not options.check and not report.had_errors and not _may_be_refused(requested, library):
         current = [
             up_to_date(target, package.digests, library, options.vendoring)
@@ -221,12 +217,11 @@ def _compile_and_write(
             return with_needs(done, requested, library.distro, report, options.again)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(requested.values(), report)]
+    report.raise_errors()
     needed = {name for model in models for name in model.interfaces}
-    if not report.had_errors and (more := completed(requested.values(), needed, library)):
+    if more := completed(requested.values(), needed, library):
         return _compile_and_write(dict(zip(requested, more, strict=True)), texts, options, report)
-    packages = []
-    if not report.had_errors:
-        packages = planned(models, requested, compiler, options.vendoring)
+    packages = planned(models, requested, compiler, options.vendoring)
     if options.check:
         for package in packages:
             package.target.drift(package.plan, package.lock, options.again)
@@ -278,7 +273,7 @@ class Run(NamedTuple):
         return any(inputs.get(name) != digest for name, digest in lock.inputs.items())
 
     def make(self, report: Report) -> tuple[Generated, ...]:
-        """Write, and return the packages; empty after an error. Raises OSError."""
+        """Write, and return the packages. Raises OSError and ReportedError."""
         root = Root.at(self.folder)
         scope = msgspec.structs.replace(self.options.scope, root=root)
         return gen(self.options._replace(scope=scope), report)

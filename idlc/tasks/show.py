@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
 from idlc.compiler.compiler import compile_package, derived_names, sound_models, stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
 from idlc.model.distros import later
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import find, is_path
+from idlc.project.find import find
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
-from idlc.recordings.find import split_recordings
+from idlc.project.words import read_words
 
 if TYPE_CHECKING:
     from idlc.recordings.definitions import RecordedDefinition
@@ -32,34 +33,34 @@ def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[s
     """Return type hash and full name of each type in paths and names, derived types included."""
     named_hashes: list[tuple[str, str]] = []
     scope = _with_hashes(scope, report)
-    models = requested_models(targets, scope, report) if scope.distro.has_hashes else ()
-    for model, names in models:
+    for model, names in requested_models(targets, scope, report):
         with stage("describe", model.package):
             named_hashes += [(model.describer.hash(name), name) for name in names]
     return list(dict.fromkeys(named_hashes))
 
 
-def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | None:
-    """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
+def describe(target: str, scope: Scope, report: Report) -> dict[str, object]:
+    """Return the content of the JSON file that ROS 2 installs for one interface or derived type.
+
+    Raises ReportedError.
+    """
     scope = _with_hashes(scope, report)
-    if not scope.distro.has_hashes:
-        return None
     models = list(requested_models((target,), scope, report))
-    if report.had_errors or not models:
-        return None
+    report.raise_errors()
+    if not models:
+        raise ReportedError
     (model, names) = models[0]
     tops = [str(own.name) for own in model.own if str(own.name) in names] or names
     if len(models) > 1 or len(tops) > 1:
         hint = f"choose one, for example with `idlc show {tops[0]} --format type-description`"
         message = f"`{target}` contains several interfaces"
-        report.add(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
-        return None
+        raise report.refused(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
     with stage("describe", tops[0]):
         return model.describer.installed(tops[0])
 
 
 def _with_hashes(scope: Scope, report: Report) -> Scope:
-    """Return a scope for the first of its distributions with type hashes; report IDL624 if none."""
+    """Return a scope for the first of its distributions with type hashes; raise if none."""
     able = tuple(distro for distro in scope.distros if distro.has_hashes)
     scope = msgspec.structs.replace(scope, distros=able or scope.distros)
     if not scope.distro.has_hashes:
@@ -68,7 +69,7 @@ def _with_hashes(scope: Scope, report: Report) -> Scope:
         hint = (
             f"{first.title} introduced them; choose a newer distribution, such as `--distro jazzy`"
         )
-        report.add(codes.NO_TYPE_HASHES.of("", message, hint=hint))
+        raise report.refused(codes.NO_TYPE_HASHES.of("", message, hint=hint))
     return scope
 
 
@@ -79,25 +80,24 @@ def requested_models(
 
     Interfaces with errors are left out.
     """
-    paths = [target for target in targets if is_path(target, scope.root)]
-    for target in targets:
-        if target not in paths:
-            problems = Report()
-            yield from _named(target, scope, problems)
-            report.extend(problems)
-    recordings, paths = split_recordings(paths, scope.root)
-    if recordings:
+    meant = read_words(targets, scope.root, "name")
+    for name in meant["name"]:
+        problems = Report()
+        with suppress(ReportedError):  # the other words are shown
+            yield from _named(name, scope, problems)
+        report.extend(problems)
+    if recordings := meant["recording"]:
         from idlc.api.sources import read_source
         from idlc.recordings.packages import recorded_models
 
         yield from recorded_models(read_source, recordings, scope, report)
-    if paths:
+    if paths := meant["path"]:
         problems = Report()
         files = find(paths, scope.root, problems, scope.exclude)
         packages = inputs.packages(files, scope, problems)
         report.extend(problems)
         report.notes += problems.notes
-        if not problems.had_errors:
+        if not problems.had_errors:  # not all files may be known
             yield from sound_models(packages, scope, report)
 
 
@@ -109,8 +109,7 @@ def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, lis
         if source is None:
             return
         model = compile_package(interface.package, [(interface, source)], library, report)
-        if report.had_errors:
-            return
+        report.raise_errors()
         names = [n for own in model.own if own.name == interface for n in derived_names(own)]
         if name == interface:
             yield model, names
@@ -260,11 +259,9 @@ def definitions(
 
     if style in ("hash", "type-description"):
         scope = _with_hashes(scope, report)
-        if not scope.distro.has_hashes:
-            return
     recorded = topics_of(read_source, [path], selected, scope.root, report)
     local = LocalTypes(scope, report)
-    for version in versions(recorded or ()):
+    for version in versions(recorded):
         types = recorded_types(version, local, report)
         for name in dict.fromkeys(typed.interface for typed in types.topics):
             model = types.models[name.package]
@@ -320,8 +317,7 @@ def _rows(message: ir.Message, model: Model, margin: str) -> Iterator[tuple[str,
 def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
     """Return the interfaces of a type name or path, each as text in a format."""
     if style == "type-description":
-        description = describe(target, scope, report)
-        return [_description(description)] if description else []
+        return [_description(describe(target, scope, report))]
     texts = []
     wholes: list[ir.TypeName] = []
     for model, names in list(requested_models((target,), scope, report)):
@@ -330,7 +326,8 @@ def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
             if str(own.name) in names:
                 with stage("show", str(own.name)):
                     texts.append(shown(own, model, style))
-    if not texts and not report.had_errors:
+    if not texts:
+        report.raise_errors()
         message = f"`{target}` is a section of a service or action"
         hint = f"`idlc show {wholes[0]}` shows the whole interface" if wholes else None
         report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))

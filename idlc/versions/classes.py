@@ -17,7 +17,7 @@ from idlc.recordings.definitions import interface_of
 from idlc.runtime.names import owner_of
 from idlc.runtime.typeinfo import Structure, structure_of
 from idlc.versions.conversion import Version
-from idlc.wire.layout import oversized
+from idlc.wire.layout import report_oversized
 
 
 def version_of(kind: Any) -> Version:
@@ -99,8 +99,7 @@ def version_of_texts(texts: InterfaceTexts, name: ir.TypeName) -> Version | None
     compiler = Compiler(library)
     models = compiler.models(compiler.reached([interface_of(name)]), report)
     model = models.get(name.package)
+    report_oversized(models.values(), report)
     if report.had_errors or model is None or name not in model.messages:
-        return None
-    if any(oversized(*models.values())):
         return None
     return Version(models, name)

@@ -8,39 +8,27 @@ from itertools import groupby
 from typing import Any
 
 from idlc.compiler.compiler import Compiler, compile_package, library_for, stage
-from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
-from idlc.model.distros import BY_NAME, Distro, unknown_distro
+from idlc.model.distros import Distro
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.library import Library
 from idlc.project.settings import Scope
+from idlc.project.words import read_distro
 from idlc.versions.packages import Comparison, combine, compare
-
-PREFIX = "distro:"
-
-
-def is_distro(against: str) -> bool:
-    """Return whether the text of `--against` names a distribution."""
-    return against.startswith(PREFIX)
 
 
 def compare_with_distro(
-    against: str, packages: Sequence[inputs.Inputs], scope: Scope, report: Report
-) -> Comparison | None:
+    name: str, packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> Comparison:
     """Return the changes from a distribution's interfaces, the old version, to the local ones.
 
     They are the interfaces that packages refer to; without packages, all built-in ones. Resulting
-    changes of the packages themselves are included. `None` after an error.
+    changes of the packages themselves are included. Raises ReportedError.
     """
-    name = against.removeprefix(PREFIX)
-    if name not in BY_NAME:
-        message = f"no such distribution: `{name}`"
-        report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
-        return None
-    other = BY_NAME[name]
+    other = read_distro(name, report)
     library = library_for(packages, scope, report)
     other_library, both = (
         library_for(packages, scope, Report(), kind=partial(_LayeredLibrary, other, other_first))
@@ -49,9 +37,8 @@ def compare_with_distro(
     own = [package for package in packages if not catalog.is_standard(package.package)]
     after = _models(own, both, report)
     before = _models(own, other_library, Report())
-    if report.had_errors:
-        return None
-    with stage("compare", against):
+    report.raise_errors()
+    with stage("compare", other.name):
         named = (package.names for package in packages if package not in own)
         used = set[ir.TypeName]().union(*map(_used, after), *named)
         names = used if packages else _all(library, other)

@@ -33,7 +33,6 @@ _ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTAL
 _SUBMODULE = b"160000"
 _NAMES = "`git branch --all` and `git tag` list the revisions; `git fetch` updates them"
 _DAMAGED = "`git fsck` lists missing or damaged objects"
-GIT = "git:"
 
 
 class Revision(NamedTuple):
@@ -104,8 +103,8 @@ class Revision(NamedTuple):
 
 
 @contextmanager
-def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Revision | None]:
-    """Provide the revision `name` of the repository that holds `path`, `None` after IDL630.
+def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Revision]:
+    """Provide the revision `name` of the repository that holds `path`; IDL630 ends it.
 
     Nothing in the repository is touched.
     """
@@ -126,11 +125,9 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
             if error.hint is None and hint:
                 hint = _completing(top) or hint
             advice = hint if error.hint is None else error.hint
-            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=advice or None))
-            revision = None
-        else:
-            revision = Revision(name, top, folder, root, submodules, skipped)
-        yield revision
+            problem = codes.NO_SUCH_REVISION.of(path, message, hint=advice or None)
+            raise report.refused(problem) from None
+        yield Revision(name, top, folder, root, submodules, skipped)
 
 
 def _completing(top: Path) -> str:

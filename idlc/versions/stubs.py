@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.text import one_line
 from idlc.generate.python.imports import Surroundings
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.render import interface_files
+from idlc.generate.templates import Code, EscapedText, RenderedFile, code
 from idlc.model import ir, python_names
 from idlc.model.link import Model
 from idlc.project import write
 from idlc.project.root import Root
-from idlc.project.templates import Code, EscapedText, RenderedFile, code
 from idlc.recordings.definitions import interface_of
 from idlc.versions.conversion import FieldPlan, Plan, Version, VersionKey, is_list
 from idlc.versions.meanings import renumbered
@@ -51,7 +51,7 @@ class _FunctionView(NamedTuple):
 def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) -> list[str]:
     """Write a file of rules for each pair of versions that needs some; return their paths.
 
-    A function that is missing from a file is added at its end.
+    A function that is missing from a file is added at its end. Raises ReportedError.
     """
     pairs = {
         (part.old.key, part.new.key): part
@@ -66,8 +66,7 @@ def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) 
         text = _grown(existing, part, root, report) if existing.exists() else _file(part)
         if text is not None:
             files[name] = text
-    if report.had_errors:
-        return []
+    report.raise_errors()
     others = {file.path: file.text for part in pairs.values() for file in _type_files(part)}
     if files:
         others |= {"__init__.py": '"""Rules that upgrade recordings."""\n'}
@@ -76,8 +75,9 @@ def write_stubs(plans: Iterable[Plan], folder: str, root: Root, report: Report) 
     shown = folder.rstrip("/")
     changes = write.compare(out, shown, every, {}, report)
     kept = [change for change in changes if change.path != "__init__.py" or change.old is None]
-    if report.had_errors or not write.apply(write.WritePlan(out, tuple(kept), {}), shown, report):
-        return []
+    report.raise_errors()
+    if not write.apply(write.WritePlan(out, tuple(kept), {}), shown, report):
+        raise ReportedError
     return [f"{shown}/{change.path}" for change in kept if change.path in files]
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.model import derive, ir
 from idlc.model.link import Model
 
@@ -164,6 +164,12 @@ class _ContentSize(NamedTuple):
 
     fields: int
     depth: int
+
+
+def report_oversized(models: Iterable[Model], report: Report) -> None:
+    """Report interfaces over a limit, unless errors are why sizes are not known."""
+    if not report.had_errors:
+        report.extend(oversized(*models))
 
 
 def oversized(*models: Model) -> Iterator[Diagnostic]:

@@ -114,7 +114,9 @@ def lost_files(clone: Path, changed: Path, scratch: Path) -> tuple[str, list[str
         elif before is not None and after is not None:
             counts["whole"] += not before - after
             lost += sorted(f"{inside}: {name}" for name in before - after)
-            is_compiled = any((changed / inside).glob(f"**/msg/_{MODULE}.py"))
+            classes = (changed / inside).glob(f"**/msg/_{MODULE}.py")
+            # `idlc init` lets CMake build packages, and compiles them into `build`
+            is_compiled = any((changed / inside / "build") not in path.parents for path in classes)
             if is_compiled and not any(name.endswith(f"/msg/_{MODULE}.py") for name in after):
                 lost.append(f"{inside}: the classes are not installed")
         counts["built" if before is not None else "cannot be built"] += 1

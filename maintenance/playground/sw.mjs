@@ -14,6 +14,10 @@ self.addEventListener("activate", (event) => {
   })());
 });
 self.addEventListener("fetch", (event) => {
+  if (new URL(event.request.url).origin !== location.origin) {
+    event.respondWith(Response.error());
+    return;
+  }
   if (event.request.method !== "GET") return;
   event.respondWith((async () => {
     const cache = await caches.open(VERSION);

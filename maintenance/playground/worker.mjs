@@ -25,11 +25,16 @@ const { session, bare } = await loaded().catch((error) => {
   postMessage({ failed: `${error.message}`.trim().split("\n").pop() });
   throw error;
 });
-// From here on there is nothing to load, and nothing to send but answers.
+// From here on there is nothing to load, and nothing to send but answers. Prototypes have these
+// names, too. The service worker refuses what import() asks of other hosts.
 const connecting = ["fetch", "XMLHttpRequest", "WebSocket", "WebSocketStream", "WebTransport", "EventSource"];
-const others = ["Worker", "BroadcastChannel", "importScripts", "indexedDB", "caches"];
-for (const name of [...connecting, ...others]) {
-  Object.defineProperty(globalThis, name, { value: undefined });
+const others = ["Worker", "SharedWorker", "BroadcastChannel", "importScripts", "indexedDB", "caches", "FontFace"];
+for (let place = globalThis; place; place = Object.getPrototypeOf(place)) {
+  for (const name of [...connecting, ...others]) {
+    if (place === globalThis || Object.hasOwn(place, name)) {
+      Object.defineProperty(place, name, { value: undefined, configurable: false, writable: false });
+    }
+  }
 }
 onmessage = ({ data: { id, request } }) => {
   const start = performance.now();

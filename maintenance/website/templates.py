@@ -16,7 +16,7 @@ import jinja2
 from jinja2.runtime import Macro
 
 from idlc.cli.main import main
-from idlc.project.templates import code, environment, html
+from idlc.generate.templates import code, environment, html
 from idlc.recordings.containers.mcap_writer import ChunkWriter, channel, schema
 from idlc.recordings.containers.records import CHANNEL_OP, SCHEMA_OP
 from idlc.scaffold.init import SERVICES

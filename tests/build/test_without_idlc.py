@@ -327,3 +327,97 @@ def test_a_library_stops_builds_of_classes_that_are_out_of_date(
     said = run_hook(tool, template)
     assert reason in said
     assert ("the classes in `src/trackkit/ros` are out of date" in said) == bool(reason)
+
+
+@pytest.fixture(scope="module")
+def siblings(template, tmp_path_factory):
+    """Return a workspace of a package and one that uses its types, as `idlc init` sets them up."""
+    folder = tmp_path_factory.mktemp("siblings")
+    files = {
+        "poses/msg/Unit.msg": "uint8 METRES=1\nuint8 unit\n",
+        "poses/msg/Pose.msg": "float64 x\nUnit unit\n",
+        "tracks/msg/Track.msg": "poses/Pose p\n",
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("idlc.cli.run.init.prove", lambda *_: Proof(""))
+        patch.setattr("idlc.cli.run.init.installed_files", lambda *_: frozenset())
+        patch.chdir(folder)
+        for name in ("poses", "tracks"):
+            assert main(["scaffold", "package", name, "--maintainer", "A <a@example.com>"]) == 0
+        write_all(files)
+        for name in ("poses", "tracks"):
+            patch.chdir(folder / name)
+            assert main(["init", "--yes"]) == 0
+    assert 'include = ["../poses"]' in (folder / "tracks/pyproject.toml").read_text()
+    return folder
+
+
+def include(path):
+    settings = Path("pyproject.toml").read_text().replace('"../poses"', path)
+    Path("pyproject.toml").write_text(settings)
+
+
+def link_sibling():
+    rename("../poses", "../../elsewhere/poses")
+    Path("../poses").symlink_to("../elsewhere/poses")
+
+
+def edit_sibling():
+    Path("../poses/msg/Pose.msg").write_text("float32 x\nUnit unit\n")
+
+
+#: Changes of a package beside, and what a build of one that uses its types says.
+SIBLINGS = {
+    "nothing": (nothing, ""),
+    "edited": (edit_sibling, "`poses/msg/Pose.msg` changed"),
+    "edited, used through another": (
+        lambda: Path("../poses/msg/Unit.msg").write_text("uint16 unit\n"),
+        "`poses/msg/Unit.msg` changed",
+    ),
+    "a comment": (
+        lambda: Path("../poses/msg/Pose.msg").write_text("# a\nfloat64   x\nposes/Unit unit\n"),
+        "",
+    ),
+    "one that is not used": (lambda: write_all({"../poses/msg/Other.msg": "int8 a\n"}), ""),
+    "renamed": (
+        lambda: rename("../poses/msg/Pose.msg", "../poses/msg/Place.msg"),
+        "`poses/msg/Pose.msg` was removed",
+    ),
+    "absent": (lambda: shutil.rmtree("../poses"), ""),
+    "its interfaces left out": (lambda: shutil.rmtree("../poses/msg"), ""),
+    "a folder around it": (lambda: (include('".."'), edit_sibling()), "Pose.msg` changed"),
+    "a link to it": (lambda: (link_sibling(), edit_sibling()), "Pose.msg` changed"),
+    "a link in a folder around it": (
+        lambda: (link_sibling(), include('".."'), edit_sibling()),
+        "Pose.msg` changed",
+    ),
+    "in a folder of another name": (
+        lambda: (rename("../poses", "../p"), include('"../p"'), rename("../p/msg", "../p/all")),
+        "",
+    ),
+    "without a package.xml": (
+        lambda: (Path("../poses/package.xml").unlink(), edit_sibling()),
+        "Pose.msg` changed",
+    ),
+    "another version beside it": (
+        lambda: (shutil.copytree("../poses", "../old"), edit_sibling(), include('"../old", ".."')),
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize("change", SIBLINGS)
+def test_a_build_stops_at_classes_that_use_earlier_types_of_a_sibling(
+    change, siblings, template, tmp_path, monkeypatch
+):
+    make, reason = SIBLINGS[change]
+    shutil.copytree(siblings, tmp_path / "src")
+    monkeypatch.chdir(tmp_path / "src/tracks")
+    make()
+    status, said = build(template)
+    assert (status == 1) == bool(reason), said
+    assert reason in said
+    assert "Traceback" not in said
+    if reason.endswith("changed"):
+        assert main(["gen"]) == 0
+        assert build(template)[0] == 0

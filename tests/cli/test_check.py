@@ -1,6 +1,7 @@
 """`idlc check`: what is shown, in which format, and what is fixed."""
 
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -389,38 +390,83 @@ def test_outdated_code_is_found_wherever_it_is_kept(project, capsys):
     assert len([*Path().rglob("idlc.lock")]) == (2 if "n/msg/C.msg" in files else 1)
 
 
+@pytest.mark.parametrize("manifest", ["", "kit/package.xml"])
+@pytest.mark.parametrize(
+    ("backend", "tool"),
+    [
+        ("build-backend = 'flit_core.buildapi'", "flit"),
+        ("build-backend = 'uv_build'", "uv"),
+        ("[tool.poetry]", "poetry"),
+        ("build-backend = 'hatchling.build'", None),
+        ("build-backend = 7", None),
+    ],
+)
+def test_tools_that_build_wheels_of_outdated_classes_are_named(backend, tool, manifest, capsys):
+    xml = f"{_NAMED.format('kit')}".replace("</p", f"{_PYTHON}</p")
+    files = {manifest: xml} if manifest else {}
+    write_all({"kit/pyproject.toml": f"[build-system]\n{backend}\n", **files})
+    write_all({"kit/msg/A.msg": "int8 a\n"})
+    assert main(["gen", "kit", "-o", "kit/src/kit", "--package", "kit"]) == 0
+    write_all({"kit/msg/A.msg": "int16 a\n"})
+    capsys.readouterr()
+    said = check(capsys, "kit", "--select", "IDL460")[1]
+    assert said.count("hint: run `idlc gen kit -o kit/src/kit") == 1
+    assert f"`; until then, {tool} builds wheels with the old classes\n" in said or not tool
+    assert ("until then" in said) == bool(tool)
+
+
+_PYTHON = "<export><build_type>ament_python</build_type></export>"
 _NAMED = "<package format='3'><name>{}</name></package>\n"
-#: Packages that use types of another, and the commands that generate and check their classes.
+#: Packages that use types of another, and the commands that generate and check their classes, the
+#: second in a folder.
 _USERS = {
     "library": (
         "[tool.idlc]\npaths = ['m']\nout = 'kit/ros'\nvendor-deps = true\ninclude = ['far']\n",
         "gen",
+        ".",
         "m",
     ),
-    "package": ("", "gen m -o m/m_msgs -I far", "."),
-    "out of a package": ("[tool.idlc]\npaths = ['m']\nout = 'lib'\ninclude = ['.']\n", "gen", "m"),
+    "package": ("", "gen m -o m/m_msgs -I far", ".", "."),
+    "out of a package": (
+        "[tool.idlc]\npaths = ['m']\nout = 'lib'\ninclude = ['.']\n",
+        "gen",
+        ".",
+        "m",
+    ),
+    "inside of it": ("", "gen m -o m/m_msgs -I far", "m", ". -I .."),
+    "deeper inside": ("", "gen m -o m/m_msgs -I far", "m/msg", ".. -I ../../far"),
+    "another library": (
+        "[project]\n",
+        "gen m --package m_msgs -o kit/ros -I far --vendor-deps",
+        "m",
+        ". -I ../m/../far",
+    ),
 }
 
 
 @pytest.mark.parametrize("user", _USERS)
-def test_outdated_types_of_other_packages_are_found(user, capsys):
-    settings, command, path = _USERS[user]
-    files = {} if user == "library" else {"m/package.xml": _NAMED.format("m_msgs")}
+def test_outdated_types_of_other_packages_are_found(user, capsys, monkeypatch):
+    settings, command, folder, path = _USERS[user]
+    words = (*shlex.split(path), "--select", "IDL460")
+    files = {} if user.endswith("library") else {"m/package.xml": _NAMED.format("m_msgs")}
     far = {"far/msg/Near.msg": "Deep deep\n", "far/msg/Deep.msg": "int8 a\n", **files}
     far |= {"far/package.xml": _NAMED.format("far_msgs"), "m/msg/A.msg": "far_msgs/Near a\n"}
     write_all({**far, "pyproject.toml": settings})
+    top = Path.cwd()
     assert main(shlex.split(command)) == 0
     write_all({"far/msg/Deep.msg": "# more words\nint8 a\n", "far/msg/Unused.msg": "int8 a\n"})
-    assert "IDL460" not in check(capsys, path, "--select", "IDL460")[1]
+    monkeypatch.chdir(folder)
+    top = os.path.relpath(top, Path.cwd())
+    assert "IDL460" not in check(capsys, *words)[1]
     for change in ({"far/msg/Deep.msg": "int16 a\n"}, {"far/msg/Near.msg": "Deep other\n"}):
-        write_all(change)
-        said = check(capsys, path, "--select", "IDL460")[1]
+        write_all({f"{top}/{file}": text for file, text in change.items()})
+        said = check(capsys, *words)[1]
         (name,) = (file.split("/")[2].removesuffix(".msg") for file in change)
         assert f"the generated code is out of date: `far_msgs/msg/{name}` changed\n" in said
         (hint,) = re.findall("run `idlc (.*)`", said)
         assert main(shlex.split(hint)) == 0
         capsys.readouterr()
-        assert "IDL460" not in check(capsys, path, "--select", "IDL460")[1]
+        assert "IDL460" not in check(capsys, *words)[1]
 
 
 def test_an_entry_point_that_leads_nowhere_is_found(capsys):

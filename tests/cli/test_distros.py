@@ -24,7 +24,7 @@ from idlc.model.distros import BY_NAME, DISTROS, NEWEST
 from idlc.model.ir import meaning
 from idlc.model.link import link
 from idlc.model.lowering.lower import lower
-from idlc.project import lock
+from idlc.project import step
 from idlc.project.library import Library
 from idlc.project.root import Root
 from tests.support.paths import SPEC
@@ -125,7 +125,7 @@ def test_definitions_are_those_of_the_release_repositories(distro):
     texts = {name: catalog.source(name, distro).text for name in catalog.interfaces(distro)}
     for package, (version, expected) in PACKAGES[distro.name].items():
         names = [n for n in texts if n.package == package and str(n) not in NOT_RELEASED]
-        lines = "".join(f"{name} {lock.meaning(texts[name], package)}\n" for name in names)
+        lines = "".join(f"{name} {step.meaning(texts[name], package)}\n" for name in names)
         assert sha256(lines.encode()).hexdigest() == expected, (package, version)
     assert PACKAGES[distro.name].keys() == set(catalog.packages(distro))
 

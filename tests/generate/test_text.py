@@ -10,9 +10,9 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from idlc.generate.python import imports, literals, render
+from idlc.generate.templates import Code, EscapedText, code
 from idlc.model import ir, link
 from idlc.model.python_names import modules
-from idlc.project.templates import Code, EscapedText, code
 from tests.support import generated
 from tests.support.examples import example, given, st
 

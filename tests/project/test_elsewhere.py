@@ -22,7 +22,7 @@ import pytest
 from idlc.cli import streams
 from idlc.cli.main import main
 from idlc.diagnostics import formats
-from idlc.project import atomic, lock
+from idlc.project import atomic, lock, step
 from tests.support import programs
 from tests.support.files import write
 from tests.support.paths import ROOT
@@ -315,7 +315,7 @@ def test_a_real_edit_is_still_noticed(here, capsys):
     module.write_bytes(module.read_bytes().replace(b"\n", b"\r\n") + b"# mine\r\n")
     assert main(["gen", "demo", "-o", "out/demo", "--check"]) == 1
     assert "was edited after" in capsys.readouterr().err
-    assert lock.digest(b"\x7fELF\0\r\n") != lock.digest(b"\x7fELF\0\n")
+    assert step.digest(b"\x7fELF\0\r\n") != step.digest(b"\x7fELF\0\n")
     assert not lock.is_same(b"\x7fELF\0\r\n", b"\x7fELF\0\n")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.project import lock, write
+from idlc.project import lock, step, write
 from idlc.project.lock import load_lock
 from idlc.project.write import plan
 
@@ -197,7 +197,7 @@ def test_the_lock_comes_first_with_both_digests_and_last_with_the_new_ones(out, 
     ]
     first, last = (lock.decode(moved[number][1]).outputs for number in (0, -1))
     old, new = (
-        {path: lock.digest(text.encode()) for path, text in files.items()} for files in (OLD, NEW)
+        {path: step.digest(text.encode()) for path, text in files.items()} for files in (OLD, NEW)
     )
     assert last == new
     assert first == {

@@ -7,9 +7,9 @@ import zstandard
 
 import idlc
 from idlc.cli.main import main
+from idlc.project.words import expand, in_order
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.damage import DamageWarning
-from idlc.recordings.find import expand, in_order
 from tests.support import recordings as made
 
 ORDERS = [

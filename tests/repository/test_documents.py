@@ -15,9 +15,9 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.codes import CODES
-from idlc.project.lock import digest
 from idlc.project.root import Root
 from idlc.project.settings import Config
+from idlc.project.step import digest
 from idlc.versions.packages import Allowance
 from tests.support import command_line_page, programs, refresh
 from tests.support.files import write

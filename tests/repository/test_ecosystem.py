@@ -58,3 +58,12 @@ def test_two_repositories_are_examined(clones, monkeypatch, capsys):
     assert sea.endswith("gen 0, import 0, breaking 1")
     assert summary.startswith("2 repositories, 0 with faults")
     assert git("status", "--porcelain", cwd=clones / "bot") == b""
+
+
+@pytest.mark.parametrize(("place", "is_lost"), [("bot", True), ("build/bot", False)])
+def test_what_cmake_builds_has_no_classes_in_wheels(place, is_lost, here, monkeypatch):
+    monkeypatch.setattr(ecosystem, "wheel_files", lambda *_: {"bot/a.py"})
+    write_all({"clone/bot/setup.py": "", "clone/bot/package.xml": ""})
+    write(f"new/bot/{place}/msg/_{ecosystem.MODULE}.py", "")
+    _, lost = ecosystem.lost_files(here / "clone", here / "new", here)
+    assert lost == ["bot: the classes are not installed"] * is_lost

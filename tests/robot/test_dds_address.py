@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from idlc.project.find import is_address
+from idlc.project.words import is_address
 from idlc.robot.dds.address import PARTICIPANTS, open_sockets, own_hosts, parse_place, searched
 from idlc.robot.errors import RobotError
 from idlc.robot.session import open_session

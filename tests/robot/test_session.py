@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.main import main
-from idlc.project.find import is_address
+from idlc.project.words import is_address
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

@@ -30,8 +30,8 @@ import sys
 
 import idlc
 import idlc.generate.python.render
+import idlc.generate.templates
 import idlc.project.settings
-import idlc.project.templates
 
 WRITES = {"os.mkdir", "os.rmdir", "os.remove", "os.rename", "os.utime", "os.chmod", "os.truncate"}
 
@@ -129,7 +129,7 @@ def main():
     names = ("difflib", "encodings.idna", "encodings.unicode_escape", "fcntl", "html", "tempfile")
     for name in (*names, "xml.parsers.expat"):
         importlib.import_module(name)
-    idlc.project.templates.environment()
+    idlc.generate.templates.environment()
     idlc.project.settings.toml("")
     for line in sys.stdin:
         order = json.loads(line)

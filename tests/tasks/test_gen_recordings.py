@@ -5,7 +5,7 @@ import json
 import pytest
 
 from idlc.cli.main import main
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.tasks.gen import run_for
 from tests.support import recorded_text
 from tests.support.files import write
@@ -71,7 +71,8 @@ def test_an_editor_reports_a_recording_by_the_name_in_the_settings(tmp_path):
         if content is not None:
             write(tmp_path / "bags/a.mcap", content)
         report = Report()
-        assert run_for(tmp_path / "msg/Drive.msg", "demo").make(report) == ()
+        with pytest.raises(ReportedError):
+            run_for(tmp_path / "msg/Drive.msg", "demo").make(report)
         (problem,) = report
         assert problem.where[0] == "bags/a.mcap"
         assert "`bags/a.mcap`" in problem.message

@@ -210,6 +210,53 @@ def test_hostile_text_stays_text(playground):
     assert hosts <= {"", f"127.0.0.1:{playground.server.server_port}"}
 
 
+#: What code in the worker could try, and whether that connects it to another host.
+PROBE = """
+const probe = new BroadcastChannel("probe");
+probe.onmessage = async ({{ data }}) => {{
+  const found = {{}};
+  const host = "http://localhost:{port}";
+  const ways = {{
+    fetch: () => fetch(host), prototype: () => WorkerGlobalScope.prototype.fetch.call(self, host),
+    worker: () => new Worker(URL.createObjectURL(new Blob(["1"]))),
+    font: () => new FontFace("a", `url(${{host}}/font)`).load(),
+    socket: () => new WebSocket(`ws://localhost:{port}`), events: () => new EventSource(host),
+    channel: () => new BroadcastChannel("a"), database: () => indexedDB.databases(),
+    "database of the prototype": () => WorkerGlobalScope.prototype.indexedDB.databases(),
+    module: () => import(`${{host}}/module.mjs`),
+    "module of text": () => import(`data:text/javascript,import "${{host}}/inner.mjs"`),
+  }};
+  for (const [name, way] of Object.entries(ways)) {{
+    try {{ await way(); found[name] = "open"; }} catch {{ found[name] = "closed"; }}
+  }}
+  probe.postMessage(found);
+}};
+"""
+
+
+def test_code_in_the_worker_could_not_connect(playground, folder, monkeypatch):
+    """No way is known to run code there; if there were one, it would lead nowhere."""
+    worker = folder / "playground/worker.mjs"
+    text = worker.read_text()
+    try:
+        worker.write_text(PROBE.format(port=playground.server.server_port) + text)
+        playground.open()
+        playground.page.until("document.body.dataset.offline")
+        playground.page.until("!!navigator.serviceWorker.controller")
+        REQUESTED.clear()
+        script = """new Promise((done) => {
+            const probe = new BroadcastChannel("probe");
+            probe.onmessage = ({ data }) => { done(data); };
+            probe.postMessage("try");
+        })"""
+        found = playground.page.run(script)
+    finally:
+        worker.write_text(text)
+    assert found == dict.fromkeys(found, "closed")
+    assert len(found) == 11
+    assert REQUESTED == []
+
+
 def test_a_link_of_another_form_is_not_used(playground):
     playground.open("#msg/../../x?text=float64%20x")
     playground.until(".cm-content", "How to drive")

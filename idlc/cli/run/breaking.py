@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,19 +13,16 @@ import click
 from idlc.cli import options, output
 from idlc.diagnostics import codes
 from idlc.diagnostics.formats import notice
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.diagnostics.terminal import counted
-from idlc.project.find import is_address
 from idlc.project.git import commit, repository_of
 from idlc.project.root import Root
 from idlc.project.settings import Config, scope, settings_here
-from idlc.recordings.find import recordings_of
+from idlc.project.words import is_address, read_version, recordings_of
 from idlc.tasks.breaking.files import BreakingOptions, Verdict, breaking
 from idlc.tasks.breaking.recordings import RecordedVerdict, compare_with_recordings
 from idlc.versions import packages
 from idlc.versions.changes import LEVELS
-from idlc.versions.distribution import is_distro
-from idlc.versions.revision import GIT
 
 if TYPE_CHECKING:
     from idlc.tasks.breaking.graph import GraphVerdict
@@ -125,7 +123,9 @@ def run(
     if timeout is not None and not is_running:
         raise click.UsageError("--timeout needs --against graph")
     verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
-    if against is not None and not report.had_errors:
+    with suppress(ReportedError):
+        report.raise_errors()
+        assert against is not None
         comparison = _comparison(paths, against, settings, levels, allowed, scoping)
         if is_running:
             from idlc.tasks.breaking.graph import compare_with_graph
@@ -141,6 +141,7 @@ def run(
 def _committed(root: Root, report: Report) -> str | None:
     """Return what the files of a repository are compared with if nothing is named."""
     for name in ("origin/HEAD", "HEAD"):
+        # settings with errors may have named another version
         if not report.had_errors and commit(name, root.base):
             sys.stderr.write(f"note: idlc compares with `git:{name}`\n")
             return f"git:{name}"
@@ -166,7 +167,7 @@ def _comparison(
 ) -> BreakingOptions:
     """Return the comparison of the paths, else of those in the settings, else of this folder."""
     paths = paths or settings.paths
-    if not paths and not is_distro(against):
+    if not paths and read_version(against, settings.root).meaning != "distribution":
         paths = (".",)
     return BreakingOptions(
         paths=paths,
@@ -185,23 +186,23 @@ def _compare_files(
     settings: Config,
     levels: tuple[str, ...],
     report: Report,
-) -> Verdict | RecordedVerdict | None:
+) -> Verdict | RecordedVerdict:
     """Compare with a recording or with a version of the files; `paths` and `levels` are options."""
     import msgspec
 
     against = comparison.against
-    if is_distro(against) or against.startswith(GIT):
+    if read_version(against, settings.root).meaning in ("revision", "distribution"):
         return breaking(comparison, report)
-
     recordings, newer, files = recordings_of(against, paths, settings.root)
     if not recordings:
         return breaking(comparison, report)
 
     current = () if newer else files or settings.paths
     comparison = msgspec.structs.replace(comparison, paths=current, levels=levels)
-    verdict = compare_with_recordings(comparison, recordings, newer, report)
-    output.notes(report, sys.stderr)
-    return verdict
+    try:
+        return compare_with_recordings(comparison, recordings, newer, report)
+    finally:
+        output.notes(report, sys.stderr)
 
 
 def _show(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 
 from idlc.check.select import selection
 from idlc.cli import output
 from idlc.diagnostics import terminal
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report, ReportedError, Severity
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.project.settings import scope, settings_here
@@ -40,7 +41,7 @@ def check_paths(
         from idlc.tasks.check_prefix import check_prefix
 
         checked = check_prefix(prefix, settings.root, report)
-    elif not report.had_errors:
+    elif not report.had_errors:  # of the settings
         where = scope(settings, package, include, exclude, distro)
         options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix, diff)
         checked = check(options, report)
@@ -64,7 +65,8 @@ def check_file(path: str, *, strict: bool) -> tuple[list[str], list[str]]:
     """Return the errors in a file as text, and a line for each warning; none if `strict`."""
     settings, report = settings_here()
     chosen = selection(settings, report)
-    if not report.had_errors:
+    with suppress(ReportedError):
+        report.raise_errors()
         check(CheckOptions((path,), scope(settings), chosen), report)
     errors = [problem for problem in report if strict or problem.severity is Severity.ERROR]
     others = [problem for problem in report if problem not in errors]

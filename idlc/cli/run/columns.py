@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,14 @@ from idlc.diagnostics.ci import Form
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.root import Root
-from idlc.recordings.find import expand, in_order, split_recordings
-from idlc.tasks.columns import ColumnsOptions, Work, columns
+from idlc.project.words import expand, in_order, split_recordings
+from idlc.tasks.columns import ColumnsOptions, WrittenFile, columns
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.terminal import Progress
     from idlc.recordings.aligned.table import ClockFit
+
+    Write = Callable[[ColumnsOptions, Report, Progress], list[WrittenFile]]
 
 
 def run(
@@ -31,15 +35,16 @@ def run(
     how: tuple[str, ...],
     tolerance: tuple[str, ...],
     clock: tuple[str, ...],
+    lerobot: str | None,
+    features: tuple[str, ...],
+    episodes: str | None,
+    task: str | None,
     **arguments: Any,
 ) -> int:
     """Run the command and return the exit status."""
-    work = None
-    if grid is not None:
-        has_others = any([fields is not None, conditions, arguments["nested"], arguments["each"]])
-        work = _table_of(grid, (how, tolerance, clock), has_others, arguments)
-    elif how or tolerance or clock:
-        raise click.UsageError("--how, --tolerance and --clock need --grid")
+    has_others = any([fields is not None, conditions, arguments["nested"], arguments["each"]])
+    data_set = (lerobot, features, episodes, task)
+    write = _write_of(grid, (how, tolerance, clock), data_set, has_others, arguments)
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
     try:
@@ -51,7 +56,7 @@ def run(
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
     form = Form.EXACT if request.style == "csv" else Form.TEXT
     with output.progress_bar(sys.stderr) as update, written_as(form, sys.stdout):
-        written = columns(request, report, update, work)
+        written = write(request, report, update)
     width = shutil.get_terminal_size((100, 24)).columns
     previews = [file.preview.text(width) for file in written if file.preview]
     output.texts(("".join(f"{line}\n" for line in lines) for lines in previews), "text", sys.stdout)
@@ -64,19 +69,39 @@ def run(
     return output.status(report)
 
 
-def _table_of(
-    grid: str, ways: tuple[tuple[str, ...], ...], has_others: bool, arguments: dict[str, Any]
-) -> Work:
-    """Return what writes the table of --grid, or report options that it does not have."""
-    from idlc.tasks.aligned import Grid, write_aligned  # other tables do not need it
-
+def _write_of(
+    grid: str | None,
+    ways: tuple[tuple[str, ...], ...],
+    data_set: tuple[Any, ...],
+    has_others: bool,
+    arguments: dict[str, Any],
+) -> Write:
+    """Return what writes the files, or report options that do not belong together."""
+    is_data_set = data_set[0] is not None
+    if any(data_set) and not is_data_set:
+        raise click.UsageError("--feature, --episodes and --task need --lerobot")
+    if is_data_set and (grid is None or grid.startswith("/")):
+        raise click.UsageError("--lerobot needs a period, such as `--grid 30Hz`")
+    if is_data_set and (arguments["out"] != "-" or arguments["style"] or arguments["force"]):
+        raise click.UsageError("--lerobot has no -o, --format, --force")
+    if grid is None:
+        if any(ways):
+            raise click.UsageError("--how, --tolerance and --clock need --grid")
+        return columns
     if has_others or not arguments["datetimes"]:
         hint = "select fields after a colon: `/imu:orientation`"
         raise click.UsageError(
             f"--grid has no --fields, --where, --each, --nested, --no-datetimes; {hint}"
         )
+    from idlc.tasks.aligned import Grid, write_aligned  # other tables do not need it
+
+    clock = Grid(grid, *ways)
+    if is_data_set:
+        from idlc.tasks.lerobot import LeRobot, write_data_set
+
+        return partial(write_data_set, LeRobot(*data_set), clock, partial(_show_fit, False))
     to_stdout = arguments["style"] == "text" or (arguments["out"] == "-" and sys.stdout.isatty())
-    return partial(write_aligned, Grid(grid, *ways), partial(_show_fit, to_stdout))
+    return partial(columns, work=partial(write_aligned, clock, partial(_show_fit, to_stdout)))
 
 
 def _show_fit(is_output: bool, summaries: list[ClockFit]) -> None:

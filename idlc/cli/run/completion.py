@@ -17,7 +17,7 @@ from idlc.project.inputs import nearby_packages
 from idlc.project.library import Library
 from idlc.project.root import Root
 from idlc.project.settings import scope, settings_here
-from idlc.recordings.find import split_recordings
+from idlc.project.words import split_recordings
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

@@ -22,7 +22,7 @@ def run(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...
     done = "changed" if write else "would change"
     broken, clean = "with errors skipped", "already formatted"
     numbers = dict.fromkeys((done, broken, clean), 0)
-    if not report.had_errors:
+    if not report.had_errors:  # of the settings
         left_out = scope(settings, exclude=exclude).exclude
         for file in find(paths or settings.paths or (".",), settings.root, report, left_out):
             source = settings.root.read_source(file.path, file.shown, report)

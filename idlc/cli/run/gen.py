@@ -6,19 +6,20 @@ import shlex
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from idlc.cli import options, output
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import Paint, counted, summary
 from idlc.diagnostics.text import one_line
-from idlc.project.find import Stamp, is_address, is_path, list_files, snapshot, stamps
+from idlc.project.find import Stamp, list_files, snapshot, stamps
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope, settings_here
-from idlc.recordings.find import files, split_recordings
+from idlc.project.words import files, is_address, read_words
 from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
 
 if TYPE_CHECKING:
@@ -32,18 +33,20 @@ INTERVAL = 0.25
 def once(request: GenOptions, style: str) -> int:
     """Run once, show the outcome and return the exit status."""
     report = Report()
-    packages = gen(request, report)
+    packages: tuple[Generated, ...] | None = None
+    with suppress(ReportedError):
+        packages = gen(request, report)
     if style == "text":
         output.show(report, style, sys.stderr)
         output.notes(report, sys.stderr)
-        if report.had_errors:
+        if packages is None:
             outcome = "" if request.check else "; nothing was written"
             sys.stderr.write(f"{summary(report)}{outcome}\n")
         else:
             paint = output.painter(sys.stdout)
             sys.stdout.writelines([_line(package, request.check, paint) for package in packages])
     else:
-        _document(report, style, packages, check=request.check)
+        _document(report, style, packages or (), check=request.check)
     return max(output.status(report), _lacks_types(report))
 
 
@@ -122,7 +125,7 @@ def _snapshot(request: GenOptions) -> dict[str, Stamp]:
 def run(style: str, watch: bool, **arguments: Any) -> int:
     """Run the command and return the exit status."""
     settings, report = settings_here()
-    if report.had_errors:
+    if report.had_errors:  # of the settings
         if style == "text":
             output.show(report, style, sys.stderr)
         else:
@@ -156,9 +159,9 @@ def _refuse_what_has_no_effect(request: GenOptions, package: str | None) -> None
         raise click.UsageError(message)
     root = request.scope.root
     judged = request.paths if package or request.topics else ()
-    recordings, others = split_recordings(judged, root)
-    if request.topics and not recordings:
+    meant = read_words(judged, root)
+    if request.topics and not meant["recording"]:
         raise click.UsageError("--topic needs a recording")
-    if package and not any(is_path(word, root) for word in others):
-        what = "a recording" if recordings else "an installed package"
+    if package and not meant["path"]:
+        what = "a recording" if meant["recording"] else "an installed package"
         raise click.UsageError(f"--package applies to files, but {what} keeps its own package name")

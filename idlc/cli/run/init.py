@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,10 @@ import click
 
 from idlc.cli import options, output
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line, printable
+from idlc.packaging.files import SETUP_PY
 from idlc.project.find import list_files
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
@@ -29,7 +31,7 @@ from idlc.scaffold.init import (
     recommendation,
     siblings,
 )
-from idlc.scaffold.layouts import SETUP, Layout, layout_of
+from idlc.scaffold.layouts import Layout, layout_of
 from idlc.scaffold.proof import Proof, installed_files, prove
 
 if TYPE_CHECKING:
@@ -50,8 +52,9 @@ def run(path: str, service: str | None, yes: bool) -> int:
         raise click.UsageError(f"no such folder: {path!r}") from error
     path = f"./{path}" if path.startswith("-") else path  # for the commands to paste
     report = Report()
-    layout = layout_of(root, report)
-    if layout is None:
+    try:
+        layout = layout_of(root, report)
+    except ReportedError:
         output.show(report, "text", sys.stderr)
         sys.stderr.write("nothing was written\n")
         return output.status(report)
@@ -59,8 +62,8 @@ def run(path: str, service: str | None, yes: bool) -> int:
     extras: list[tuple[Draft, list[str]]] = []
     if service:
         others = Report()
-        checks = continuous(service, layout, others)
-        if checks:
+        with suppress(ReportedError):
+            checks = continuous(service, layout, others)
             extras.append((checks, obtaining(checks)))
         output.show(others, "text", sys.stderr)
         status = max(status, output.status(others))
@@ -127,13 +130,12 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
         if layout.packages and not number:
             sys.stdout.write(f"{within}skipped, because it has no interfaces\n")
             continue
-        inner = layout_of(own, report) if layout.packages else layout
-        if inner:
+        preparation = None
+        with suppress(ReportedError):
+            inner = layout_of(own, report) if layout.packages else layout
             interfaces = counted(number, "interface") if number else "no interfaces yet"
             sys.stdout.write(f"{within}{one_line(inner.sentence(interfaces))}\n")
-        preparation = (
-            prepare(inner, ScaffoldOptions(own), report, siblings(inner)) if inner else None
-        )
+            preparation = prepare(inner, ScaffoldOptions(own), report, siblings(inner))
         sys.stdout.flush()
         output.show(report, "text", sys.stderr)
         if preparation is None:
@@ -153,8 +155,8 @@ def _show(draft: Draft, out: str, root: Root) -> None:
     reasons = [f"{path}: {reason}" for path, reason in draft.reasons.items()]
     reasons += [f"{out}/: the output of `idlc gen`"] * bool(out)
     sys.stdout.writelines(["\n", *(f"{within}{one_line(reason)}\n" for reason in reasons), "\n"])
-    result = draft.write(Report(), dry_run=True)
-    sys.stdout.writelines(printable(line) for line in (result.diff if result else ()))
+    with suppress(ReportedError):  # writing reports it
+        sys.stdout.writelines(map(printable, draft.write(Report(), dry_run=True).diff))
     sys.stdout.flush()
 
 
@@ -166,9 +168,10 @@ def _write(draft: Draft, next_commands: Sequence[str]) -> int:
     report = Report()
     if not draft.reasons:
         return 0
-    is_written = draft.write(report) is not None
+    with suppress(ReportedError):
+        draft.write(report)
     output.show(report, "text", sys.stderr)
-    if is_written and next_commands:
+    if next_commands and not output.status(report):
         folder = Root.here().shown(draft.path)
         start = [] if draft.path == Path.cwd() else [f"cd {shlex.quote(folder)}"]
         sys.stdout.writelines(f"next: {line}\n" for line in (*start, *next_commands))
@@ -184,7 +187,7 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
     folder = preparation.layout.folder
     within = "" if folder == root.base else f"{one_line(root.shown(folder))}: "
     draft, backend = preparation.draft, preparation.layout.backend
-    is_edited = SETUP in draft.reasons and draft.project.has(SETUP)
+    is_edited = SETUP_PY in draft.reasons and draft.project.has(SETUP_PY)
     before = installed_files(folder, backend) if is_edited and backend else frozenset()
     done = _compile(preparation, within, report)
     if not done:
@@ -213,8 +216,10 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
 
 def _compile(preparation: Preparation, within: str, report: Report) -> tuple[Generated, ...]:
     """Write and compile a package; return the generated packages, none after an error."""
-    is_written = preparation.draft.write(report) is not None
-    done = generate(preparation, report) if is_written else ()
+    done: tuple[Generated, ...] = ()
+    with suppress(ReportedError):
+        preparation.draft.write(report)
+        done = generate(preparation, report)
     output.show(report, "text", sys.stderr)
     if not done:
         sys.stderr.write(f"{within}idlc did not generate the classes\n")

@@ -7,6 +7,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -14,7 +15,7 @@ import click
 from idlc.cli import output
 from idlc.cli.streams import colours
 from idlc.diagnostics.explain import close_name, overview, page
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import Paint, counted
 from idlc.diagnostics.text import one_line
 from idlc.project import library
@@ -31,7 +32,9 @@ def in_scope(
     """
     settings, report = settings_here()
     text = None
-    if despite_errors or not report.had_errors:
+    with suppress(ReportedError):
+        if not despite_errors:
+            report.raise_errors()
         text = command(scope=scope(settings, *scoping), report=report)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)

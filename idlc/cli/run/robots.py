@@ -16,7 +16,7 @@ from msgspec.structs import asdict
 from idlc.cli import messages, output
 from idlc.cli.streams import stop_signals
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.project.settings import Scope, settings_here
@@ -39,9 +39,9 @@ def with_session(
     """Call a command with the `session` with a robot and a `report`, which is shown then."""
     settings, report = settings_here()
     folders, failed = (*include, *settings.include), False
-    with connected(address, report) as session:
-        if session and not report.had_errors:
-            failed = bool(command(session=session, report=report, include=folders))
+    with connected(address, report) as session, suppress(ReportedError):
+        report.raise_errors()
+        failed = bool(session and command(session=session, report=report, include=folders))
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     return output.status(report) or int(failed)
@@ -130,8 +130,7 @@ def record(
     except ImportError as error:
         raise click.UsageError(f"{error}; run `pip install 'idlc[zenoh,recordings]'`") from None
     names = {end.name for end in find_endpoints(session, topics, TOPICS, report)}
-    if report.had_errors:
-        return False
+    report.raise_errors()
     end = float("inf") if duration is None else time.monotonic() + duration
     try:
         with stop_signals() as stopped, open(out, "xb") as file:  # noqa: PTH123 - never a link

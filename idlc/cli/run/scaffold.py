@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 import click
 
 from idlc.cli import output
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import summary
 from idlc.model import ir
 from idlc.model.ir import KINDS
@@ -71,7 +72,9 @@ def new_package(
     shared = {key: arguments[key] for key in ("dry_run", "force", "include")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
     chosen |= {"starters"} if starters else set()
-    result = package(requested, ScaffoldOptions(root, **shared), report, examples, chosen)
+    result = None
+    with suppress(ReportedError):
+        result = package(requested, ScaffoldOptions(root, **shared), report, examples, chosen)
     example = f"{output.program()} scaffold interface msg Status 'float32 battery'"
     return _finish(result, report, (f"cd {name}", example))
 
@@ -104,7 +107,9 @@ def new_interface(
         raise click.UsageError(str(error)) from error
     settings = ScaffoldOptions(Root.here(), include=include, **arguments)
     checked_kind = KINDS[KINDS.index(kind)]
-    result = interface(checked_kind, name, fields, settings, report)
+    result = None
+    with suppress(ReportedError):
+        result = interface(checked_kind, name, fields, settings, report)
     return _finish(result, report)
 
 
@@ -210,7 +215,9 @@ def new_node(name: str, owners: Sequence[tuple[str, int]], **arguments: Any) -> 
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
-    result = node(requested, settings, report)
+    result = None
+    with suppress(ReportedError):
+        result = node(requested, settings, report)
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
     python = Path(sys.executable).name
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)

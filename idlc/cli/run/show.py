@@ -12,9 +12,8 @@ from idlc.cli import options, output
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
-from idlc.project.find import is_address
 from idlc.project.settings import Scope
-from idlc.recordings.find import is_recording
+from idlc.project.words import is_address, read_word
 from idlc.recordings.times import date_text
 from idlc.tasks import show
 from idlc.tasks.show import RecordingFacts, TopicFacts
@@ -81,7 +80,7 @@ def run(
     report: Report,
 ) -> None:
     """Run the command."""
-    is_of_recording = is_recording(subject, scope.root)
+    is_of_recording = read_word(subject, scope.root) == "recording"
     if (style == "msg") != (out is not None) or (style == "msg" and not is_of_recording):
         raise click.UsageError("`--format msg` and `-o DIR` belong together, and need a recording")
     if out is not None:

@@ -6,16 +6,18 @@ import shlex
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from idlc.cli import options, output
+from idlc.diagnostics.report import ReportedError
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.project.settings import scope, settings_here
-from idlc.recordings.find import expand
+from idlc.project.words import expand
 from idlc.tasks.upgrade.recordings import (
     TopicPlan,
     UpgradeOptions,
@@ -96,7 +98,8 @@ def run(
     where = scope(settings, package, include, exclude, distro)
     request = UpgradeOptions(recordings, where, out, again=again, **arguments)
     result = UpgradeResult([], [], [], {}, {})
-    if not report.had_errors:
+    with suppress(ReportedError):
+        report.raise_errors()
         with output.progress_bar(sys.stderr) as update:
             result = upgrade_recordings(request, report, update)
     _show(result, request, style, failed=report.had_errors)

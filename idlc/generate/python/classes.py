@@ -9,8 +9,8 @@ import msgspec
 from idlc.generate.python import fields, literals
 from idlc.generate.python.fields import Docstring, FieldView, Naming
 from idlc.generate.python.imports import References
+from idlc.generate.templates import Code, EscapedText
 from idlc.model import enums, ir, python_names
-from idlc.project.templates import Code, EscapedText
 
 
 class ConstantView(msgspec.Struct, frozen=True):

@@ -9,10 +9,10 @@ import msgspec
 
 from idlc.generate.python import literals
 from idlc.generate.python.imports import References
+from idlc.generate.templates import Code, EscapedText
 from idlc.model import comments, ir, python_names
 from idlc.model.idl_text import idl_text
 from idlc.model.ir import spell
-from idlc.project.templates import Code, EscapedText
 from idlc.wire.plan import LIST_PRIMITIVES
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import msgspec
 
+from idlc.generate.templates import Code, EscapedText
 from idlc.model import derive, enums, ir, link, python_names
-from idlc.project.templates import Code, EscapedText
 from idlc.wire.layout import Messages
 
 

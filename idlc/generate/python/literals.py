@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import unicodedata
 
+from idlc.generate.templates import EscapedText
 from idlc.model import ir
-from idlc.project.templates import EscapedText
 
 
 def string_literal(value: str) -> str:

@@ -22,13 +22,13 @@ from idlc.generate.python.imports import ALONE, References, Surroundings
 from idlc.generate.python.lines import call, text_of
 from idlc.generate.python.literals import string_literal
 from idlc.generate.python.positions import NamedExpressions
+from idlc.generate.templates import Code, EscapedText, RenderedFile
+from idlc.generate.templates import code as code_environment
 from idlc.model import derive, ir, link, python_names
 from idlc.model.idl_text import idl_text
 from idlc.model.names import snake_case
 from idlc.model.type_data import content
 from idlc.project.lock import COPY_HEAD
-from idlc.project.templates import Code, EscapedText, RenderedFile
-from idlc.project.templates import code as code_environment
 from idlc.runtime import PROTOCOL
 from idlc.runtime.names import stamp
 from idlc.version import RUNTIME, __version__

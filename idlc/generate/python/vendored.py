@@ -8,8 +8,8 @@ import msgspec
 
 from idlc.generate.python.imports import VENDORED
 from idlc.generate.python.render import interface_files, template
+from idlc.generate.templates import Code, RenderedFile
 from idlc.model import derive, link
-from idlc.project.templates import Code, RenderedFile
 
 
 class CopyView(msgspec.Struct, frozen=True):

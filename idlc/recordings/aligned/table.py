@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +15,7 @@ from idlc.diagnostics.text import worded
 from idlc.recordings.aligned import blend
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
 from idlc.recordings.aligned.describe import leaves, metadata, quaternions
+from idlc.recordings.arguments import texts
 from idlc.recordings.columns.arrow import arrow
 from idlc.recordings.columns.elements import element_of, names_of
 from idlc.recordings.columns.values import needing
@@ -277,6 +279,23 @@ class Aligned:
             parts.append(AlignedPart(self._sources, self.schema, ticks, needs))
         return parts
 
+    def present(self) -> dict[str, Any]:
+        """Return which ticks have a message of each topic."""
+        pairs = zip(self._sources, self._matches, strict=True)
+        return {source.track.topic: each.first >= 0 for source, each in pairs}
+
+    @property
+    def ticks(self) -> Any:
+        """The times of the rows, in nanoseconds."""
+        return self._ticks
+
+    def rows(self, first: int, last: int) -> Aligned:
+        """Return some rows of the table, for which no times are read again."""
+        result, rows = copy(self), slice(first, last)
+        vars(result)["_matches"] = [each.part(rows) for each in self._matches]
+        vars(result)["_ticks"] = self._ticks[rows]
+        return result
+
     def summary(self) -> list[ClockFit]:
         """Return how well each topic fits the clock."""
         triples = zip(self._sources, self._times, self._matches, strict=True)
@@ -310,7 +329,7 @@ class Aligned:
     def to_numpy(self) -> dict[str, Any]:
         """Return a masked array for each column; lists of one length have two dimensions."""
         table = self.to_arrow()
-        return {name: _masked(table[name].combine_chunks()) for name in table.column_names}
+        return {name: masked(table[name].combine_chunks()) for name in table.column_names}
 
 
 def aligned(
@@ -324,7 +343,9 @@ def aligned(
     span: tuple[int | None, int | None],
 ) -> Aligned:
     """Return the table of `Recording.aligned`; raise RecordingError for what it cannot have."""
-    wanted = dict(topics) if isinstance(topics, Mapping) else dict.fromkeys(topics)
+    if not isinstance(topics, Mapping):
+        topics = dict.fromkeys(texts(topics, "`topics`"))
+    wanted = dict(topics)
     if (on is None) == (every is None):
         raise RecordingError("the clock is either `on` a topic or `every` so often", "give one")
     for option in (how, tolerance, clock):
@@ -508,7 +529,7 @@ def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
     return list(arrays.values())
 
 
-def _masked(column: Any) -> Any:
+def masked(column: Any) -> Any:
     """Return a column of Arrow as a masked array of numpy."""
     pa = arrow()
     mask = column.is_null().to_numpy(zero_copy_only=False)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from idlc.recordings.arguments import texts
 from idlc.recordings.columns.elements import selected
 from idlc.recordings.columns.plan import PlanLevel, plan_of
 from idlc.recordings.columns.scan import (
@@ -82,7 +83,7 @@ def to_columns(
     `on_unread` gets the number of bytes that are left in each message, and `None` if that is not
     known, because not all fields are read, or a message cannot be read.
     """
-    wanted = (fields,) if isinstance(fields, str) else fields
+    wanted = None if fields is None else texts(fields, "`fields`")
     judge = on_unread or _ignore
     selection = None
     if wanted is not None:

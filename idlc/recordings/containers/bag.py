@@ -9,15 +9,11 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+from idlc.project.words import COMPRESSED, METADATA, SUFFIXES, ZSTD, natural
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.damage import Damage
 
-SUFFIXES = (".mcap", ".db3")
-#: Files that rosbag2 compressed as a whole.
-ZSTD = ".zstd"
-COMPRESSED = tuple(suffix + ZSTD for suffix in SUFFIXES)
-METADATA = "metadata.yaml"
-#: Keys in it.
+#: Keys in the metadata.
 INFORMATION, TOPICS = "rosbag2_bagfile_information", "topics_with_message_count"
 TOPIC, COUNT, PATHS = "topic_metadata", "message_count", "relative_file_paths"
 START, DURATION = "starting_time", "duration"
@@ -290,8 +286,3 @@ def _values(nodes: Iterable[Any], key: str) -> list[Any]:
 def _own_name(path: str) -> str:
     """Return a file's name in the bag: older versions put the bag's own folder in front."""
     return path.replace("\\", "/").rpartition("/")[2]
-
-
-def natural(name: str) -> list[tuple[str, int]]:
-    """Return a key that sorts bag_9 before bag_10."""
-    return [(text, int(number or 0)) for text, number in re.findall(r"(\D*)(\d*)", name)]

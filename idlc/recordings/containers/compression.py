@@ -180,8 +180,6 @@ def compress(data: Any, compression: str) -> bytes:
     return compressed
 
 
-def missing(library: str, why: str) -> RecordingError:
+def missing(library: str, why: str, extra: str = "recordings") -> RecordingError:
     """Return the error that says how to install what is missing."""
-    return RecordingError(
-        f"{why}, and {library} is not installed", "pip install 'idlc[recordings]'"
-    )
+    return RecordingError(f"{why}, and {library} is not installed", f"pip install 'idlc[{extra}]'")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
 
 from msgspec.structs import replace
 
-from idlc.project.find import is_address
+from idlc.project.words import METADATA, SUFFIXES, ZSTD, is_address
 from idlc.recordings.containers import bag, db3, records
 from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
 from idlc.recordings.containers.db3 import Db3File
@@ -242,7 +242,7 @@ def _opened_bag(path: Path, opened: Callable[[Path], RecordingFile], strict: boo
     files, damage = _readable(bag_files.paths, opened, strict)
     count = sum(topic.count for file in files for topic, _ in file.topics)
     if count < bag_files.counted:
-        what = f"{bag.METADATA} counts {bag_files.counted:,} messages, and the files have {count:,}"
+        what = f"{METADATA} counts {bag_files.counted:,} messages, and the files have {count:,}"
         logs = [f"`{file.log}`" for file in files if isinstance(file, Db3File) and file.is_lone]
         rest = f"; the others may be in {', '.join(logs)}, which is missing" if logs else ""
         bag_files.notes.append(what + rest)
@@ -266,7 +266,7 @@ def _opened(
         return McapFile(place, index, check, read, strict)
     folder = tempfile.mkdtemp(prefix="idlc-")
     try:
-        plain = Path(folder, place.name.removesuffix(bag.ZSTD))
+        plain = Path(folder, place.name.removesuffix(ZSTD))
         problem = unpack(place, plain)
         file = _opened(plain, index, check, strict, read)
     except BaseException:
@@ -307,7 +307,7 @@ def _readable(
 def is_db3(path: Path) -> bool:
     """Return whether a file is .db3, not MCAP; raise RecordingError if it is neither."""
     hint: str | None = None
-    if path.name == bag.METADATA:
+    if path.name == METADATA:
         hint = f"give the folder: `{path.parent}`"
         raise RecordingError(f"`{path}` is the metadata of a recording, not a recording", hint)
     start = first_bytes(path, 64)
@@ -326,10 +326,9 @@ def is_db3(path: Path) -> bool:
         hint = f"convert it: `{shlex.join(('rosbags-convert', *places))}`"
         raise RecordingError(f"`{path}` is a recording of ROS 1, which idlc does not read", hint)
     if start.startswith(ZSTD_MAGIC):
-        raise RecordingError(
-            f"`{path}` is compressed as a whole", f"zstd -d {shlex.quote(str(path))}"
-        )
-    kind = DamageError if path.suffix in bag.SUFFIXES else RecordingError
+        hint = f"zstd -d {shlex.quote(str(path))}"
+        raise RecordingError(f"`{path}` is compressed as a whole", hint)
+    kind = DamageError if path.suffix in SUFFIXES else RecordingError
     raise kind(f"`{path}` is not an MCAP or .db3 recording", hint)
 
 

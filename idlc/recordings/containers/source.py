@@ -73,6 +73,8 @@ class FileSource:
             reason = (self.is_local and getattr(error, "strerror", None)) or str(error)
             if isinstance(error, FileNotFoundError):
                 reason = "No such file or directory"
+            if isinstance(error, AttributeError):
+                reason = "it is not a path, a URL or an open file"
             reason = reason or type(error).__name__
             is_damage = self.is_local and getattr(error, "errno", None) == EIO
             kind = DamageError if is_damage else RecordingError

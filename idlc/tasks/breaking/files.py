@@ -15,7 +15,7 @@ import msgspec
 
 from idlc.compiler.compiler import models_of, stage, without_errors
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
@@ -33,8 +33,9 @@ from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Config, Scope
+from idlc.project.words import VersionWord, read_version
 from idlc.versions.changes import LEVELS, Change
-from idlc.versions.distribution import compare_with_distro, is_distro
+from idlc.versions.distribution import compare_with_distro
 from idlc.versions.packages import (
     Allowance,
     Comparison,
@@ -47,8 +48,8 @@ from idlc.versions.packages import (
     part_to_raise,
     raised,
 )
-from idlc.versions.revision import GIT, Revision, checked_out, is_revision
-from idlc.wire.layout import oversized
+from idlc.versions.revision import Revision, checked_out, is_revision
+from idlc.wire.layout import oversized, report_oversized
 
 #: The inputs of packages.
 Packages: TypeAlias = Sequence[Inputs]
@@ -95,29 +96,29 @@ class Verdict(NamedTuple):
         return {"interface": self.compared}
 
 
-def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
-    """Report each change that breaks something; `None` if a version could not be compiled."""
+def breaking(options: BreakingOptions, report: Report) -> Verdict:
+    """Report each change that breaks something; ReportedError if a version cannot be compiled."""
     root, exclude = options.scope.root, options.scope.exclude
     listing = list_files(options.paths, root, report, exclude)
     packages = inputs.packages(listing.files, options.scope, report)
-    comparison = None if report.had_errors else _against(options, packages, report)
-    if comparison is None:
-        return None
+    report.raise_errors()
+    version = read_version(options.against, root)
+    comparison = _against(options, version, packages, report)
+    # an empty folder is fine if its interfaces were removed; errors may be why it seems empty
     if listing.empty and not (comparison.differs or report.had_errors):
-        # an empty folder is fine if its interfaces were removed
         report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
-        return None
+        raise ReportedError
     is_complete = not comparison.skipped
     skipped = report_skipped(comparison.skipped, options, report)
     # unused allowances may be for what was skipped
     judged = judge(comparison.changes, options, report, is_all=is_complete)
-    is_version = is_complete and not is_distro(options.against)
+    is_version = is_complete and version.meaning != "distribution"
     part = part_to_raise(comparison) if is_version else None
-    version = _version(packages, root, report)
-    following = raised(version, part) if version and part else None
+    current = _version(packages, root, report)
+    following = raised(current, part) if current and part else None
     allowed = judged.allowed + sum(len(each.names) for each in comparison.skipped) - len(skipped)
     facts = comparison.additions, skipped, judged.hidden, comparison.compared
-    return Verdict(judged.levels, allowed, part, version, following, *facts)
+    return Verdict(judged.levels, allowed, part, current, following, *facts)
 
 
 def report_skipped(
@@ -192,27 +193,27 @@ def not_allowed(
     return tuple(change for at, change in enumerate(changes) if at not in allowed)
 
 
-def _against(options: BreakingOptions, packages: Packages, report: Report) -> Comparison | None:
-    if is_distro(options.against):
-        comparison = compare_with_distro(options.against, packages, options.scope, report)
-        if comparison and not (comparison.compared or comparison.additions):
+def _against(
+    options: BreakingOptions, version: VersionWord, packages: Packages, report: Report
+) -> Comparison:
+    if version.meaning == "distribution":
+        comparison = compare_with_distro(version.name, packages, options.scope, report)
+        if not (comparison.compared or comparison.additions):
             reason = "the interfaces use no standard interface"
             report_nothing(options, reason, "without PATH, idlc compares all of them", report)
-            return None
+            raise ReportedError
         return comparison
-    if options.against.startswith(GIT):
-        name = options.against.removeprefix(GIT)
-        with checked_out(name, options.paths[0], options.scope.root, report) as revision:
-            comparison = revision and _compare(options, packages, revision, report)
+    if version.meaning == "revision":
+        with checked_out(version.name, options.paths[0], options.scope.root, report) as revision:
+            comparison = _compare(options, packages, revision, report)
         prefix = f"{options.against}:"
-        return comparison and comparison.placed(lambda path: path.removeprefix(prefix))
+        return comparison.placed(lambda path: path.removeprefix(prefix))
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
         message = f"no such file or folder: `{options.against}`"
-        hint = f"for the git revision, use `--against {GIT}{options.against}`"
-        report.add(codes.NO_SUCH_PATH.of(options.against, message, hint=hint))
-        return None
+        hint = f"for the git revision, use `--against git:{options.against}`"
+        raise report.refused(codes.NO_SUCH_PATH.of(options.against, message, hint=hint))
     return _compare(options, packages, None, report)
 
 
@@ -248,13 +249,15 @@ class Side(NamedTuple):
 
 def _compare(
     options: BreakingOptions, packages: Packages, revision: Revision | None, report: Report
-) -> Comparison | None:
-    before = _before(options, packages, revision, report)
+) -> Comparison:
+    before = None
+    with suppress(ReportedError):  # so that errors of the new version are reported, too
+        before = _before(options, packages, revision, report)
     problems = Report()
     after = _side(packages, {}, _newer_scope(options), problems)
     report.extend(problems.errors)
     if before is None or any(problem.code in codes.USAGE for problem in report):
-        return None
+        raise ReportedError
     skipped = [
         Skipped(tuple(map(str, sorted(before.broken))), _errors_in(options.against), before.error),
         *before.skipped,
@@ -306,7 +309,7 @@ def _outside(
 
 def _before(
     options: BreakingOptions, packages: Packages, revision: Revision | None, report: Report
-) -> Side | None:
+) -> Side:
     scope = options.scope
     skipped: Sequence[Skipped] = ()
     problems = Report()
@@ -333,7 +336,7 @@ def _before(
             old = inputs.packages(files, named, problems)
     report.extend(problem for problem in problems if problem.code in codes.USAGE)
     if any(problem.code in codes.USAGE for problem in report):
-        return None
+        raise ReportedError
     homes = (
         {package.home: files for package in old} if scope.package else by_home(files, scope.root)
     )
@@ -491,21 +494,18 @@ def error_free_models(packages: Packages, scope: Scope, report: Report) -> dict[
     """Return the packages' models; reports errors only, warnings are reported by `check`."""
     problems = Report()
     models = {model.package: model for _, model in models_of(packages, scope, problems)}
-    if not problems.had_errors:
-        problems.extend(oversized(*models.values()))
+    report_oversized(models.values(), problems)
     report.extend(problems.errors)
     return models
 
 
-def _compare_with_lock(
-    options: BreakingOptions, packages: Packages, report: Report
-) -> Comparison | None:
+def _compare_with_lock(options: BreakingOptions, packages: Packages, report: Report) -> Comparison:
     folder = options.against.removesuffix(lock.FILE).rstrip("/") or "."
     record = load_lock(options.scope.root.absolute(folder), folder, report)
     if record is None:
-        if not report.had_errors:
-            report.add(codes.NO_SUCH_PATH.of(options.against, f"no such file: `{options.against}`"))
-        return None
+        report.raise_errors()
+        message = f"no such file: `{options.against}`"
+        raise report.refused(codes.NO_SUCH_PATH.of(options.against, message))
     mine = [package for package in packages if package.package == record.package]
     if len(packages) == 1 and not mine:
         named = msgspec.structs.replace(options.scope, package=record.package)
@@ -516,8 +516,7 @@ def _compare_with_lock(
     if not record.types:
         hint = "`idlc gen` writes a lock with the type hashes"
         report_nothing(options, "the lock has no type hashes", hint, report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     model = models.get(record.package) or Model(record.package, (), {})
     same = bool(mine) and mine[0].digests == record.inputs
     with stage("compare", options.against):
@@ -544,10 +543,12 @@ class Baseline:
 
     def __init__(self, folder: Path, wished: str, settings: Config, scope: Scope) -> None:
         ignored = Report()  # `idlc breaking` reports problems of its table
-        version = wished or against(settings, ignored) or ""
-        comparable = version.startswith(GIT) or (bool(version) and is_folder(folder / version))
+        name = wished or against(settings, ignored) or ""
+        version = read_version(name, scope.root)
+        self._revision = version.name if version.meaning == "revision" else None
+        comparable = self._revision or (bool(name) and is_folder(folder / name))
         self._folder = folder
-        self.name = version if comparable else ""
+        self.name = name if comparable else ""
         self._options = BreakingOptions((), self.name, scope, allowed=allowances(settings, ignored))
         self.commit: str | None = None
         self._side: Side | None = None
@@ -562,12 +563,12 @@ class Baseline:
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = msgspec.structs.replace(self._options, paths=paths, scope=scope)
             side = None
-            if paths and self.name.startswith(GIT):
-                name = self.name.removeprefix(GIT)
-                with checked_out(name, paths[0], scope.root, report) as revision:
-                    side = revision and _before(options, packages, revision, report)
-            elif paths and self.name:
-                side = _before(options, packages, None, report)
+            with suppress(ReportedError):
+                if paths and self._revision:
+                    with checked_out(self._revision, paths[0], scope.root, report) as revision:
+                        side = _before(options, packages, revision, report)
+                elif paths and self.name:
+                    side = _before(options, packages, None, report)
             why = next((problem.message for problem in report.errors), "")
             self._side = side or Side({}, frozenset(), why)
         return self._side
@@ -579,10 +580,9 @@ class Baseline:
 
     def has_moved(self) -> bool:
         """Return whether the name refers to another commit than at the last call."""
-        if not self.name.startswith(GIT):
+        if not self._revision:
             return False
-        name = self.name.removeprefix(GIT)
-        before, self.commit = self.commit, git.commit(name, self._folder) or ""
+        before, self.commit = self.commit, git.commit(self._revision, self._folder) or ""
         if before == self.commit:
             return False
         self._side = None

@@ -17,14 +17,15 @@ from typing import Any, NamedTuple, TypeAlias, get_args
 
 from idlc.compiler.compiler import Compiler, stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.model import ir
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import is_address, list_files, no_interfaces
+from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
+from idlc.project.words import is_address
 from idlc.robot.keys import Entity as RobotEntity
 from idlc.robot.keys import EntityKind
 from idlc.robot.live.connect import (
@@ -316,8 +317,8 @@ class GraphVerdict(NamedTuple):
 
 def compare_with_graph(
     options: BreakingOptions, patience: float, report: Report, *, has_paths: bool
-) -> GraphVerdict | None:
-    """Report types in which endpoints, or local files, differ; `None` for an empty graph.
+) -> GraphVerdict:
+    """Report types in which endpoints, or local files, differ; ReportedError for an empty graph.
 
     `patience`: seconds without a change; without files, the installed types are compared. The graph
     is that of this machine's rclpy, or of a robot whose address is compared against.
@@ -328,21 +329,19 @@ def compare_with_graph(
         report.extend(no_interfaces(path, scope.root, scope.exclude) for path in listing.empty)
     packages = inputs.packages(listing.files, scope, report)
     local_models = error_free_models(packages, scope, report).values()
-    if report.had_errors:
-        return None
+    report.raise_errors()
     is_robot = is_address(options.against)
     joined = connected(options.against, report, patience) if is_robot else join_graph(report)
     with joined as view:
         graph = RobotGraph(view) if isinstance(view, Session) else view
         if graph is None:
-            return None
+            raise ReportedError
         endpoints = graph.endpoints(patience)
         if not endpoints:
             variables = _OF_A_ROBOT if is_robot else _OF_RCLPY
             message = f"no node appeared within {patience:g} seconds"
             hint = f"set {variables}, or raise --timeout"
-            report.add(codes.EMPTY_GRAPH.of(options.against, message, hint=hint))
-            return None
+            raise report.refused(codes.EMPTY_GRAPH.of(options.against, message, hint=hint))
         whole = graph.has_hashes_of_services
         models, local = _local_versions(local_models, endpoints, scope, whole)
         versions = list(several_versions(endpoints, local))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import msgspec
 from idlc.api.sources import read_source
 from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, ReportedError
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -53,8 +54,8 @@ class RecordedVerdict(NamedTuple):
 
 def compare_with_recordings(
     options: BreakingOptions, recordings: Sequence[str], newer: Sequence[str], report: Report
-) -> RecordedVerdict | None:
-    """Report changes since recordings were made; `None` if something could not be read.
+) -> RecordedVerdict:
+    """Report changes since recordings were made; ReportedError if something cannot be read.
 
     The new versions are in the `newer` recordings, in the interfaces of PATHs, or without both on
     this machine. Without levels, only changes that affect readers are reported.
@@ -63,15 +64,14 @@ def compare_with_recordings(
     problems = Report()
     packages = inputs.packages(files, options.scope, problems)
     report.extend(problems)
-    topics, newer_topics = (
-        topics_of(read_source, words, (), options.scope.root, report)
-        for words in (recordings, newer)
-    )
-    if topics is None or newer_topics is None or report.had_errors:
-        return None
+    topics: list[list[RecordedDefinition]] = []
+    for words in (recordings, newer):
+        with suppress(ReportedError):  # both are read before an error ends this
+            topics.append(topics_of(read_source, words, (), options.scope.root, report))
+    report.raise_errors()
     local = _LocalVersions(packages, options, report)
-    later = _Recorded(newer_topics, local.types, report) if newer else None
-    earlier = _Recorded(topics, local.types, report)
+    later = _Recorded(topics[1], local.types, report) if newer else None
+    earlier = _Recorded(topics[0], local.types, report)
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
     for models, recorded in earlier.versions:

@@ -14,6 +14,7 @@ from idlc.compiler.compiler import sound_models, stage
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import printable
+from idlc.generate.templates import RenderedFile, html, verbatim
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.project import inputs
@@ -23,10 +24,10 @@ from idlc.project.lock import Tree
 from idlc.project.package_xml import read_statements
 from idlc.project.root import Root
 from idlc.project.settings import Scope
-from idlc.project.templates import RenderedFile, html, verbatim
+from idlc.project.words import read_word
 from idlc.project.write import apply, owned_files, plan
 from idlc.tasks.docs.view import KINDS, Home, PagePaths, Paragraph, blocks, page, prefix, words
-from idlc.tasks.gen import is_name, named_packages
+from idlc.tasks.gen import named_packages
 
 
 class About(NamedTuple):
@@ -216,11 +217,10 @@ def _listed(folder: Path) -> dict[str, frozenset[str]]:
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     """Write a site about the interfaces of paths and names; return its number of pages.
 
-    Interfaces with errors, and interfaces that hold these, are left out.
+    Interfaces with errors, and interfaces that hold these, are left out. Raises ReportedError.
     """
     packages = _packages(paths, scope, report)
-    if report.had_errors:
-        return 0
+    report.raise_errors()
     models = [model for model, _ in sound_models(packages, scope, report) if model.own]
     if not models:
         return 0
@@ -237,10 +237,11 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
 
 
 def _packages(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:
-    names = [word for word in words if is_name(word, scope.root)]
+    names = [word for word in words if read_word(word, scope.root) == "name"]
     named = named_packages(names, scope, report, whole=False)
-    paths = [word for word in words if not is_name(word, scope.root)]
-    if not paths or report.had_errors:
+    paths = [word for word in words if word not in names]
+    report.raise_errors()
+    if not paths:
         return tuple(named)
     files = find(paths, scope.root, report, scope.exclude)
     packages = (*inputs.packages(files, scope, report), *named)

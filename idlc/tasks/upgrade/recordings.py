@@ -6,7 +6,7 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,13 +17,21 @@ from idlc.api.sources import read_source
 from idlc.api.upgrade import Runner, UpgradeError
 from idlc.compiler.compiler import stage
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Label, Report, Severity, first_few
+from idlc.diagnostics.report import (
+    Diagnostic,
+    Label,
+    Report,
+    ReportedError,
+    Severity,
+    first_few,
+)
 from idlc.diagnostics.terminal import Progress
 from idlc.model import ir
 from idlc.project.files import is_folder
-from idlc.project.find import RULES, is_address
+from idlc.project.find import RULES
 from idlc.project.root import Root
 from idlc.project.settings import Scope
+from idlc.project.words import is_address, read_version
 from idlc.recordings.columns import unread_bytes
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.conversion import (
@@ -37,7 +45,6 @@ from idlc.recordings.containers.file import CDR, MSG
 from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import definition_text, interface_of
-from idlc.recordings.find import is_recording
 from idlc.recordings.lengths import SAMPLE, check_lengths, first_longer, wrong_definition
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
@@ -54,10 +61,8 @@ from idlc.runtime.typeinfo import Structure
 from idlc.tasks.upgrade.targets import UpgradeTarget, compiled, target_of
 from idlc.versions.conversion import FieldFate, Plan, Version, make_plan
 from idlc.versions.converters import RunRules
-from idlc.versions.distribution import PREFIX
 from idlc.versions.exact import Payloads
 from idlc.versions.meanings import renumbered
-from idlc.versions.revision import GIT
 from idlc.versions.rules import Known, Rules, read_rules, rule_files
 
 if TYPE_CHECKING:
@@ -144,18 +149,25 @@ class UpgradeResult(NamedTuple):
 def upgrade_recordings(
     options: UpgradeOptions, report: Report, progress: Progress
 ) -> UpgradeResult:
-    """Plan the upgrade of recordings, and write them unless something is in the way of it."""
+    """Plan the upgrade of recordings, and write them unless something is in the way of it.
+
+    The result has what was planned before an error.
+    """
     result = UpgradeResult([], [], [], {}, {})
     unread: list[Diagnostic] = []
-    with ExitStack() as opened:
+    with ExitStack() as opened, suppress(ReportedError):
         opened.callback(lambda: report.extend(_as_errors(unread)))  # which do not prevent writing
-        target = opened.enter_context(target_of(options.to, options.scope, report))
-        local = _local(options, opened, report)
+        target = local = None
+        with suppress(ReportedError):
+            target = opened.enter_context(target_of(options.to, options.scope, report))
+        with suppress(ReportedError):
+            local = _local(options, opened, report)
         named = _read(rule_files(options.rules, options.scope.root), options.scope.root, report)
         if options.topics:
             topics_of(read_source, options.recordings, options.topics, options.scope.root, report)
-        if target is None or local is None or report.had_errors:
-            return result
+        report.raise_errors()
+        assert target is not None
+        assert local is not None
         found = _found(target, named, options.scope.root)
         for recording in options.recordings:
             undefined = result.undefined.setdefault(recording, [])
@@ -163,11 +175,11 @@ def upgrade_recordings(
             without: dict[Diagnostic, list[str]] = {}
             lists = undefined, without
             every = _plans(recording, options, target, local, known_rules, report, *lists)
-            result.plans.extend(every)
+            with suppress(ReportedError):  # the other recordings may be readable
+                result.plans.extend(every)
             result.unread[recording] = [name for names in without.values() for name in names]
             unread += without
-        if report.errors:
-            return result
+        report.raise_errors()
         if options.write_rules is not None:
             from idlc.versions.stubs import write_stubs
 
@@ -175,7 +187,7 @@ def upgrade_recordings(
             result.stubs.extend(write_stubs(plans, options.write_rules, options.scope.root, report))
             return result
         _judge(result.plans, options, target, Known(named), found, report)
-        if not (options.dry_run or report.had_errors or options.out is None):
+        if not options.dry_run and options.out is not None:
             run = Runner({rules.path: rules.file for rules in named})
             _write(result, options, run, report, progress)
     return result
@@ -186,20 +198,15 @@ def _as_errors(problems: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
         yield msgspec.structs.replace(problem, severity=Severity.ERROR)
 
 
-def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalTypes | None:
-    """Return the old types that recordings do not define; `None` after an error."""
+def _local(options: UpgradeOptions, opened: ExitStack, report: Report) -> LocalTypes:
+    """Return the old types that recordings do not define. Raises ReportedError."""
     scope = options.scope
     if options.old is None:
         return LocalTypes(scope, report, option=f"`{FROM} PATH`")
-    is_folder_of_packages = options.to is not None and not (
-        options.to.startswith((GIT, PREFIX)) or is_recording(options.to, scope.root)
-    )
-    if options.to is not None and is_folder_of_packages:
+    if options.to is not None and read_version(options.to, scope.root).meaning in ("path", "name"):
         # a revision of what `--to` names
         scope = msgspec.structs.replace(scope, paths=(options.to,))
     old = opened.enter_context(target_of(options.old, scope, report))
-    if old is None:
-        return None
     scope = msgspec.structs.replace(scope, distros=(old.distro or scope.distro,))
     return LocalTypes(scope, report, old.texts, option=f"`{FROM} PATH`")
 
@@ -234,8 +241,6 @@ def _plans(
     definitions nothing has to `unread`.
     """
     topics = topics_of(read_source, [recording], (), options.scope.root, report)
-    if topics is None:
-        return
     selected = set(options.topics)
     packages: set[str] = set()
     definitions = Counter(topic.topic.name for topic in topics)
@@ -254,7 +259,7 @@ def _plans(
         packages |= {name.package for name in types.interfaces}
         if not is_address(recording):
             _check_lengths(recording, types, options, report)
-        with stage("plan", recording):
+        with stage("plan", recording), suppress(ReportedError):
             for each in _of_types(recording, types, target, rules, report, undefined):
                 yield each._replace(several=definitions[each.topic] > 1)
     if packages and target.texts and not any(map(target.owns, packages)):
@@ -315,8 +320,6 @@ def _of_types(
             key = definition_key(recorded.type, recorded.schema)
             yield TopicPlan(recording, recorded.name, str(topic.name), None, key)
     models = compiled(compiler, {interface_of(name) for *_, name in known}, report)
-    if models is None:
-        return
     plans: dict[tuple[ir.TypeName, ir.TypeName], Plan | None] = {}
     for topic, old, name in known:
         if (topic.name, name) not in plans:
@@ -409,7 +412,8 @@ def _judge(
             labels = (Label(finding.old, "recorded version"),) if finding.old else ()
             span = finding.span
             report.add(codes.RULE_NEEDED.at(span, message, hint=hint, labels=labels))
-    if useful and not report.had_errors:
+    report.raise_errors()
+    if useful:
         listed = ", ".join(f"`{path}`" for path in sorted(useful))
         report.notes.append(f"idlc did not run the rules in {listed}; run them with `{running}`")
 

@@ -9,11 +9,10 @@ from typing import Any, cast
 
 from idlc.api.sources import read_source
 from idlc.compiler.compiler import Compiler, sources_of
-from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
-from idlc.model.distros import BY_NAME, Distro, unknown_distro
+from idlc.model.distros import Distro
 from idlc.project import inputs
 from idlc.project.find import (
     Exclusions,
@@ -26,12 +25,11 @@ from idlc.project.find import (
 from idlc.project.library import IDL, InterfaceTexts, Library
 from idlc.project.package_xml import declared_name
 from idlc.project.settings import Scope
-from idlc.recordings.find import is_recording
+from idlc.project.words import VersionWord, read_distro, read_version
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import topics_of, versions
-from idlc.versions.distribution import PREFIX, is_distro
-from idlc.versions.revision import GIT, checked_out
-from idlc.wire.layout import oversized
+from idlc.versions.revision import checked_out
+from idlc.wire.layout import report_oversized
 
 
 class _NewTypes(Library):
@@ -105,46 +103,40 @@ class UpgradeTarget:
 
 
 @contextmanager
-def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[UpgradeTarget | None]:
-    """Give the types that `--to` means, such as those of a recording; `None` after an error."""
+def target_of(to: str | None, scope: Scope, report: Report) -> Iterator[UpgradeTarget]:
+    """Give the types that `--to` means, such as those of a recording. Raises ReportedError."""
     if to is None:
         folders = inputs.nearby_packages(scope.root)
         homes = {package: places[0] for package, places in folders.items() if places}
         yield UpgradeTarget(scope, {}, homes)
-    elif is_distro(to):
-        name = to.removeprefix(PREFIX)
-        if name not in BY_NAME:
-            message = f"no such distribution: `{name}`"
-            report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
-        yield UpgradeTarget(scope, {}, {}, distro=BY_NAME[name]) if name in BY_NAME else None
-    elif to.startswith(GIT):
-        paths = scope.paths or (".",)
-        with checked_out(to.removeprefix(GIT), paths[0], scope.root, report) as revision:
-            if revision is None:
-                yield None
-                return
-            listing = revision.listing(paths, scope.exclude, report)
-            exclude = scope.exclude.seen_from(revision.folder, revision.top)
-            yield _of_listing(listing, exclude, revision.shown, scope, report)
-    elif is_recording(to, scope.root):
-        yield _of_recording(to, scope, report)
-    else:
-        yield _of_path(to, scope, report)
+        return
+    match read_version(to, scope.root):
+        case VersionWord("distribution", name):
+            yield UpgradeTarget(scope, {}, {}, distro=read_distro(name, report))
+        case VersionWord("revision", name):
+            paths = scope.paths or (".",)
+            with checked_out(name, paths[0], scope.root, report) as revision:
+                listing = revision.listing(paths, scope.exclude, report)
+                exclude = scope.exclude.seen_from(revision.folder, revision.top)
+                yield _of_listing(listing, exclude, revision.shown, scope, report)
+        case VersionWord("recording"):
+            yield _of_recording(to, scope, report)
+        case _:
+            yield _of_path(to, scope, report)
 
 
-def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
-    groups = versions(topics_of(read_source, [path], (), scope.root, report) or ())
+def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget:
+    groups = versions(topics_of(read_source, [path], (), scope.root, report))
     check_versions(groups, report)
-    if report.had_errors:
-        return None
+    report.raise_errors()
     return UpgradeTarget(scope, groups[0].texts if groups else {}, {})
 
 
-def _of_path(path: str, scope: Scope, report: Report) -> UpgradeTarget | None:
+def _of_path(path: str, scope: Scope, report: Report) -> UpgradeTarget:
     """Return the types of an interface file, or of all packages in a folder."""
     listing = list_files([path], scope.root, report, scope.exclude)
     target = _of_listing(listing, scope.exclude, scope.root.shown, scope, report)
-    if target is None or not target.texts:
+    if not target.texts:
         report.extend(no_interfaces(each, scope.root, scope.exclude) for each in listing.empty)
     return target
 
@@ -155,7 +147,7 @@ def _of_listing(
     shown: Callable[[Path], str],
     scope: Scope,
     report: Report,
-) -> UpgradeTarget | None:
+) -> UpgradeTarget:
     """Return the types of files, and of .idl files in the packages that were listed."""
     root = scope.root
     texts: dict[ir.TypeName, Source] = {}
@@ -172,29 +164,26 @@ def _of_listing(
                 interface = ir.TypeName(package, cast("ir.Kind", kind), file.removesuffix(IDL))
                 texts[interface] = source
     target = _of_files(listing.files, scope, report)
-    if target is None or not texts:
+    if not texts:
         return target
     texts.update(target.texts)
     return UpgradeTarget(scope, texts, homes | target.homes, target.whole | homes.keys())
 
 
-def _of_files(
-    files: tuple[InterfaceFile, ...], scope: Scope, report: Report
-) -> UpgradeTarget | None:
+def _of_files(files: tuple[InterfaceFile, ...], scope: Scope, report: Report) -> UpgradeTarget:
     packages = inputs.packages(files, scope, report)
     texts = {name: source for package in packages for name, source in sources_of(package, report)}
-    if report.had_errors:
-        return None
+    report.raise_errors()
     whole = frozenset(package.package for package in packages if package.is_whole(scope.root))
     homes = {package.package: (package.folders or (package.home,))[0] for package in packages}
     return UpgradeTarget(scope, texts, homes, whole)
 
 
 def compiled(compiler: Compiler, names: set[ir.TypeName], report: Report) -> Any:
-    """Return the models of interfaces by package; `None` after errors, which are reported."""
+    """Return the models of interfaces by package. Raises ReportedError."""
     problems = Report()
     models = compiler.models(compiler.reached(names), problems)
-    if not problems.had_errors:
-        problems.extend(oversized(*models.values()))
+    report_oversized(models.values(), problems)
     report.extend(problems.errors)
-    return None if problems.had_errors else models
+    problems.raise_errors()
+    return models

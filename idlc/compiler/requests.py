@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.diagnostics.text import worded
 from idlc.model import catalog, ir
 from idlc.project import inputs
@@ -23,18 +23,20 @@ from idlc.project.settings import Scope
 def requested_packages(
     paths: Sequence[str], named: Sequence[inputs.Inputs], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
-    """Return the packages at paths, and the named ones; empty after a problem.
+    """Return the packages at paths, and the named ones.
 
-    Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
+    Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages. Files
+    without errors may still follow, so only problems with the words raise ReportedError.
     """
     files = find(paths, scope.root, report, scope.exclude) if paths else ()
     packages = list(named)
     for package in named:
         accept_name(package.package, "the command line", report)
-    if files and not report.had_errors:
+    if files and not report.had_errors:  # not all files may be known
         packages += _from_files(files, "" if packages else out, scope, report)
-    usage = [diagnostic for diagnostic in report if diagnostic.code in codes.USAGE]
-    return () if usage else inputs.without_duplicates(packages, scope.root, report)
+    if any(diagnostic.code in codes.USAGE for diagnostic in report):
+        raise ReportedError
+    return inputs.without_duplicates(packages, scope.root, report)
 
 
 def _from_files(
