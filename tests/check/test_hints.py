@@ -198,7 +198,7 @@ def test_short_names_are_near_only_by_one_letter():
 
 
 #: The rooms that a program in Python and commands both use.
-BOTH = ("api", "recordings", "versions", "robot", "compiler", "model", "wire", "language")
+BOTH = ("api", "recordings", "versions", "robot", "model", "wire", "language")
 OPTION = re.compile(r"(?<![\w-])--[a-z]|`-I\b")
 ARGUMENT = re.compile(r"\b(as_|include|distro|index|fields|check|strict|rules|listen)=")
 #: Whole commands are right for both, and those of others are not hints.

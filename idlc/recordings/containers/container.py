@@ -322,8 +322,8 @@ def is_db3(path: Path) -> bool:
         hint = f"`git annex get {shlex.quote(str(path))}` downloads it"
         raise DamageError(f"`{path}` is a pointer of git-annex to a recording", hint)
     if start.startswith(b"#ROSBAG"):
-        places = ("--src", str(path), "--dst", str(path.with_suffix("")))
-        hint = f"convert it: `{shlex.join(('rosbags-convert', *places))}`"
+        source, target = shlex.quote(str(path)), shlex.quote(str(path.with_suffix("")))
+        hint = f"convert it: `rosbags-convert --src {source} --dst {target}`"
         raise RecordingError(f"`{path}` is a recording of ROS 1, which idlc does not read", hint)
     if start.startswith(ZSTD_MAGIC):
         hint = f"zstd -d {shlex.quote(str(path))}"
