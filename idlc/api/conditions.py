@@ -67,7 +67,7 @@ class Condition(NamedTuple):
 
 def _named_element(kind: type, path: str) -> ListElement | None:
     """Return the element that a path names, as in `position.elbow`, or None for other paths."""
-    element = element_of(structure_of(kind), path)
+    element = element_of(structure_of(kind), path) if isinstance(path, str) else None
     return element if element and element.names else None
 
 

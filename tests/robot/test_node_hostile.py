@@ -4,6 +4,8 @@ import gc
 import random
 import sys
 import threading
+import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -50,7 +52,10 @@ def mutated(rng, data):
 
 
 def test_mutated_messages_requests_and_responses_are_ignored(node, capsys, monkeypatch):
-    monkeypatch.setattr("idlc.robot.nodes.logger._quiet", {})  # as if no test had warned before
+    # as if no test had warned before, and as if no time passed
+    monkeypatch.setattr("idlc.robot.nodes.logger._quiet", {})
+    clock = SimpleNamespace(monotonic=lambda: 0.0, time_ns=time.time_ns)
+    monkeypatch.setattr("idlc.robot.nodes.logger.time", clock)
     rng = random.Random(29)
     received = []
     subscription = node.create_subscription(String, "chatter", received.append, 10)
