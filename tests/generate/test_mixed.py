@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from idlc.cli.main import main
+from tests.support.files import write_all
 from tests.support.generated import catalog_files, write_package
 from tests.support.rounds import ALL
 
@@ -69,7 +71,7 @@ for folder in sys.argv[2:]:
                 message = make()
                 outcome = "whole" if repr(way(message)) == repr(message) else "lost"
             except (ImportError, AttributeError) as error:
-                assert "run it again" in str(error), error
+                assert "run `idlc gen` again" in str(error), error
                 outcome = "refused"
             print(folder, outcome, make.__name__, way.__name__, flush=True)
     os._exit(0)
@@ -116,3 +118,47 @@ def test_no_mixed_package_loses_a_value(change, tmp_path):
     for folder, paths in mixtures.items():
         assert "lost" not in outcomes[folder], paths
         assert ("refused" in outcomes[folder]) == (len(paths) not in (0, 5)), paths
+
+
+#: Changes of a type that another package uses, directly or through a type between.
+FOREIGN = {
+    "direct": "far/Deep d\n",
+    "nested": "near/Pos d\n",
+    "many": "far/Deep[] d\n",
+}
+
+
+@pytest.mark.parametrize("way", FOREIGN)
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_package_that_was_not_compiled_again_loses_no_value(way, change, tmp_path):
+    """Another package, which it uses, was."""
+    before, after = CHANGES[change]
+    write_all(
+        {
+            f"{tmp_path}/src/far/msg/Deep.msg": before,
+            f"{tmp_path}/src/near/msg/Pos.msg": "far/Deep x\n",
+            f"{tmp_path}/src/user/msg/Track.msg": FOREIGN[way],
+        }
+    )
+    sources, out = tmp_path / "src", tmp_path / "out"
+    for package in ("far", "near", "user"):
+        assert (
+            main(["gen", f"{sources / package}", "-o", f"{out / package}", "-I", f"{sources}"]) == 0
+        )
+    write_all({f"{sources}/far/msg/Deep.msg": after})
+    assert main(["gen", f"{sources / 'far'}", "-o", f"{out / 'far'}"]) == 0
+    program = (
+        "from user.msg import Track\n"
+        "for use in (lambda: Track().serialize(), lambda: Track.deserialize(bytes(64)),\n"
+        "            lambda: Track().to_dict(), lambda: Track.from_dict({})):\n"
+        "    try:\n"
+        "        use()\n"
+        "    except ImportError as error:\n"
+        "        assert 'far.msg.Deep has other fields' in str(error), error\n"
+        "    else:\n"
+        "        raise SystemExit(1)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=out, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

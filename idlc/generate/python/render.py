@@ -25,6 +25,7 @@ from idlc.generate.python.positions import NamedExpressions
 from idlc.generate.templates import Code, EscapedText, RenderedFile
 from idlc.generate.templates import code as code_environment
 from idlc.model import derive, ir, link, python_names
+from idlc.model.catalog import is_standard
 from idlc.model.idl_text import idl_text
 from idlc.model.names import snake_case
 from idlc.model.type_data import content
@@ -57,7 +58,8 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     tables = NamedExpressions(names)
     writing = text_of(encode(steps, tables), 8)
     # The functions that make empty objects of the message and of those in it. They demand that
-    # classes of the package have the fields that the codec was made for.
+    # classes have the fields that the codec was made for. Standard types may be of another
+    # distribution, which adds or removes few fields.
     makers: dict[ir.TypeName, str] = {}
     nested = (
         step.type
@@ -67,7 +69,7 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     for type_ in dict.fromkeys((structure.name, *nested)):
         stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
         words = ["kind" if type_ == structure.name else references.name(type_)]
-        if type_.package == references.package:
+        if type_.package == references.package or not is_standard(type_.package):
             held = structure if type_ == structure.name else messages[type_]
             words.append(f"{_stamp(held):#010x}")
         makers[type_] = tables.function(stem, call("maker", *words))
@@ -103,6 +105,11 @@ def _stamp(message: ir.Message) -> int:
 def type_data_source(model: link.Model, surroundings: Surroundings = ALONE) -> str:
     """Return the text of the module: one line of it for each type, and each stamp of a class."""
     messages = [message for interface in model.own for message in derive.sections(interface)]
+    messages += [
+        message
+        for name, message in model.messages.items()
+        if name.package != model.package and not is_standard(name.package)
+    ]
     stamps = {str(message.name): _stamp(message) for message in messages}
     tables = {"stamps": dict(sorted(stamps.items())), **content(model)}
     parts = _parts(tables, surroundings.others)

@@ -63,8 +63,8 @@ def demand_stamp(kind: Any, number: int | None) -> None:
     if number is not None and number != stamp(kind._fields_and_field_types):
         package = kind.__module__.rpartition(".")[0]
         raise ImportError(
-            f"{package} has files of two versions of {kind.__name__}, perhaps because `idlc gen` "
-            f"was interrupted: run it again",
+            f"{package}.{kind.__name__} has other fields than the code that uses it was generated "
+            f"for: run `idlc gen` again",
             name=kind.__module__,
         )
 

@@ -120,7 +120,7 @@ class Types:
         self.descriptions: dict[str, Any] = content["descriptions"]
         self.hashes: dict[str, str] = content["hashes"]
         self.sources: dict[str, str] = content["sources"]
-        #: The stamps of the package's own classes.
+        #: The stamps of the package's own classes, and of others that are not standard.
         self.stamps: dict[str, int] = content.get("stamps", {})
         self._structures: dict[str, Structure] = {}
 
@@ -218,12 +218,18 @@ def _structure_of(owner: type) -> Structure:
     kind = owner.__module__.rsplit(".", 2)[1]
     structure = types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
     demand_stamp(owner, types.stamps.get(structure.name))
-    for field in structure.fields:
-        if (
-            field.nested and field.nested.is_own
-        ):  # whose fields are read and written, too
-            _structure_of(field.nested.find_class())
+    _demand_nested(structure)
     return structure
+
+
+@cache
+def _demand_nested(structure: Structure) -> None:
+    """Demand the stamps of the classes in a structure, whose fields are read and written, too."""
+    stamps = structure.types.stamps
+    for field in structure.fields:
+        if field.nested and field.nested.name in stamps:
+            demand_stamp(field.nested.find_class(), stamps[field.nested.name])
+            _demand_nested(field.nested)
 
 
 def type_hash(kind: type) -> str:
