@@ -64,8 +64,8 @@ from idlc.cli import completion, options
     "--grid",
     metavar="GRID",
     help="Write one table with all topics: a row for each message of topic GRID, or for each "
-    "period, such as `100ms` or `30Hz`. To select fields of a TOPIC, add them after a colon: "
-    "`/imu:orientation`. First, idlc shows for each topic how many rows have a value, and how old "
+    "period, such as `100ms` or `30Hz`. An argument such as `/imu:orientation` selects fields of "
+    "a topic. Before it writes, idlc shows for each topic how many rows have a value, and how old "
     "these values are.",
 )
 @click.option(
@@ -101,14 +101,14 @@ from idlc.cli import completion, options
     "features",
     metavar="NAME=COLUMN,...",
     multiple=True,
-    help="With --lerobot: name the columns of a feature, such as `action=/cmd_vel.linear`. Each "
+    help="With --lerobot: make feature NAME of these columns, as in `action=/cmd_vel.linear`. Each "
     "other TOPIC becomes a feature, such as `observation.imu`.",
 )
 @click.option(
     "--episodes",
     metavar="TOPIC",
-    help="With --lerobot: begin an episode at each message of TOPIC. Its field `data` can contain "
-    "the task. An empty text, or false, ends an episode.",
+    help="With --lerobot: begin an episode at each message of TOPIC, and end the one before. The "
+    "field `data` can be the text of --task. If it is empty or false, no episode begins.",
 )
 @click.option("--task", metavar="TEXT", help="With --lerobot: describe what the robot does.")
 @click.option(

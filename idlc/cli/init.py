@@ -31,7 +31,7 @@ def command(**arguments: Any) -> int:
     idlc shows every change first. On a terminal, it asks before it writes; elsewhere, it writes
     only with --yes. It then compiles the interfaces, installs a copy of the package into a
     temporary folder, and imports the classes from that folder. The installation runs the package's
-    own build. A second run changes nothing; with --yes, it tests again.
+    own build. A second run changes nothing. To test again, add --yes.
     """
     from idlc.cli.run.init import run
 

@@ -80,7 +80,8 @@ def _role_options(function: Any) -> Any:
 @click.option(
     "--robust",
     is_flag=True,
-    help="Handle signals while starting, replaced and cancelled goals, servers that do not answer.",
+    help="Also handle rare cases: a signal while the node starts, a goal that is replaced or "
+    "cancelled, a server that does not answer.",
 )
 @common
 def command(**arguments: Any) -> int:

@@ -31,7 +31,7 @@ from idlc.cli import completion, options
     metavar="DIR",
     type=click.Path(file_okay=False),
     help="With --format msg, the folder to write a recording's .msg, .srv, .action and .idl files "
-    "to: a package in each folder.",
+    "to, with one folder for each package.",
 )
 @options.scoped(options.package, options.include, options.exclude, options.distro)
 def command(**arguments: Any) -> None:
