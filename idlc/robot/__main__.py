@@ -58,7 +58,7 @@ def run(words: list[str]) -> None:
             is_module = True
     elif target.endswith(".py"):  # to look for it would run it
         hint = f"write `python -m idlc.robot {shlex.quote(one_line(target))}`"
-        raise RobotError(f"`{one_line(target)}` is no module, but the name of a file", hint)
+        raise RobotError(f"`{one_line(target)}` is the name of a file, not of a module", hint)
     sys.path.insert(0, str(folder))
     if (spec := find_spec("rclpy")) is not None:
         problem = f"rclpy is installed ({one_line(spec.origin or 'as a folder')})"
