@@ -18,7 +18,7 @@ from idlc.cli import completion, options
         "idlc columns rec.mcap /imu --where 'linear_acceleration.z > 12'",
         "idlc columns rec.mcap -o columns/",
         "idlc columns rec.mcap /imu /joints:position --grid /imu -o train.parquet",
-        "idlc columns 'ep_*.mcap' /image /joints:position --grid 30Hz --lerobot train/",
+        "idlc columns 'ep_*.mcap' /camera /joints:position --grid 30Hz --lerobot train/",
     ),
 )
 @click.argument("subject", metavar="REC", type=click.Path())

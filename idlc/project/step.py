@@ -202,10 +202,7 @@ def _root(path: Path) -> Path:
 
 
 def digest(data: bytes) -> str:
-    """Return the SHA-256 of a file, for a text with line ends normalized.
-
-    On Windows, git checks texts out with other ones.
-    """
+    """Return the SHA-256 of a file, for a text with line ends normalized: git changes them."""
     import hashlib  # loads OpenSSL, which a check does without
 
     return hashlib.sha256(plain(data)).hexdigest()
@@ -219,11 +216,9 @@ def plain(data: bytes) -> bytes:
 
 
 def meaning(text: str, package: str) -> str:
-    """Return a SHA-256 of an interface's text that ignores its comments and spelling.
-
-    Dependencies are recorded by it: the built-in catalogue has no comments and spells out what
-    an installed package abbreviates, and both compile to the same.
-    """
+    """Return a SHA-256 of an interface's text that ignores its comments and spelling."""
+    # Dependencies are recorded by it: the built-in catalogue has no comments and spells out what
+    # an installed package abbreviates, and both compile to the same.
     constants: list[str] = []
     fields: list[str] = []
     for line in text.splitlines():

@@ -22,6 +22,7 @@ from tests.support import recordings
 from tests.support.files import write
 from tests.support.paths import ROOT
 from tests.support.waiting import read_line, wait_for
+from tests.tasks.test_lerobot import simple
 
 MSG = "float64 speed\n"
 
@@ -100,6 +101,7 @@ def test_the_example_in_each_help_works_as_pasted(command, capfd):
     text = capfd.readouterr().out
     if " rec.mcap" in text:  # this cannot be pasted
         recordings.by_mcap(Path("rec.mcap"), recordings.messages(6))
+        recordings.by_mcap(Path("ep_1.mcap"), simple())
     example = text.partition("Example:\n\n")[2].partition("\n\n  ")[0]
     lines = [line.strip() for line in example.splitlines() if line.startswith("    ")]
     assert any(line.startswith("idlc ") for line in lines), text
