@@ -17,7 +17,7 @@ from idlc.diagnostics.text import absence, closest, closest_package, did_you_mea
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
 from idlc.project import inputs, prefixes
-from idlc.project.files import entries, is_file, is_folder, near_path
+from idlc.project.files import GRAPH_HINT, entries, is_file, is_folder, near_path
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
 from idlc.project.lock import FILE as LOCK
 from idlc.project.package_xml import declared_name
@@ -379,6 +379,8 @@ def _resolved(name: ir.TypeName, library: Library) -> ResolvedType | None:
 def _similar(text: str, library: Library, root: Root) -> str:
     """Return the hint with the closest name to a type's or package's, or the closest path."""
     parts, near_file = _DIVIDER.split(text), near_path(text, Path(root.path(text)))
+    if near_file == GRAPH_HINT:  # rather than a type such as rosgraph_msgs/msg/Graph
+        return near_file
     if len(parts) == 1:
         every = (name for package in library.packages() for name in library.interfaces(package))
         named = {interface.name: str(interface) for interface in every}
