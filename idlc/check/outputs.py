@@ -20,7 +20,7 @@ from idlc.project.files import is_file
 from idlc.project.find import CLOSING, SKIPPED
 from idlc.project.inputs import Inputs
 from idlc.project.lock import FILE, Lock, load_lock
-from idlc.project.settings import SETTINGS_FILE, Scope, included_outside, toml
+from idlc.project.settings import SETTINGS_FILE, Scope, toml
 from idlc.project.step import meaning
 
 #: The tools of build backends that run nothing of the project, and so notice nothing.
@@ -152,7 +152,7 @@ def current_outputs(
         words = ["gen"]
         if not (scope.paths and scope.out and folder.is_relative_to(root.absolute(scope.out))):
             words += [root.shown(package.home), "-o", root.shown(folder)]
-            words += include_options(model, included_outside(scope))
+            words += include_options(model, scope.typed_outside)
             words += [] if manifest else ["--package", record.package]
             words += {"": [], "private": ["--vendor-deps"], "beside": ["--vendor-deps=beside"]}[
                 record.vendoring

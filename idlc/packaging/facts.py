@@ -18,7 +18,7 @@ from idlc.project.inputs import Inputs
 from idlc.project.lock import BUILD_STEP, FILE, Lock, Runtime, load_lock
 from idlc.project.package_xml import Statement, statements
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import Scope, included_outside
+from idlc.project.settings import Scope
 
 _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc", "upgrade"})
@@ -159,7 +159,7 @@ def facts(
             file.relative_to(folder).as_posix() for file in files if file.suffix in (*KINDS, ".idl")
         ),
         folders=present,
-        include=included_outside(scope) if locks else (),
+        include=scope.typed_outside if locks else (),
         has_build_step=any(file.name == BUILD_STEP for file in files),
         available=available,
         providers=neighbours.providers(available) if modules else {},

@@ -267,7 +267,8 @@ def command_table(
 class Scope(msgspec.Struct, frozen=True):
     """Options of a lookup: the package's name if set, folders with other packages, exclusions.
 
-    Paths are relative to `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its
+    Paths are relative to `root`. `typed` are the folders of `include` that the command line
+    named, not the settings. `out` is the folder that [tool.idlc] compiles `paths` into; its
     name may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
     except for `check`; none means the one that is installed. With `enums`, generated classes have
     enums for all fields whose names constants begin with.
@@ -281,19 +282,20 @@ class Scope(msgspec.Struct, frozen=True):
     out: str | None = None
     enums: bool = False
     distros: tuple[Distro, ...] = ()
+    typed: tuple[str, ...] = ()
 
     @property
     def distro(self) -> Distro:
         """The distribution that files are read for where that is one."""
         return self.distros[0] if self.distros else BY_NAME.get(distribution().name, DEFAULT)
 
-
-def included_outside(scope: Scope) -> tuple[str, ...]:
-    """Return the folders outside of the base that the command line included."""
-    settings = load_settings(scope.root, Report())
-    given = (path for path in scope.include if path not in settings.include)
-    base = scope.root.base
-    return tuple(path for path in given if not scope.root.absolute(path).is_relative_to(base))
+    @property
+    def typed_outside(self) -> tuple[str, ...]:
+        """The folders outside of the base that the command line named."""
+        root = self.root
+        return tuple(
+            path for path in self.typed if not root.absolute(path).is_relative_to(root.base)
+        )
 
 
 def scope(
@@ -317,4 +319,5 @@ def scope(
         settings.out or None,
         settings.enums,
         tuple(dict.fromkeys(BY_NAME[name] for name in names)),
+        tuple(include),
     )

@@ -50,7 +50,7 @@ def run(words: list[str]) -> None:
     if not is_module:
         path = Path(target).resolve()
         if not path.is_file():
-            hint = near_path(target, path) or "name a node's .py file"
+            hint = near_path(target, Path(target).absolute()) or "name a node's .py file"
             raise RobotError(f"`{one_line(target)}` is not a file", hint)
         folder, module = path.parent, path.stem
         while (folder / "__init__.py").is_file() and folder.parent != folder:

@@ -58,7 +58,7 @@ def write_aligned(
         field_problem(error, options, report)
         return
     style = _style(options)
-    job = Job(recording[[*topics, rows][0]], options.out, style)
+    job = Job(recording[next(iter(topics), rows)], options.out, style)
     if style != TEXT and not checked([job], options, report):
         return
     announce(table.summary())

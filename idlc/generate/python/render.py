@@ -58,8 +58,7 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     tables = NamedExpressions(names)
     writing = text_of(encode(steps, tables), 8)
     # The functions that make empty objects of the message and of those in it. They demand that
-    # classes have the fields that the codec was made for. Standard types may be of another
-    # distribution, which adds or removes few fields.
+    # classes have the fields that the codec was made for.
     makers: dict[ir.TypeName, str] = {}
     nested = (
         step.type
@@ -69,7 +68,7 @@ def codec(structure: ir.Message, references: References, messages: Messages) -> 
     for type_ in dict.fromkeys((structure.name, *nested)):
         stem = f"new_{snake_case(references.name(type_))}".replace("__", "_")
         words = ["kind" if type_ == structure.name else references.name(type_)]
-        if type_.package == references.package or not is_standard(type_.package):
+        if _is_stamped(type_.package, references.package):
             held = structure if type_ == structure.name else messages[type_]
             words.append(f"{_stamp(held):#010x}")
         makers[type_] = tables.function(stem, call("maker", *words))
@@ -98,6 +97,14 @@ def _code(lines: Iterable[str]) -> tuple[Code, ...]:
     return tuple(map(Code, lines))
 
 
+def _is_stamped(package: str, own: str) -> bool:
+    """Return whether a package's types must have the fields that code was generated for.
+
+    Standard types of other packages may be those of another distribution at run time.
+    """
+    return package == own or not is_standard(package)
+
+
 def _stamp(message: ir.Message) -> int:
     return stamp({field.name: idl_text(field.type) for field in message.fields})
 
@@ -108,7 +115,7 @@ def type_data_source(model: link.Model, surroundings: Surroundings = ALONE) -> s
     messages += [
         message
         for name, message in model.messages.items()
-        if name.package != model.package and not is_standard(name.package)
+        if name.package != model.package and _is_stamped(name.package, model.package)
     ]
     stamps = {str(message.name): _stamp(message) for message in messages}
     tables = {"stamps": dict(sorted(stamps.items())), **content(model)}
