@@ -134,7 +134,7 @@ def package_hint(name: str, names: Iterable[str]) -> str:
 
 
 class Audience(Enum):
-    """Who reads a hint, which names an option, a setting or an argument accordingly."""
+    """The reader of a hint, who needs the name of an option, a setting or an argument."""
 
     COMMAND = "the person who typed a command"
     SETTINGS = "a user of a build or an editor"

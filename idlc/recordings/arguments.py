@@ -1,4 +1,4 @@
-"""What programs pass to functions: words for a value of another kind than a function takes."""
+"""Arguments of functions: an error names the kind of value that a function needs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from idlc.runtime.typeinfo import structure_of
 
 
 def texts(value: Any, what: str) -> tuple[str, ...]:
-    """Return the texts and paths that an argument lists; one of them alone is one."""
+    """Return the texts and paths that an argument lists, or the single one that it is.
+
+    Raises TypeError.
+    """
     try:
         listed = (value,) if isinstance(value, (str, os.PathLike)) else tuple(value)
         return tuple(str(os.fspath(each)) for each in listed)

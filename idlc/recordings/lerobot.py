@@ -127,8 +127,10 @@ class _Video:
 
     def statistics(self) -> dict[str, Any]:
         """Return statistics of each channel, for values between 0 and 1."""
-        each = [statistics(np.arange(256), counts) for counts in self._counts]
-        result = {name: [[[one[name] / 255]] for one in each] for name in each[0]}
+        channels = [statistics(np.arange(256), counts) for counts in self._counts]
+        result: dict[str, Any] = {
+            name: [[[channel[name] / 255]] for channel in channels] for name in channels[0]
+        }
         return result | {"count": [len(self._sampled)]}
 
 
@@ -152,8 +154,10 @@ def statistics(values: Any, counts: Any) -> dict[str, float]:
 
 def _of_columns(values: Any) -> dict[str, Any]:
     """Return statistics of each column of an array."""
-    each = [statistics(column, np.ones(len(values), np.int64)) for column in values.T]
-    return {name: [one[name] for one in each] for name in each[0]} | {"count": [len(values)]}
+    counts = np.ones(len(values), np.int64)
+    columns = [statistics(column, counts) for column in values.T]
+    result = {name: [column[name] for column in columns] for name in columns[0]}
+    return result | {"count": [len(values)]}
 
 
 def _of_episodes(episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -230,16 +234,16 @@ class DataSet:
         for (name, dtype), values in zip(ADDED.items(), added, strict=True):
             arrays[name] = values.astype(dtype)[:, None]
         self._write(DATA.format(**place), {name: _column(each) for name, each in arrays.items()})
-        found = {name: video.statistics() for name, video in videos.items()}
-        found |= {name: _of_columns(values) for name, values in arrays.items()}
-        self._statistics.append(found)
+        own = {name: video.statistics() for name, video in videos.items()}
+        own |= {name: _of_columns(values) for name, values in arrays.items()}
+        self._statistics.append(own)
         row = {"episode_index": number, "tasks": [task], "length": frames}
         row |= _under("data", place)
         row |= {"dataset_from_index": self.frames, "dataset_to_index": self.frames + frames}
         for name in videos:
             span = {"from_timestamp": 0.0, "to_timestamp": frames / self._fps}
             row |= _under(f"videos/{name}", {**place, **span})
-        for name, each in found.items():
+        for name, each in own.items():
             row |= _under(f"stats/{name}", each)
         self._episodes.append(row | _under("meta/episodes", {"chunk_index": 0, "file_index": 0}))
         self.frames += frames
@@ -290,8 +294,8 @@ class DataSet:
             "splits": {"train": f"0:{len(self)}"},
         }
         names = self._statistics[0]
-        found = {name: _of_episodes([each[name] for each in self._statistics]) for name in names}
-        for name, content in (("info", info), ("stats", found)):
+        stats = {name: _of_episodes([each[name] for each in self._statistics]) for name in names}
+        for name, content in (("info", info), ("stats", stats)):
             text = json.dumps(content, indent=4, ensure_ascii=False)
             (self._draft / f"meta/{name}.json").write_text(text, encoding="utf-8")
         self._draft.rename(self._folder)

@@ -65,7 +65,7 @@ class FeaturePart(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The name in the table; pictures have that of the topic."""
+        """The name of the column in the table, or of the topic of pictures."""
         return f"{self.topic}.{self.path}" if self.path else self.topic
 
 
@@ -120,19 +120,19 @@ def _add(
     report: Report,
     progress: Progress,
 ) -> list[WrittenFile]:
-    """Add the episodes of a recording; return nothing if it has not the fields."""
+    """Add the episodes of a recording; return an empty list if it lacks the fields."""
     path, before = options.recordings[0], data.frames
     words = options.topics or [name for name in recording if name != request.episodes]
     try:
-        found, left_out = _found([topic_of(word, recording) for word in words], recording)
-        features = _features(found, request.features)
+        available, left_out = _available([topic_of(word, recording) for word in words], recording)
+        features = _features(available, request.features)
         table = table_of(grid, _fields(features), recording, options)
         episodes = list(_episodes(request, grid, table, recording, options))
     except ValueError as error:
         field_problem(error, options, report)
         return []
     used = {part for parts in features.values() for part in parts}
-    left_out += [f"`{part.name}`" for part in found if part not in used]
+    left_out += [f"`{part.name}`" for part in available if part not in used]
     if left_out and not before:
         report.notes.append(f"not in the data set: {first_few(left_out, NAMED)}")
     announce(table.summary())
@@ -165,23 +165,23 @@ def _without_ends(table: Aligned) -> Aligned:
     return part
 
 
-def _found(
+def _available(
     topics: Sequence[tuple[str, Any]], recording: Recording
 ) -> tuple[list[FeaturePart], list[str]]:
     """Return the pictures and numbers of topics, and the columns that are neither."""
-    found: list[FeaturePart] = []
+    available: list[FeaturePart] = []
     left_out: list[str] = []
     for topic, fields in topics:
         selection = recording[topic]
         kind = selection.read_type.name.rpartition("/")[2]
         if fields is None and kind in PICTURES:
-            found.append(FeaturePart(topic, "", kind))
+            available.append(FeaturePart(topic, "", kind))
             continue
         for field in selection.table(join_messages([]), fields).schema:
             parts = _numbers(selection, topic, field)
-            found += parts
+            available += parts
             left_out += [] if parts else [f"`{topic}.{field.name}`"]
-    return found, left_out
+    return available, left_out
 
 
 def _numbers(selection: RecordedTopic, topic: str, field: Any) -> list[FeaturePart]:
@@ -206,7 +206,9 @@ def _numbers(selection: RecordedTopic, topic: str, field: Any) -> list[FeaturePa
     return [] if size == 0 else [FeaturePart(topic, path, dtype, size)]
 
 
-def _features(found: Sequence[FeaturePart], wanted: Sequence[str]) -> dict[str, list[FeaturePart]]:
+def _features(
+    available: Sequence[FeaturePart], wanted: Sequence[str]
+) -> dict[str, list[FeaturePart]]:
     """Return what each feature is made of: what the user wants, and other topics by name."""
     features: dict[str, list[FeaturePart]] = {}
     for word in wanted:
@@ -214,15 +216,17 @@ def _features(found: Sequence[FeaturePart], wanted: Sequence[str]) -> dict[str, 
         if not equals:
             raise RecordingError(f"`{word}` is not a feature", "write `action=/cmd_vel`")
         for path in paths.split(","):
-            parts = [each for each in found if re.match(rf"{re.escape(path)}(?![^.[])", each.name)]
+            parts = [
+                each for each in available if re.match(rf"{re.escape(path)}(?![^.[])", each.name)
+            ]
             if not parts:
-                known_names = {name for each in found for name in (each.topic, each.name)}
+                known_names = {name for each in available for name in (each.topic, each.name)}
                 hint = did_you_mean(path, known_names)
                 raise RecordingError(f"no numbers and no pictures are in `{path}`", hint)
             known = features.setdefault(name, [])
             known += [part for part in parts if part not in known]
     named = {part.topic for parts in features.values() for part in parts}
-    for part in found:
+    for part in available:
         if part.topic not in named:  # a part of an action must not become an observation
             words = re.sub(r"[^\w.-]", "_", part.topic.strip("/"), flags=re.ASCII)
             features.setdefault(f"observation.{'' if part.path else 'images.'}{words}", []).append(

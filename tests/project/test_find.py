@@ -117,7 +117,7 @@ def one(paths: list[str], package: str | None = None, out: str = "out") -> tuple
     name = ""
     with suppress(ReportedError):
         name = requested_packages(paths, (), out, Scope(Root.here(), package), report)[0].package
-    return name, [found.code for found in report]
+    return name, [problem.code for problem in report]
 
 
 def test_the_package_name_comes_from_the_option_then_package_xml_then_the_folder():

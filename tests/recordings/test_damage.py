@@ -273,7 +273,9 @@ def test_the_types_of_one_topic_are_counted_apart(tmp_path):
     kinds = ["sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"]
     (tmp_path / "bag").mkdir()
     for number, kind in enumerate(kinds):
-        messages = [one._replace(topic="/t") for one in MESSAGES if one.type == kind][number:]
+        messages = [message._replace(topic="/t") for message in MESSAGES if message.type == kind][
+            number:
+        ]
         made.by_mcap(tmp_path / "bag" / f"bag_{number}.mcap", messages)
     (tmp_path / "bag" / "bag_2.mcap").touch()
     listed = [
@@ -287,7 +289,7 @@ def test_the_types_of_one_topic_are_counted_apart(tmp_path):
     text = (tmp_path / "copy" / "metadata.yaml").read_text(encoding="utf-8")
     written = yaml.safe_load(text)["rosbag2_bagfile_information"]["topics_with_message_count"]
     counts = {each["topic_metadata"]["type"]: each["message_count"] for each in written}
-    every = [sum(one.type == kind for one in MESSAGES) for kind in kinds]
+    every = [sum(message.type == kind for message in MESSAGES) for kind in kinds]
     assert counts == {kinds[0]: every[0], kinds[1]: every[1] - 1}
 
 
