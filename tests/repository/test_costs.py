@@ -40,8 +40,8 @@ def test_what_tests_share_is_divided_among_them(tmp_path):
 @pytest.mark.parametrize(
     ("marks", "seconds", "tiers"),
     [
-        ((), 0.3, {"quick", "test"}),
-        ((), 0.4, {"test"}),
+        ((), 0.1, {"quick", "test"}),
+        ((), 0.2, {"test"}),
         ((), 2.1, {"long"}),
         (("rounds",), 0.1, {"quick", "test", "long"}),
         (("rounds",), 2.1, {"long"}),

@@ -399,6 +399,7 @@ def test_a_folder_may_have_the_name_of_an_option(project, capsys):
     ],
     ids=["empty", "another table", "named"],
 )
+@pytest.mark.usefixtures("unproved")
 def test_a_setup_py_that_is_missing_names_the_package(settings, is_named, project):
     files = {**ament(), "pyproject.toml": settings}
     del files["setup.py"]
@@ -481,6 +482,7 @@ def test_the_layout_of_files_stays(old, new, project, capsys):
     assert "nothing to do" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("unproved")
 def test_a_setting_that_exists_stays(project):
     write_all(library(f'{SETUPTOOLS}\n[tool.idlc]\npaths = ["a b"]\npackage = "mine"\n'))
     assert main(["init", "--yes"]) == 0
@@ -490,6 +492,7 @@ def test_a_setting_that_exists_stays(project):
     assert text.endswith(f'{table}package = "mine"\n')
 
 
+@pytest.mark.usefixtures("unproved")
 def test_a_package_that_is_excluded_is_not_the_librarys(project, capsys):
     write_all({f"ros/{path}": text for path, text in INTERFACES.items()})
     write_all(library(f'{SETUPTOOLS}\n[tool.idlc]\nexclude = ["ros"]\n'))
@@ -499,6 +502,7 @@ def test_a_package_that_is_excluded_is_not_the_librarys(project, capsys):
     assert not [*Path("src").rglob("*field*")]
 
 
+@pytest.mark.usefixtures("unproved")
 def test_settings_of_a_folder_above_are_not_the_librarys(project, monkeypatch):
     write("pyproject.toml", '[tool.idlc]\npaths = ["x"]\nout = "y"\n')
     write_all({f"lib/{path}": text for path, text in SAMPLES["setuptools: setup.py"].files.items()})
@@ -507,6 +511,7 @@ def test_settings_of_a_folder_above_are_not_the_librarys(project, monkeypatch):
     assert Path("track_kit/ros/msg/__init__.py").is_file()
 
 
+@pytest.mark.usefixtures("unproved")
 def test_a_library_without_an_init_py_says_where_its_classes_are(project):
     table = '\n[tool.idlc]\nout = "src/ada/kit/ros"\n'
     write_all({"pyproject.toml": SETUPTOOLS + table, "src/ada/kit/track.py": ""})
@@ -681,6 +686,7 @@ def test_a_service_gets_the_idlc_that_it_runs(project, capsys):
 
 
 @pytest.mark.parametrize("service", ["github", "gitlab", "pre-commit"])
+@pytest.mark.usefixtures("unproved")
 def test_a_service_looks_for_no_code_that_is_not_committed(service, project):
     write_all(SAMPLES["ament_cmake"].files)
     assert main(["init", "--ci", service, "--yes"]) == 0
@@ -753,6 +759,7 @@ def test_an_installed_package_is_imported_elsewhere(name, project, python, tmp_p
 @pytest.mark.long
 @pytest.mark.ros  # colcon is installed with what needs ROS 2
 @pytest.mark.parametrize("name", [name for name in SAMPLES if name.startswith("ament: ")])
+@pytest.mark.usefixtures("unproved")
 def test_colcon_builds_what_was_set_up(name, project, tmp_path):
     sample = SAMPLES[name]
     write_all({f"src/{path}": text for path, text in sample.files.items()})
@@ -781,6 +788,7 @@ def test_colcon_builds_what_was_set_up(name, project, tmp_path):
         ('dynamic = ["dependencies"]\n', None),
     ],
 )
+@pytest.mark.usefixtures("unproved")
 def test_a_library_with_arrays_depends_on_numpy(old, new, project, capsys):
     text = SETUPTOOLS.replace("requires-python", f"{old}requires-python")
     write_all(library(text) | {"interfaces/msg/Box.msg": "float64[3] size  # [m]\n"})
@@ -825,6 +833,7 @@ def test_vs_code_recommends_the_extension_where_it_is_used(old, new, project, ca
 
 
 @pytest.mark.parametrize("path", [".", "a b"])
+@pytest.mark.usefixtures("unproved")
 def test_the_hint_on_an_edited_class_is_a_command(path, project, capsys):
     write_all({f"{path}/{name}": text for name, text in (ament() | MESSAGE).items()})
     assert main(["init", path, "--yes"]) == 0
@@ -838,6 +847,7 @@ def test_the_hint_on_an_edited_class_is_a_command(path, project, capsys):
     assert main(["init", path, "--yes"]) == 0
 
 
+@pytest.mark.usefixtures("unproved")
 def test_gen_in_a_workspace_names_a_command_for_all_packages(project, capsys):
     write_all(WORKSPACE)
     assert main(["init", "--yes"]) == 0

@@ -23,8 +23,8 @@ from tests.support.paths import ROOT
 
 TABLE = ROOT / "tests/costs.tsv"
 #: CPU-seconds up to which a test is quick, and up to which it is not long.
-QUICK = 0.3
-LONG = 1.0
+QUICK = 0.1
+LONG = 0.5
 TIERS = ("quick", "test", "long")
 #: The names of all tests of a run, before any is left out.
 COLLECTED = pytest.StashKey[set[str]]()
@@ -48,7 +48,7 @@ class Costs(NamedTuple):
 
     def write(self, path: Path = TABLE) -> None:
         """Write a table, the most expensive tests first."""
-        rounded = {test: round(seconds, 1) for test, seconds in self.seconds.items()}
+        rounded = {test: round(seconds, 2) for test, seconds in self.seconds.items()}
         rows = sorted(rounded.items(), key=lambda row: (-row[1], row[0]))
         lines = [f"{seconds}\t{test}\n" for test, seconds in rows if seconds > QUICK]
         path.write_text(HEADER + "".join(lines), encoding="utf-8")
