@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from posixpath import normpath
 from typing import Any, TypeAlias
@@ -18,6 +19,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.packaging.files import SETUP_CFG, SETUP_PY
 from idlc.packaging.layout import PackageLayout
 from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused, already_taken, split
+from idlc.packaging.setup_cfg import SetupCfg
 from idlc.packaging.setup_edits import (
     append_element,
     insertion,
@@ -30,6 +32,7 @@ from idlc.project.settings import SETTINGS_FILE, toml
 
 SECTION = "options.entry_points"
 KEY = "console_scripts"
+UNKNOWN = "idlc cannot parse the entry points"
 IN_SETUP_CFG = f"below `{KEY} =` in [{SECTION}]"
 _HEADER = re.compile(r"\s*\[([^\]]*)\]")
 
@@ -58,6 +61,21 @@ def _add_entry(text: str, script: ConsoleScript, *, in_section: bool) -> Outcome
 
 def add_to_cfg(text: str, script: ConsoleScript) -> Outcome:
     """Return a setup.cfg with a console script in its `[options.entry_points]`."""
+    try:
+        before = SetupCfg(text).lines(SECTION, KEY)
+    except ValueError:
+        return Refused("this is not a valid setup.cfg", script.line, IN_SETUP_CFG)
+    outcome = _with_script_in_cfg(text, script)
+    if isinstance(outcome, Refused) or outcome.text == text:
+        return outcome
+    with suppress(ValueError):
+        if SetupCfg(outcome.text).lines(SECTION, KEY) == (*before, script.line):
+            return outcome
+    return Refused(UNKNOWN, script.line, IN_SETUP_CFG)
+
+
+def _with_script_in_cfg(text: str, script: ConsoleScript) -> Outcome:
+    """Return a setup.cfg with another line, which nobody has read yet."""
     lines = text.splitlines(keepends=True)
     section = _section(lines, SECTION)
     if section is None:
@@ -108,7 +126,6 @@ def _inserted(lines: list[str], at: int, new: list[str]) -> Edited:
 
 
 IN_SETUP = f"to `{KEY}` in the `entry_points` of setup()"
-UNKNOWN = "idlc cannot parse the entry points"
 
 #: The edits of a file, or the reason why there are none.
 EntryPointEdits: TypeAlias = tuple[Edit, ...] | str
@@ -249,13 +266,20 @@ def add_console_script(files: Mapping[str, str], script: ConsoleScript) -> tuple
         dynamic = project.get("dynamic", ())
         if project and not {"scripts", "entry-points"}.intersection(dynamic):
             return SETTINGS_FILE, _in_pyproject(files[SETTINGS_FILE], name, project, script)
-    in_cfg = _section(files.get(SETUP_CFG, "").splitlines(), SECTION)
-    if SETUP_PY in files and not in_cfg:
+    if SETUP_PY in files and not _lists_entry_points(files.get(SETUP_CFG, "")):
         return SETUP_PY, add_to_setup(files[SETUP_PY], script)
     if SETUP_CFG in files:
         return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
     why = "there is no setup.py, and no setup.cfg or pyproject.toml that describes a package"
     return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
+
+
+def _lists_entry_points(text: str) -> bool:
+    """Return whether a setup.cfg lists entry points, which then outrank those in setup.py."""
+    try:
+        return SetupCfg(text).has_section(SECTION)
+    except ValueError:
+        return False
 
 
 def _table(text: str, name: str) -> dict[str, Any] | Refused:

@@ -8,19 +8,18 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping
-from configparser import Error as ConfigError
-from configparser import RawConfigParser
 from fnmatch import fnmatchcase
 from posixpath import normpath
 from typing import Any, NamedTuple
 
 from idlc.diagnostics.source import Source, Span
+from idlc.packaging.setup_cfg import SetupCfg
 from idlc.packaging.setup_py import Setup, name_of_call
 from idlc.project.settings import toml
 
 _SEARCH = ("where", "include", "exclude")
 _FINDERS = ("find_packages", "find_namespace_packages")
-#: Characters of the longest setup.cfg or pyproject.toml that is read.
+#: Characters of the longest pyproject.toml that is read.
 _MOST = 100_000
 _MOST_ROOTS = 20
 #: Arguments with which other code may choose the packages.
@@ -206,34 +205,26 @@ def _finder(setup: Setup, node: ast.expr) -> Finder | None:
 
 
 def _of_cfg(source: Source | None) -> PackagingConfig | None:
-    if source is None or len(source.text) > _MOST:
-        return None if source else PackagingConfig()
-    parser = RawConfigParser(strict=False)
+    if source is None:
+        return PackagingConfig()
     try:
-        parser.read_string(source.text)
-    except ConfigError:
+        cfg = SetupCfg(source.text)
+    except ValueError:
         return None
-    dirs = _words(parser, "options", "package_dir") or _words(parser, "options", "package-dir")
+    dirs = cfg.words("options", "package_dir") or cfg.words("options", "package-dir")
     pairs = [line.partition("=") for line in dirs]
     roots = {key.strip(): root.strip() for key, equals, root in pairs if equals} or None
-    names = _words(parser, "options", "packages")
+    names = cfg.words("options", "packages")
     at = re.compile(r"(?mi)^packages\b").search(source.text, max(source.text.find("[options]"), 0))
-    if not parser.has_option("options", "packages") or at is None:
+    if not cfg.has("options", "packages") or at is None:
         return PackagingConfig(roots=roots)
     place = Span(source, *at.span())
     if names not in (("find:",), ("find_namespace:",)):
         return PackagingConfig(Installed(place, names), roots)
     section = "options.packages.find"
-    where, include, exclude = (_words(parser, section, key) for key in _SEARCH)
+    where, include, exclude = (cfg.words(section, key) for key in _SEARCH)
     finder = Finder("".join(where) or ".", include, exclude)
     return None if len(where) > 1 else PackagingConfig(Installed(place, (), (finder,)), roots)
-
-
-def _words(parser: RawConfigParser, section: str, option: str) -> tuple[str, ...]:
-    """Return the parts of a value, which lines or commas separate."""
-    text = parser.get(section, option, fallback="") or ""
-    parts = text.split("\n") if "\n" in text else text.split(",")
-    return tuple(word for part in parts if (word := part.strip()))
 
 
 def _of_toml(source: Source | None) -> PackagingConfig | None:

@@ -33,6 +33,7 @@ from idlc.packaging.facts import folders
 from idlc.packaging.files import CMAKE_LISTS, SETUP_CFG, SETUP_FILES, SETUP_PY
 from idlc.packaging.layout import layout
 from idlc.packaging.outcome import Edited, Outcome, Refused
+from idlc.packaging.setup_cfg import SetupCfg
 from idlc.packaging.setup_edits import KEYWORD, append_element, step_before_setup
 from idlc.packaging.setup_py import BOM, Setup
 from idlc.project import git
@@ -86,8 +87,6 @@ _ROUNDS = 3
 _USED = re.compile(r"(?m)^[ \t]*([a-z][a-z0-9_]*)/[A-Z]")
 #: A requirement of builds that compile the interfaces.
 _IDLC = re.compile(r"idlc(?![\w.-])")
-#: The distribution's name in pyproject.toml or setup.cfg.
-_NAME = re.compile(r"(?ms)^\[(?:project|metadata)\](?:(?!^\[).)*?^\s*name\s*[=:]")
 _BUILD_SYSTEM = '[build-system]\nrequires = ["setuptools"]\nbuild-backend = '
 _BUILD_SYSTEM += '"setuptools.build_meta"\n'
 #: The start of a list in VS Code's extensions.json, up to its first element.
@@ -466,13 +465,23 @@ def _ament_python(
     return _setup(draft, name, files, report)
 
 
+def _is_named(cfg: Source | None, pyproject: Source | None) -> bool:
+    """Return whether setup.cfg or pyproject.toml has the name of the distribution."""
+    with suppress(ValueError):
+        if cfg and SetupCfg(cfg.text).has("metadata", "name"):
+            return True
+    with suppress(ValueError):
+        project = toml(pyproject.text).get("project") if pyproject else None
+        return isinstance(project, dict) and "name" in project
+    return False
+
+
 def _setup(draft: Draft, name: str, files: Mapping[str, str], report: Report) -> str:
     """Have setup.py compile and install the interfaces; return what idlc cannot see."""
     text, others = draft.text(SETUP_PY), draft.configs()
     whole = _SETUP_TEXT.replace("(", f"(name='{name}', ")
     if text is None:
-        is_named = any(other and _NAME.search(other.text) for other in others)
-        text = _SETUP_TEXT if is_named else whole
+        text = _SETUP_TEXT if _is_named(*others) else whole
     try:
         ast.parse(text.removeprefix(BOM))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:

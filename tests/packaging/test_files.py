@@ -223,6 +223,9 @@ def test_setup_py_counts_where_the_project_leaves_scripts_to_it():
         ({"pyproject.toml": '[project]\nname="a"\nscripts = {a = "b:c"}\n'}, "pyproject.toml"),
         ({"pyproject.toml": '[project]\nname="a"\nscripts.talker = "b:c"\n'}, "pyproject.toml"),
         ({"setup.cfg": CFG.replace("listener =", "talker =")}, "setup.cfg"),
+        ({"setup.cfg": "name = demo\n" + CFG}, "setup.cfg"),
+        # setuptools would read the second of the two keys alone
+        ({"setup.cfg": CFG.replace("console_scripts", "Console_Scripts")}, "setup.cfg"),
     ],
 )
 def test_what_is_refused_outside_of_setup_py(files, path):
