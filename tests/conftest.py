@@ -50,6 +50,8 @@ def pytest_configure(config):
     if config.getoption("tier") == "long":
         os.environ.setdefault("IDLC_ROUNDS", "1")
     runs_tests = hasattr(config, "workerinput") or not config.getoption("numprocesses", None)
+    if runs_tests:
+        gc.disable()  # until all tests are collected
     if config.getoption("costs") and runs_tests:
         config.pluginmanager.register(costs.Meter(config.getoption("costs")))
 
@@ -91,8 +93,8 @@ def pytest_runtest_protocol(item):
 
 def pytest_collection_finish():
     """Keep the collector of garbage from looking at all tests again and again."""
-    gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_sessionfinish(session):
