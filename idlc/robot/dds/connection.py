@@ -19,8 +19,6 @@ from idlc.robot.dds.writer import Writer
 _TICK = 0.05
 #: Seconds between two looks at the own addresses, which change with the network.
 _LOOK = 3.0
-#: Packets that are read before what is due is done: one after so many seconds without any.
-_AT_ONCE, _NAP = 64, 0.0001
 _MOST_PACKET = 65_536
 
 
@@ -71,34 +69,28 @@ class Connection:
         self._tick_above()
 
     def _run(self) -> None:
+        wait = 0.0
         while self._is_open:
-            begin = time.monotonic()
-            ready = self._selector.select(max(self._due() - begin, 0))
-            # to look for another packet would let other threads run first
-            most = 1 if time.monotonic() - begin > _NAP else _AT_ONCE
-            for key, _ in ready:
-                self._receive(key.data, most)
-            # most messages of others make nothing due
-            if (now := time.monotonic()) >= self._due() or self.changed_at > self._ticked:
-                with self.lock:
-                    if self._is_open:
-                        self._tick(now)
+            for key, _ in self._selector.select(wait):
+                self._receive(key.data)
+            with self.lock:
+                now, due = time.monotonic(), self._due()
+                # most messages of others make nothing due
+                if self._is_open and (now >= due or self.changed_at > self._ticked):
+                    self._tick(now)
+                    due = self._due()
+                wait = max(due - now, 0)
 
     def _due(self) -> float:
-        with self.lock:
-            return min(self.participant.deadline, self._ticked + _TICK)
+        return min(self.participant.deadline, self._ticked + _TICK)
 
-    def _receive(self, each: socket.socket, most: int) -> None:
-        for _ in range(most):
-            try:
-                packet, source = each.recvfrom(_MOST_PACKET)
-            except BlockingIOError:
-                return
-            except OSError:  # on Windows, an earlier packet did not reach anybody
-                continue
-            with self.lock:
-                if not self._is_open:
-                    return
+    def _receive(self, each: socket.socket) -> None:
+        try:
+            packet, source = each.recvfrom(_MOST_PACKET)
+        except OSError:  # nothing is there, or on Windows: an earlier packet reached nobody
+            return
+        with self.lock:
+            if self._is_open:
                 self.send(self.participant.receive(packet, source[:2], time.monotonic()))
 
     def send(self, packets: Iterable[Outgoing]) -> None:

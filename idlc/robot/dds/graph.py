@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, TypeAlias
 
 from idlc.robot.dds import wire
 from idlc.robot.dds.discovery import EndpointData
-from idlc.robot.dds.formats import Received
 from idlc.robot.dds.wire import GUID, WireError
 from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
@@ -192,7 +191,7 @@ class RemoteNodes:
         self._domain = domain
         self._nodes: dict[bytes, tuple[NodeInfo, ...]] = {}
 
-    def learn(self, received: Received) -> bool:
+    def learn(self, received: wire.Data) -> bool:
         """Take a message of `ros_discovery_info`; return whether it is valid."""
         try:
             guid, nodes = parse_info(received.payload)

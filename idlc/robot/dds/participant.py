@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.discovery import EndpointData, Peer, fits
-from idlc.robot.dds.formats import Address, Outgoing, Received, Remote, Shared
+from idlc.robot.dds.formats import Address, Outgoing, Remote, Shared
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.writer import Writer
 
@@ -90,7 +90,7 @@ class Participant:
         self._add(end, writer)
         return writer
 
-    def add_reader(self, end: EndpointData, deliver: Callable[[Received], None]) -> Reader:
+    def add_reader(self, end: EndpointData, deliver: Callable[[wire.Data], None]) -> Reader:
         """Announce a reader."""
         reader = Reader(end.guid, end.qos, deliver, self.shared)
         self._add(end, reader)
@@ -133,7 +133,7 @@ class Participant:
         """Tell all that this participant ends."""
         end = discovery.format_end(self.prefix + discovery.PARTICIPANT_ID)
         for peer in self.peers.values():
-            self._send(peer.meta, bytes(wire.PREFIX), self._edition + 1, end, b"")
+            self._send(peer.meta, wire.ALL, self._edition + 1, end, b"")
 
     def move(self, addresses: list[Address]) -> bool:
         """Announce these addresses of this participant from now on; return whether they are new."""
@@ -149,7 +149,7 @@ class Participant:
         if fits(own, other):
             self._ends[own.id].match(other.guid, peer.address(other), other.qos)
 
-    def _learn(self, sample: Received) -> None:
+    def _learn(self, sample: wire.Data) -> None:
         """Take an announcement of an endpoint."""
         peer = self.peers.get(sample.writer[: wire.PREFIX])
         if peer is None:
@@ -232,7 +232,7 @@ class Participant:
         self._greetings += 1
         self._announce(peer.meta, peer.prefix)
 
-    def _announce(self, address: Address, prefix: bytes = bytes(wire.PREFIX)) -> None:
+    def _announce(self, address: Address, prefix: bytes = wire.ALL) -> None:
         self._send(address, prefix, self._edition, b"", self._announcement)
 
     def _send(
@@ -272,8 +272,7 @@ class Participant:
             return []
         peer = self.peers.get(prefix)
         for destination, part in parts:
-            is_for_all = destination == bytes(wire.PREFIX)
-            if prefix == self.prefix or not (is_for_all or destination == self.prefix):
+            if prefix == self.prefix or destination not in (self.prefix, wire.ALL):
                 continue
             if isinstance(part, wire.Data) and part.writer == discovery.SPDP_WRITER:
                 self._meet(part, source[0])
@@ -282,7 +281,7 @@ class Participant:
                 continue
             is_same_host = peer.host == source[0]
             if not peer.is_known:
-                if is_for_all or not is_same_host:
+                if destination == wire.ALL or not is_same_host:
                     continue
                 self._know(peer)
             peer.seen = now if is_same_host else peer.seen
@@ -293,24 +292,13 @@ class Participant:
         """Pass a part on to the end that it is for; without a reader, to all of its writer."""
         if isinstance(part, (wire.AckNack, wire.NackFragment)):
             writer, guid = self._ends.get(part.writer), prefix + part.reader
-            if isinstance(writer, Writer) and isinstance(part, wire.AckNack):
-                writer.acknack(guid, part)
-            elif isinstance(writer, Writer) and isinstance(part, wire.NackFragment):
-                writer.nack_fragment(guid, part)
+            if isinstance(writer, Writer):
+                writer.receive(guid, part)
             return
         guid = prefix + part.writer
-        ends = [self._ends.get(part.reader)] if any(part.reader) else [*self._ends.values()]
-        for reader in ends:
-            if not isinstance(reader, Reader) or guid not in reader.writers:
-                continue
-            if isinstance(part, wire.Data):
-                reader.data(guid, part)
-            elif isinstance(part, wire.Fragment):
-                reader.fragment(guid, part)
-            elif isinstance(part, wire.Heartbeat):
-                reader.heartbeat(guid, part)
-            else:
-                reader.gap(guid, part)
+        for reader in [*self.shared.matched.get(guid, ())]:
+            if part.reader in (reader.id, wire.ALL_READERS):
+                reader.receive(guid, part)
 
     @property
     def deadline(self) -> float:
@@ -331,7 +319,7 @@ class Participant:
             names = {peer.meta: peer.prefix for peer in self.peers.values() if not peer.is_known}
             known = [peer.meta for peer in self.peers.values() if peer.is_known]
             for address in dict.fromkeys((*self._searched, *known)):
-                self._announce(address, names.get(address, bytes(wire.PREFIX)))
+                self._announce(address, names.get(address, wire.ALL))
         return self.shared.collect()
 
     @property

@@ -9,9 +9,9 @@ from idlc.robot.dds import graph
 from idlc.robot.dds.address import Place
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import EndpointData
-from idlc.robot.dds.formats import Received
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
 from idlc.robot.dds.services import Services
+from idlc.robot.dds.wire import Data
 from idlc.robot.dds.writer import Writer, unpadded
 from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.names import dds_type
@@ -108,7 +108,7 @@ class DdsTransport:
     def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
         """Declare a reader."""
 
-        def deliver(received: Received) -> None:
+        def deliver(received: Data) -> None:
             if not received.is_key:
                 sent = received.time or time.time_ns()
                 attachment = pack_attachment(received.number, sent, received.writer)
@@ -178,7 +178,7 @@ class DdsTransport:
         self._connection.write(self._info, payload)
         self._is_news, self._news_at = False, now + _PERIOD
 
-    def _learn(self, received: Received) -> None:
+    def _learn(self, received: Data) -> None:
         self._is_stale |= self._remote.learn(received)
 
     def _entities(self) -> dict[str, None]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from idlc.robot.dds import discovery, formats, wire
-from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
+from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
@@ -130,7 +130,9 @@ class Writer:
         """Deliver a sample to a reader of the same participant."""
         payload, inline, time = sample
         parameters = wire.parse_parameters(inline, 0, "<")[0] if inline else wire.NONE
-        reader.deliver(Received(self.guid, number, parameters, payload, not payload, time))
+        reader.deliver(
+            wire.Data(reader.id, self.guid, number, parameters, payload, not payload, time)
+        )
 
     def _send(
         self, reader: RemoteReader, number: int, *tail: bytes, chosen: Sequence[int] = ()
@@ -157,13 +159,20 @@ class Writer:
         first = max(next(iter(self.history), self.last + 1), reader.start)
         return formats.format_heartbeat(reader.id, self.id, first, self.last, self._count)
 
-    def acknack(self, guid: bytes, part: wire.AckNack) -> None:
-        """Send what a reader lacks, or say that it never comes."""
+    def receive(self, guid: bytes, part: wire.AckNack | wire.NackFragment) -> None:
+        """Send again what a reader asks for."""
         reader = self.readers.get(guid)
-        if reader is None or not reader.reliable or part.base > self.last + 1:
+        if reader is None or not reader.reliable:
             return
-        if part.beat == reader.count:
-            return  # the network repeated it
+        if isinstance(part, wire.AckNack):
+            self._acknack(reader, part)
+        else:
+            self._nack_fragment(reader, part)
+
+    def _acknack(self, reader: RemoteReader, part: wire.AckNack) -> None:
+        """Send what a reader lacks, or say that it never comes."""
+        if part.base > self.last + 1 or part.beat == reader.count:
+            return  # the network repeats packets
         reader.count = part.beat
         reader.base = max(reader.base, part.base)
         reader.is_told |= part.base > 0
@@ -181,10 +190,9 @@ class Writer:
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
 
-    def nack_fragment(self, guid: bytes, part: wire.NackFragment) -> None:
+    def _nack_fragment(self, reader: RemoteReader, part: wire.NackFragment) -> None:
         """Send fragments again."""
-        reader = self.readers.get(guid)
-        if reader is None or not reader.reliable or part.number not in self.history:
+        if part.number not in self.history:
             return
         may_draw = self._shared.may_draw
         chosen = [each for each in part.missing if may_draw(reader.prefix, reader.size)]

@@ -172,9 +172,7 @@ class Ready:
         if callback is None:
             group.end(waiting)
             return False
-        future: Future[Any] = Future(executor=executor)
-        future.wake_at_end(partial(group.end, waiting))
-        return executor.step(future, callback)
+        return executor.begin(callback, partial(group.end, waiting))
 
 
 class Executor(AbstractContextManager["Executor"]):
@@ -214,6 +212,20 @@ class Executor(AbstractContextManager["Executor"]):
         future: Future[Any] = Future(executor=self)
         self.schedule(self.step, future, work)
         return future
+
+    def begin(self, callback: Callback, end: Callback) -> bool:
+        """Run a callback, and call `end` after it; a coroutine goes on as a task."""
+        try:
+            result = callback()
+        except BaseException:
+            end()
+            raise
+        if not iscoroutine(result):  # most callbacks are functions; a future is slow to make
+            end()
+            return True
+        future: Future[Any] = Future(executor=self)
+        future.wake_at_end(end)
+        return self.step(future, result)
 
     def step(self, future: Future[Any], work: Any) -> bool:
         """Run a function, or a coroutine to its next `await`; the future gets the result."""
@@ -299,15 +311,22 @@ class MultiThreadedExecutor(Executor):
         super().__init__(context=context)
         self._pool = futures.ThreadPoolExecutor(num_threads or max(2, os.cpu_count() or 2))
 
+    def begin(self, callback: Callback, end: Callback) -> bool:
+        """Run a callback in a thread."""
+        return self._submit(super().begin, callback, end)
+
     def step(self, future: Future[Any], work: Any) -> bool:
         """Run a function, or a coroutine to its next `await`, in a thread."""
+        return self._submit(super().step, future, work)
+
+    def _submit(self, work: Callable[..., bool], *args: Any) -> bool:
         with suppress(RuntimeError):  # the executor is shut down
-            self._pool.submit(self._step, future, work)
+            self._pool.submit(self._run, work, *args)
         return True
 
-    def _step(self, future: Future[Any], work: Any) -> None:
+    def _run(self, work: Callable[..., bool], *args: Any) -> None:
         try:
-            super().step(future, work)
+            work(*args)
         except BaseException as error:
             self.schedule(_fail, error)
 
