@@ -133,10 +133,6 @@ class Services:
             writer = participant.add_writer(ends[False])
             return Pair(participant.add_reader(ends[True], deliver), writer)
 
-    def withdraw(self, pair: Pair) -> None:
-        """Withdraw both ends."""
-        self._connection.remove(*(each.guid for each in pair))
-
     def serve(self, entity: Entity, callback: Callable[[Request], None]) -> Pair:
         """Declare a service."""
 
@@ -159,7 +155,7 @@ class Services:
 
     def withdraw_client(self, entity: Entity) -> None:
         """Withdraw an announced client, which waits for nothing any more."""
-        self.withdraw(self._clients.pop(entity.id).pair)
+        self._connection.remove(*(each.guid for each in self._clients.pop(entity.id).pair))
 
     def call(
         self, client: _Client, payload: bytes, attachment: bytes, callback: OnReply, limit: float

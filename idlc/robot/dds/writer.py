@@ -60,7 +60,7 @@ class Writer:
         self.readers: dict[bytes, RemoteReader] = {}
         self.local: list[Reader] = []
         self.history: OrderedDict[int, HistorySample] = OrderedDict()
-        self.last = 0
+        self.last, self.is_closed = 0, False
         self._shared = shared
         self._count = 0
         self._bytes = 0
@@ -92,6 +92,7 @@ class Writer:
 
     def close(self) -> None:
         """Forget all readers."""
+        self.is_closed = True
         self.readers.clear()
         self.local.clear()
 
