@@ -268,8 +268,7 @@ def unwrap(received: wire.Data, start: bytes) -> tuple[bytes, tuple[bytes, int] 
 
 
 def _string(text: str) -> bytes:
-    data = text.encode() + b"\0"
-    return struct.pack("<I", len(data)) + data
+    return _octets(text.encode() + b"\0")
 
 
 def _octets(data: bytes) -> bytes:

@@ -61,8 +61,7 @@ class Participant:
         self._changed = changed
         #: The own ends by their ids, and what was announced of them by their GUIDs.
         self._ends: dict[bytes, Writer | Reader] = {}
-        self._local: dict[bytes, EndpointData] = {}
-        self._numbers: dict[bytes, int] = {}
+        self._local: dict[bytes, tuple[EndpointData, int]] = {}
         self._removed: deque[tuple[Writer, int]] = deque()
         self._periods = iter(_PERIODS)
         self._announce_at = 0.0
@@ -100,29 +99,28 @@ class Participant:
         self._ends[own.id] = own
         announcer = self._announcers[end.is_writer]
         announcer.write(discovery.format_endpoint(end))
-        self._numbers[end.guid] = announcer.last
-        for other in self._local.values():
+        for other, _ in self._local.values():
             near = self._ends[other.id]
             writer, reader = (own, near) if end.is_writer else (near, own)
             if fits(end, other) and isinstance(writer, Writer) and isinstance(reader, Reader):
                 writer.match_local(reader)
-        self._local[end.guid] = end
+        self._local[end.guid] = end, announcer.last
         for peer in self.peers.values():
             for other in peer.endpoints.values():
                 self._match(end, other, peer)
 
     def remove(self, guid: bytes) -> None:
         """Withdraw an endpoint; a second time does nothing."""
-        end = self._local.pop(guid, None)
-        if end is None:
+        if guid not in self._local:
             return
+        end, number = self._local.pop(guid)
         own = self._ends.pop(end.id)
         own.close()
         for writer in self._ends.values():
             if isinstance(writer, Writer):
                 writer.local = [reader for reader in writer.local if reader is not own]
         announcer = self._announcers[end.is_writer]
-        announcer.forget(self._numbers.pop(guid))
+        announcer.forget(number)
         announcer.write(b"", discovery.format_end(guid))
         self._removed.append((announcer, announcer.last))
         if len(self._removed) > _ENDS:
@@ -133,7 +131,7 @@ class Participant:
         """Tell all that this participant ends."""
         end = discovery.format_end(self.prefix + discovery.PARTICIPANT_ID)
         for peer in self.peers.values():
-            self._send(peer.meta, wire.ALL, self._edition + 1, end, b"")
+            self._announce(peer.meta, ended=end)
 
     def move(self, addresses: list[Address]) -> bool:
         """Announce these addresses of this participant from now on; return whether they are new."""
@@ -172,7 +170,7 @@ class Participant:
             self.refused += 1
             return
         peer.endpoints[end.guid] = end
-        for own in [*self._local.values()]:
+        for own, _ in [*self._local.values()]:
             self._match(own, end, peer)
         self._changed()
 
@@ -204,22 +202,18 @@ class Participant:
             self._lose(peer)
             peer = None
         if peer is None:
-            if len(self.peers) >= MOST_PEERS and not self._make_room():
-                self.refused += 1
-                return
+            if len(self.peers) >= MOST_PEERS:
+                strangers = (each for each in self.peers.values() if not each.is_known)
+                oldest = next(strangers, None)
+                if oldest is None:
+                    self.refused += 1
+                    return
+                del self.peers[oldest.prefix]
             peer = self.peers[about.prefix] = Peer(about, host, now)
         if peer.host == host:
             peer.about = about._replace(meta_port=peer.about.meta_port) if peer.is_known else about
             peer.seen = now
             self._greet(peer)
-
-    def _make_room(self) -> bool:
-        """Forget the oldest stranger."""
-        for peer in self.peers.values():
-            if not peer.is_known:
-                del self.peers[peer.prefix]
-                return True
-        return False
 
     def _greet(self, peer: Peer) -> None:
         """Announce this participant to one that does not know it yet, not for ever."""
@@ -232,15 +226,13 @@ class Participant:
         self._greetings += 1
         self._announce(peer.meta, peer.prefix)
 
-    def _announce(self, address: Address, prefix: bytes = wire.ALL) -> None:
-        self._send(address, prefix, self._edition, b"", self._announcement)
-
-    def _send(
-        self, address: Address, prefix: bytes, number: int, inline: bytes, payload: bytes
-    ) -> None:
-        """Send a sample about this participant."""
+    def _announce(self, address: Address, prefix: bytes = wire.ALL, ended: bytes = b"") -> None:
+        """Send a sample about this participant, or about its end."""
         ids = discovery.SPDP_READER, discovery.SPDP_WRITER
-        part = formats.format_data(*ids, number, inline, payload)
+        number, payload = self._edition, self._announcement
+        if ended:
+            number, payload = number + 1, b""
+        part = formats.format_data(*ids, number, ended, payload)
         self.shared.send(Remote(prefix + ids[0], address, False), part)
 
     def _know(self, peer: Peer) -> None:
