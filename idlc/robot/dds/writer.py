@@ -35,6 +35,7 @@ class HistorySample(NamedTuple):
     payload: bytes
     inline: bytes
     time: int
+    written: float
 
 
 def _padded(payload: bytes) -> bytes:
@@ -70,6 +71,7 @@ class Writer:
         """Send to a reader from now on, and what is kept if both sides want that."""
         if guid in self.readers:
             return
+        self._expire()
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         is_late = self.qos.is_latched and qos.is_latched
         first = next(iter(self.history), self.last + 1) if is_late else self.last + 1
@@ -85,6 +87,7 @@ class Writer:
 
     def match_local(self, reader: Reader) -> None:
         """Deliver to a reader of the same participant."""
+        self._expire()
         self.local.append(reader)
         if self.qos.is_latched and reader.qos.is_latched:
             for number, sample in [*self.history.items()]:
@@ -104,7 +107,7 @@ class Writer:
         """Send a sample to all readers; it stays in the history."""
         payload = _padded(payload)
         self.last += 1
-        sample = self.history[self.last] = HistorySample(payload, inline, time)
+        sample = self.history[self.last] = HistorySample(payload, inline, time, self._shared.now)
         self._bytes += len(payload)
         while self._bytes > MOST_HISTORY or len(self.history) == (self._depth or 0) + 1:
             if len(self.history) == 1:
@@ -122,6 +125,12 @@ class Writer:
             self.history.clear()
             self._bytes = 0
 
+    def _expire(self) -> None:
+        """Forget the samples whose lifespan has ended."""
+        limit = self._shared.now - self.qos.lifespan / 1e9
+        for number in [number for number, each in self.history.items() if each.written < limit]:
+            self.forget(number)
+
     def forget(self, number: int) -> None:
         """Remove a sample from the history."""
         if (sample := self.history.pop(number, None)) is not None:
@@ -129,7 +138,7 @@ class Writer:
 
     def _deliver(self, reader: Reader, number: int, sample: HistorySample) -> None:
         """Deliver a sample to a reader of the same participant."""
-        payload, inline, time = sample
+        payload, inline, time, _ = sample
         parameters = wire.parse_parameters(inline, 0, "<")[0] if inline else wire.NONE
         reader.deliver(
             wire.Data(reader.id, self.guid, number, parameters, payload, not payload, time)
@@ -142,7 +151,7 @@ class Writer:
 
         `tail` follows in the same packet.
         """
-        payload, inline, time = self.history[number]
+        payload, inline, time, _ = self.history[number]
         if inline and payload and is_cyclone(reader.guid):
             payload, inline = discovery.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
@@ -174,6 +183,7 @@ class Writer:
         """Send what a reader lacks, or say that it never comes."""
         if part.base > self.last + 1 or part.beat == reader.count:
             return  # the network repeats packets
+        self._expire()
         reader.count = part.beat
         reader.base = max(reader.base, part.base)
         reader.is_told |= part.base > 0

@@ -31,6 +31,14 @@ class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
     """The context was shut down, for example by SIGTERM, while an executor waited."""
 
 
+class ShutdownException(Exception):  # noqa: N818 - rclpy's name
+    """The executor was shut down while it waited for a callback."""
+
+
+class TimeoutException(Exception):  # noqa: N818 - rclpy's name
+    """No callback was ready in time."""
+
+
 class Future(futures.Future[T]):
     """A result that comes later; `await` it in a coroutine that an executor or asyncio runs.
 
@@ -99,7 +107,10 @@ async def call(callback: Callable[..., Any], *args: Any) -> Any:
 
 
 class CallbackGroup:
-    """Decides which callbacks may run while a coroutine of the group waits."""
+    """Decides which callbacks may run while a coroutine of the group waits.
+
+    Groups of one's own can override `beginning_execution` and `ending_execution`.
+    """
 
     #: Functions to call at the end of the callback that runs; `None` if others need not wait.
     waiting: list[Callback] | None = None
@@ -124,6 +135,13 @@ class CallbackGroup:
         for resume in waiting or ():
             resume()
 
+    def beginning_execution(self, entity: Any) -> bool:  # noqa: ARG002 - for groups of one's own
+        """Return whether a callback may run now; else it is tried again after the next one."""
+        return True
+
+    def ending_execution(self, entity: Any) -> None:
+        """Take note that a callback has ended."""
+
 
 class MutuallyExclusiveCallbackGroup(CallbackGroup):
     """One callback at a time, coroutines included; each node has such a group as the default."""
@@ -138,6 +156,7 @@ class Ready:
 
     def __init__(self, group: CallbackGroup | None) -> None:
         self.callback_group = group or ReentrantCallbackGroup()
+        self.node: Any = None
         self._executor: Executor | None = None
         self._is_queued = False
 
@@ -167,12 +186,34 @@ class Ready:
             waiting = []
         if not group.begin(waiting, partial(executor.schedule, self.run, executor)):
             return False
+        if not group.beginning_execution(self):
+            group.end(waiting)
+            executor.refused.append(self)
+            return False
         self._is_queued = False
         callback = self.take()
         if callback is None:
-            group.end(waiting)
+            self._end(waiting)
             return False
-        return executor.begin(callback, partial(group.end, waiting))
+        return executor.begin(self, callback, partial(self._end, waiting))
+
+    def _end(self, waiting: list[Callback] | None) -> None:
+        self.callback_group.ending_execution(self)
+        self.callback_group.end(waiting)
+
+
+class Task(Future[Any]):
+    """A callback that an executor of one's own runs by a call, on any thread."""
+
+    def __init__(self, executor: Executor, callback: Callback, end: Callback) -> None:
+        super().__init__(executor=executor)
+        self._callback = callback
+        self.wake_at_end(end)
+
+    def __call__(self) -> None:
+        """Run the callback; `result` and `exception` return what came of it."""
+        with suppress(BaseException):
+            Executor.step(self.executor, self, self._callback)  # type: ignore[arg-type]
 
 
 class Executor(AbstractContextManager["Executor"]):
@@ -188,6 +229,10 @@ class Executor(AbstractContextManager["Executor"]):
         # its `put` may be called in signal handlers
         self._queue: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._is_shutdown = False
+        #: What its callback group did not let run.
+        self.refused: list[Ready] = []
+        #: What `wait_for_ready_callbacks` returns, while it waits.
+        self._found: list[tuple[Task, Ready, Any]] | None = None
         self.context.sleepers.add(self)
 
     def add_node(self, node: Any) -> bool:
@@ -213,8 +258,11 @@ class Executor(AbstractContextManager["Executor"]):
         self.schedule(self.step, future, work)
         return future
 
-    def begin(self, callback: Callback, end: Callback) -> bool:
+    def begin(self, ready: Ready, callback: Callback, end: Callback) -> bool:
         """Run a callback, and call `end` after it; a coroutine goes on as a task."""
+        if self._found is not None:
+            self._found.append((Task(self, callback, end), ready, ready.node))
+            return True
         try:
             result = callback()
         except BaseException:
@@ -282,11 +330,29 @@ class Executor(AbstractContextManager["Executor"]):
     def spin_until_future_complete(self, future: Future[Any], timeout_sec: Limit = None) -> None:
         """Run callbacks until the future is done or cancelled, or the time is over."""
         end = _end(timeout_sec)
-        future.wake_at_end(self.wake)
+        future.wake_at_end(partial(self.schedule, lambda: True))
         while not future.done() and self.context.ok() and not self._is_shutdown:
-            self._spin_once(end)
+            self.spin_once(timeout_sec=max(0.0, end - time.monotonic()))
             if time.monotonic() >= end:
                 return
+
+    def wait_for_ready_callbacks(self, timeout_sec: Limit = None) -> tuple[Task, Ready, Any]:
+        """Wait for a callback; return a task that runs it, its entity, and its node.
+
+        The `spin_once` of an executor of one's own calls it. Raises TimeoutException,
+        ShutdownException, and ExternalShutdownException.
+        """
+        end, self._found = _end(timeout_sec), []
+        try:
+            while not self._found:
+                if self._is_shutdown:
+                    raise ShutdownException
+                self._spin_once(end)
+                if not self._found and time.monotonic() >= end:
+                    raise TimeoutException
+            return self._found[0]
+        finally:
+            self._found = None
 
     def _spin_once(self, end: float) -> bool:
         """Take from the queue once; return whether a callback ran, or the time is over."""
@@ -298,7 +364,12 @@ class Executor(AbstractContextManager["Executor"]):
             work = self._queue.get(timeout=max(0.0, wait))
         except Empty:
             return time.monotonic() >= end
-        return work()
+        has_run = work()
+        if has_run and self.refused:
+            refused, self.refused = self.refused, []
+            for ready in refused:
+                self.schedule(ready.run, self)
+        return has_run
 
 
 SingleThreadedExecutor = Executor
@@ -311,9 +382,9 @@ class MultiThreadedExecutor(Executor):
         super().__init__(context=context)
         self._pool = futures.ThreadPoolExecutor(num_threads or max(2, os.cpu_count() or 2))
 
-    def begin(self, callback: Callback, end: Callback) -> bool:
+    def begin(self, ready: Ready, callback: Callback, end: Callback) -> bool:
         """Run a callback in a thread."""
-        return self._submit(super().begin, callback, end)
+        return self._submit(super().begin, ready, callback, end)
 
     def step(self, future: Future[Any], work: Any) -> bool:
         """Run a function, or a coroutine to its next `await`, in a thread."""

@@ -130,6 +130,7 @@ class Node(HasParameters):
         """Have the executor run the callbacks of a timer or an endpoint."""
         parts: list[Any] = self.timers if isinstance(part, Timer) else self.endpoints
         parts.append(part)
+        part.node = self
         part.attach(self.executor)
 
     def destroy_timer(self, part: Timer | Endpoint) -> bool:
