@@ -58,8 +58,9 @@ def test_a_place_follows_the_address_and_the_variables_of_ros(
         ("dds/", {}, "`dds/` is not an address of DDS"),
         ("dds/a b", {}, "`dds/a b` is not an address of DDS"),
         ("dds:7x", {}, "`dds:7x` is not an address of DDS"),
-        ("dds:233", {}, "`233` is not a domain (set ROS_DOMAIN_ID to 0)"),
-        ("dds", {"ROS_DOMAIN_ID": "-1"}, "`-1` is not a domain"),
+        ("dds:233", {}, "`233` is not a domain (write `dds:7`, say)"),
+        ("dds", {"ROS_DOMAIN_ID": "-1"}, "`-1` is not a domain (set ROS_DOMAIN_ID to 0)"),
+        ("dds", {RANGE: "all"}, "ROS_AUTOMATIC_DISCOVERY_RANGE is `all` (write SUBNET"),
         (
             "dds",
             {"ROS_SECURITY_STRATEGY": "Enforce"},
@@ -83,6 +84,22 @@ def test_variables_that_idlc_does_not_use_are_noted():
         "idlc does not use ROS_SECURITY_ENABLE",
     )
     assert "; ".join(place.notes) in nodes_stderr(environ)
+
+
+@pytest.mark.parametrize(
+    ("address", "environ", "sentence"),
+    [
+        ("dds", {}, "idlc searched this machine only; `dds/HOST` also searches another one"),
+        ("dds", {RANGE: "OFF"}, f"{RANGE} is OFF, so idlc searched nothing"),
+        (
+            "dds/192.0.2.1",
+            {RANGE: "SUBNET"},
+            "idlc searched 127.0.0.1, 192.0.2.1, the subnet; no participant answered",
+        ),
+    ],
+)
+def test_a_place_without_participants_is_one_sentence(address, environ, sentence):
+    assert parse_place(address, None, environ).silence == sentence
 
 
 def nodes_stderr(environ):

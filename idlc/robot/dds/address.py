@@ -51,6 +51,16 @@ class Place(NamedTuple):
         """True if nothing leaves this machine."""
         return not self.subnet and all(host.startswith("127.") for host in self.hosts)
 
+    @property
+    def silence(self) -> str:
+        """A sentence for when there is no other participant."""
+        if not (self.hosts or self.subnet):
+            return "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, so idlc searched nothing"
+        if self.is_local:
+            return "idlc searched this machine only; `dds/HOST` also searches another one"
+        places = [*self.hosts, *(["the subnet"] if self.subnet else [])]
+        return f"idlc searched {', '.join(places)}; no participant answered"
+
 
 def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) -> Place:
     """Return where to search by an address and ROS 2's variables; raise RobotError.
@@ -65,11 +75,13 @@ def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) ->
     if domain is not None:
         text = str(domain)
     if not (re.fullmatch("[0-9]{1,3}", text) and int(text) <= MOST_DOMAIN):
-        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0")
-    range_ = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
+        hint = "write `dds:7`, say" if match[1] else "set ROS_DOMAIN_ID to 0"
+        raise RobotError(f"`{one_line(text)}` is not a domain", hint)
+    word = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip()
+    range_ = word.upper()
     if range_ not in _RANGES:
         hint = "write SUBNET, LOCALHOST or OFF"
-        raise RobotError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is `{one_line(range_)}`", hint)
+        raise RobotError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is `{one_line(word)}`", hint)
     peers = environ.get("ROS_STATIC_PEERS", "").split(";")
     if environ.get("ROS_LOCALHOST_ONLY", "").strip() == "1":
         range_, peers = "LOCALHOST", []

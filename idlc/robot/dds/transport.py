@@ -230,8 +230,8 @@ class DdsTransport:
         """Return the variables that idlc does not use, and where it did not find anybody."""
         participant = self._connection.participant
         notes = [*self.place.notes]
-        if not participant.peers and self.place.is_local:
-            notes.append("idlc searched this machine only; `dds/HOST` also searches another one")
+        if not participant.peers:
+            notes.append(self.place.silence)
         if participant.without_udp:
             notes.append("some participants offer no UDP over IPv4; idlc does not see them")
         if participant.refused:
