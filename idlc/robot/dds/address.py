@@ -109,11 +109,15 @@ def _base(domain: int) -> int:
     return 7400 + 250 * domain
 
 
+def _ports(place: Place) -> range:
+    """Return the port of each participant on a machine."""
+    first = _base(place.domain) + 10
+    return range(first, min(first + 2 * PARTICIPANTS, 2**16), 2)
+
+
 def searched(place: Place) -> list[Address]:
     """Return the addresses at which other participants may listen."""
-    first = _base(place.domain) + 10
-    ports = range(first, min(first + 2 * PARTICIPANTS, 2**16), 2)
-    addresses = [(host, port) for host in place.hosts for port in ports]
+    addresses = [(host, port) for host in place.hosts for port in _ports(place)]
     return [*addresses, *([(GROUP, _base(place.domain))] if place.subnet else ())]
 
 
@@ -148,8 +152,7 @@ def _interfaces() -> Iterator[str]:
 def open_sockets(place: Place) -> list[socket.socket]:
     """Return the socket of a free participant, and that of the subnet; raise RobotError."""
     host = _LOOPBACK if place.is_local else "0.0.0.0"  # noqa: S104 - the environment asks for it
-    first = _base(place.domain) + 10
-    for port in range(first, min(first + 2 * PARTICIPANTS, 2**16), 2):
+    for port in _ports(place):
         own = _socket()
         try:
             own.bind((host, port))

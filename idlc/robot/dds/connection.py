@@ -70,16 +70,18 @@ class Connection:
 
     def _run(self) -> None:
         wait = 0.0
-        while self._is_open:
-            for key, _ in self._selector.select(wait):
-                self._receive(key.data)
+        while True:
+            ready = self._selector.select(wait)
             with self.lock:
-                now, due = time.monotonic(), self._due()
+                if not self._is_open:
+                    return
+                for key, _ in ready:
+                    self._receive(key.data)
+                now = time.monotonic()
                 # most messages of others make nothing due
-                if self._is_open and (now >= due or self.changed_at > self._ticked):
+                if now >= self._due() or self.changed_at > self._ticked:
                     self._tick(now)
-                    due = self._due()
-                wait = max(due - now, 0)
+                wait = max(self._due() - now, 0)
 
     def _due(self) -> float:
         return min(self.participant.deadline, self._ticked + _TICK)
@@ -89,9 +91,7 @@ class Connection:
             packet, source = each.recvfrom(_MOST_PACKET)
         except OSError:  # nothing is there, or on Windows: an earlier packet reached nobody
             return
-        with self.lock:
-            if self._is_open:
-                self.send(self.participant.receive(packet, source[:2], time.monotonic()))
+        self.send(self.participant.receive(packet, source[:2], time.monotonic()))
 
     def send(self, packets: Iterable[Outgoing]) -> None:
         """Send packets; one that the system refuses is lost, as one is on the way."""
