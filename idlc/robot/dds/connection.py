@@ -1,4 +1,8 @@
-"""A participant on sockets: one thread receives, sends what is due, and calls back."""
+"""A participant on sockets: one thread receives, sends what is due, and calls back.
+
+An executor that waits takes its turns, as to hand each message to another thread takes longer than
+to receive it.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from math import inf
 
 from idlc.robot.dds import address, formats, wire
 from idlc.robot.dds.formats import Outgoing
@@ -19,6 +24,8 @@ from idlc.robot.dds.writer import Writer
 _TICK = 0.05
 #: Seconds between two looks at the own addresses, which change with the network.
 _LOOK = 3.0
+#: Seconds in which another thread that took a turn takes the next one.
+_LEASE = 0.01
 _MOST_PACKET = 65_536
 
 
@@ -35,6 +42,9 @@ class Connection:
             self._selector.register(each, selectors.EVENT_READ, each)
         self._place, self._looked, self._ticked = place, 0.0, 0.0
         self._port = port = self._sockets[0].getsockname()[1]
+        self._own_address = "127.0.0.1", port
+        #: Who takes a turn, whether it waits for a packet, and until when the thread takes none.
+        self._turn, self._waits, self._lent_until = threading.RLock(), False, 0.0
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
         others = [each for each in address.searched(place) if each != ("127.0.0.1", port)]
         #: When the endpoints of others changed last.
@@ -69,19 +79,54 @@ class Connection:
         self._tick_above()
 
     def _run(self) -> None:
-        wait = 0.0
-        while True:
-            ready = self._selector.select(wait)
-            with self.lock:
-                if not self._is_open:
-                    return
-                for key, _ in ready:
-                    self._receive(key.data)
-                now = time.monotonic()
-                # most messages of others make nothing due
-                if now >= self._due() or self.changed_at > self._ticked:
-                    self._tick(now)
-                wait = max(self._due() - now, 0)
+        while self._is_open:
+            if time.monotonic() < self._lent_until:
+                time.sleep(_LEASE)
+                continue
+            with self._turn:
+                self._take_turn(_TICK)
+
+    def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
+        """Take a turn of the thread on this one, unless it has one; return whether it was taken.
+
+        It ends at the first packet, at `wake`, and at once unless `is_idle()`. The thread waits a
+        little for the next turn of another one.
+        """
+        if not self._is_open or not self._turn.acquire(blocking=False):
+            self._lent_until = max(self._lent_until, time.monotonic() + _LEASE)
+            return False
+        try:
+            self._lent_until = inf
+            self._take_turn(timeout, is_idle)
+        finally:
+            self._lent_until = time.monotonic() + _LEASE
+            self._turn.release()
+        return True
+
+    def wake(self) -> None:
+        """End the turn that waits for a packet; for any thread."""
+        if self._waits:
+            with suppress(OSError):
+                self._send(b"", self._own_address)
+
+    def _take_turn(self, timeout: float, is_idle: Callable[[], bool] | None = None) -> None:
+        """Wait for a packet, receive it, and do what is due."""
+        with self.lock:
+            wait = max(min(timeout, self._due() - time.monotonic()), 0)
+        self._waits = is_idle is not None
+        if is_idle is not None and not is_idle():
+            wait = 0
+        ready = self._selector.select(wait)
+        self._waits = False
+        with self.lock:
+            if not self._is_open:
+                return
+            for key, _ in ready:
+                self._receive(key.data)
+            now = time.monotonic()
+            # most messages of others make nothing due
+            if now >= self._due() or self.changed_at > self._ticked:
+                self._tick(now)
 
     def _due(self) -> float:
         return min(self.participant.deadline, self._ticked + _TICK)
@@ -91,7 +136,8 @@ class Connection:
             packet, source = each.recvfrom(_MOST_PACKET)
         except OSError:  # nothing is there, or on Windows: an earlier packet reached nobody
             return
-        self.send(self.participant.receive(packet, source[:2], time.monotonic()))
+        if packet:
+            self.send(self.participant.receive(packet, source[:2], time.monotonic()))
 
     def send(self, packets: Iterable[Outgoing]) -> None:
         """Send packets; one that the system refuses is lost, as one is on the way."""
@@ -132,6 +178,8 @@ class Connection:
         if was_open and threading.current_thread() is not self._thread:
             self._thread.join()
         if was_open:
-            self._selector.close()
-            for each in self._sockets:
-                each.close()
+            self.wake()
+            with self._turn:
+                self._selector.close()
+                for each in self._sockets:
+                    each.close()

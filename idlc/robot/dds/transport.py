@@ -79,6 +79,14 @@ class DdsTransport:
             self._infos = participant.add_reader(reader, self._learn)
         self._connection.start()
 
+    def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
+        """Receive on this thread."""
+        return self._connection.pump(timeout, is_idle)
+
+    def wake(self) -> None:
+        """End `pump`."""
+        self._connection.wake()
+
     def _guid(self, number: int, kind: bytes) -> bytes:
         return guid_of(self._connection.prefix, number, kind)
 

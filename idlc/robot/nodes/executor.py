@@ -18,6 +18,7 @@ from threading import Lock
 from typing import Any, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
+from idlc.robot.transport import Transport
 
 T = TypeVar("T")
 #: On Windows, a signal does not interrupt a wait, so that no wait is longer than these seconds.
@@ -229,6 +230,8 @@ class Executor(AbstractContextManager["Executor"]):
         # its `put` may be called in signal handlers
         self._queue: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._is_shutdown = False
+        #: The transport of the last node, which receives while the executor waits.
+        self.transport: Transport | None = None
         #: What its callback group did not let run.
         self.refused: list[Ready] = []
         #: What `wait_for_ready_callbacks` returns, while it waits.
@@ -298,6 +301,8 @@ class Executor(AbstractContextManager["Executor"]):
     def schedule(self, work: Callable[..., bool], *args: Any) -> None:
         """Append to the queue, from any thread; `work` returns whether it ran a callback."""
         self._queue.put(partial(work, *args))
+        if self.transport is not None:
+            self.transport.wake()
 
     def wake(self) -> None:
         """End the current wait, so that the executor looks at timers and the context again."""
@@ -361,7 +366,7 @@ class Executor(AbstractContextManager["Executor"]):
         waits = [timer.wake_if_ready() for node in self._nodes for timer in node.timers]
         wait = min(_TICK, end - time.monotonic(), *waits)
         try:
-            work = self._queue.get(timeout=max(0.0, wait))
+            work = self._next(max(0.0, wait))
         except Empty:
             return time.monotonic() >= end
         has_run = work()
@@ -370,6 +375,13 @@ class Executor(AbstractContextManager["Executor"]):
             for ready in refused:
                 self.schedule(ready.run, self)
         return has_run
+
+    def _next(self, wait: float) -> Callable[[], bool]:
+        """Return work from the queue; raise Empty if there is none for so many seconds or less."""
+        is_idle = self._queue.empty
+        if is_idle() and self.transport is not None and self.transport.pump(wait, is_idle):
+            wait = 0.0
+        return self._queue.get(block=wait > 0, timeout=wait)
 
 
 SingleThreadedExecutor = Executor

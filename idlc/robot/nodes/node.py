@@ -121,6 +121,8 @@ class Node(HasParameters):
     def attach(self, executor: Executor | None) -> None:
         """Run callbacks in this executor; called by it."""
         self.executor = executor
+        if executor is not None:
+            executor.transport = self.transport
         for part in (*self.timers, *self.endpoints):
             # a coroutine of another executor does not go on
             part.callback_group.waiting = None
