@@ -40,7 +40,8 @@ class Connection:
         self._selector = selectors.DefaultSelector()
         for each in self._sockets:
             self._selector.register(each, selectors.EVENT_READ, each)
-        self._place, self._looked, self._ticked = place, 0.0, 0.0
+        self._place = place
+        self._looked = self._ticked = self._due_at = 0.0
         self._port = port = self._sockets[0].getsockname()[1]
         self._own_address = "127.0.0.1", port
         #: Who takes a turn, whether it waits for a packet, and until when the thread takes none.
@@ -111,8 +112,7 @@ class Connection:
 
     def _take_turn(self, timeout: float, is_idle: Callable[[], bool] | None = None) -> None:
         """Wait for a packet, receive it, and do what is due."""
-        with self.lock:
-            wait = max(min(timeout, self._due() - time.monotonic()), 0)
+        wait = max(min(timeout, self._due_at - time.monotonic()), 0)
         self._waits = is_idle is not None
         if is_idle is not None and not is_idle():
             wait = 0
@@ -127,6 +127,7 @@ class Connection:
             # most messages of others make nothing due
             if now >= self._due() or self.changed_at > self._ticked:
                 self._tick(now)
+            self._due_at = self._due()
 
     def _due(self) -> float:
         return min(self.participant.deadline, self._ticked + _TICK)
