@@ -35,7 +35,8 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
         " ParameterUninitializedException"
     ),
     "rclpy.executors": (
-        "Executor ExternalShutdownException MultiThreadedExecutor SingleThreadedExecutor"
+        "Executor ExternalShutdownException MultiThreadedExecutor ShutdownException"
+        " SingleThreadedExecutor TimeoutException"
     ),
     "rclpy.guard_condition": "GuardCondition",
     "rclpy.impl": "",
@@ -45,7 +46,8 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
         " NodeMixin Publisher SimpleManagedEntity State TransitionCallbackReturn"
     ),
     "rclpy.logging": "LoggingSeverity get_logger",
-    "rclpy.parameter": "Parameter parameter_value_to_python",
+    "rclpy.parameter": "Parameter parameter_dict_from_yaml_file parameter_value_to_python",
+    "rclpy.parameter_client": "AsyncParameterClient",
     "rclpy.qos": (
         "DurabilityPolicy HistoryPolicy LivelinessPolicy QoSDurabilityPolicy QoSHistoryPolicy"
         " QoSLivelinessPolicy QoSPolicyKind QoSProfile QoSReliabilityPolicy ReliabilityPolicy"
@@ -62,8 +64,8 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
 }
 #: The modules of idlc that provide the names.
 _HOMES = (
-    "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.node"
-    " robot.nodes.overrides robot.parameters robot.qos"
+    "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.executor"
+    " robot.nodes.node robot.nodes.overrides robot.parameters robot.qos"
 ).split()
 #: The names that idlc gives to what has other names in rclpy.
 _ALIASES = {

@@ -22,6 +22,15 @@ _CLASSES = (type(None), bool, int, float, str, bytes, bool, int, float, str)
 #: Values that differ by less, relatively, are the same end or step of a range.
 TOLERANCE = 1e-6
 _SIM_TIME = "use_sim_time"
+#: The services of parameters that a node has.
+PARAMETER_SERVICES = (
+    "describe_parameters",
+    "get_parameters",
+    "get_parameter_types",
+    "list_parameters",
+    "set_parameters",
+    "set_parameters_atomically",
+)
 
 
 class ParameterType(Enum):
@@ -313,14 +322,15 @@ class HasParameters:
     def _serve_parameters(self, create_service: Callable[..., Any]) -> None:
         """Create the six services; their messages are compiled for the first request."""
         # in the order of rclpy, so that ids are equal
-        for name, answer in {
-            "describe_parameters": partial(_map, self.describe_parameter, "names", "descriptors"),
-            "get_parameters": partial(_map, self._get_value, "names", "values"),
-            "get_parameter_types": partial(_map, self.get_parameter_type, "names", "types"),
-            "list_parameters": self._list,
-            "set_parameters": partial(_map, self._set, "parameters", "results"),
-            "set_parameters_atomically": self._set_atomically,
-        }.items():
+        answers = (
+            partial(_map, self.describe_parameter, "names", "descriptors"),
+            partial(_map, self._get_value, "names", "values"),
+            partial(_map, self.get_parameter_type, "names", "types"),
+            self._list,
+            partial(_map, self._set, "parameters", "results"),
+            self._set_atomically,
+        )
+        for name, answer in zip(PARAMETER_SERVICES, answers, strict=True):
             kind = standard(f"rcl_interfaces/srv/{name.title().replace('_', '')}")
             create_service(kind, f"~/{name}", answer, qos_profile=qos_profile_parameters)
 

@@ -116,6 +116,15 @@ class Transport(Protocol):
         Raises TimeoutError after `timeout` seconds if answers may be missing.
         """
 
+    def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
+        """Receive on this thread for `timeout` seconds at most, while `is_idle()`.
+
+        Callbacks run on this thread then. Returns False at once if another thread receives.
+        """
+
+    def wake(self) -> None:
+        """End `pump`; for any thread, also in signal handlers."""
+
     def notes(self) -> list[str]:
         """Return sentences about what this connection cannot show."""
 

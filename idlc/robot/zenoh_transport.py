@@ -148,6 +148,13 @@ class ZenohTransport:
                 raise TimeoutError
             yield str(reply.ok.key_expr)
 
+    def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:  # noqa: ARG002
+        """Return False, as Zenoh's own threads receive."""
+        return False
+
+    def wake(self) -> None:
+        """Do nothing, as `pump` does not wait."""
+
     def notes(self) -> list[str]:
         """Return nothing."""
         return []

@@ -9,7 +9,14 @@ import sys
 import pytest
 
 from idlc.project.words import is_address
-from idlc.robot.dds.address import PARTICIPANTS, open_sockets, own_hosts, parse_place, searched
+from idlc.robot.dds.address import (
+    PARTICIPANTS,
+    _is_used,
+    open_sockets,
+    own_hosts,
+    parse_place,
+    searched,
+)
 from idlc.robot.errors import RobotError
 from idlc.robot.session import open_session
 from tests.support.domains import held_domain
@@ -58,8 +65,9 @@ def test_a_place_follows_the_address_and_the_variables_of_ros(
         ("dds/", {}, "`dds/` is not an address of DDS"),
         ("dds/a b", {}, "`dds/a b` is not an address of DDS"),
         ("dds:7x", {}, "`dds:7x` is not an address of DDS"),
-        ("dds:233", {}, "`233` is not a domain (set ROS_DOMAIN_ID to 0)"),
-        ("dds", {"ROS_DOMAIN_ID": "-1"}, "`-1` is not a domain"),
+        ("dds:233", {}, "`233` is not a domain (write a number up to 232, such as `dds:7`)"),
+        ("dds", {"ROS_DOMAIN_ID": "-1"}, "`-1` is not a domain (set ROS_DOMAIN_ID to 0)"),
+        ("dds", {RANGE: "all"}, "ROS_AUTOMATIC_DISCOVERY_RANGE is `all` (write SUBNET"),
         (
             "dds",
             {"ROS_SECURITY_STRATEGY": "Enforce"},
@@ -83,6 +91,36 @@ def test_variables_that_idlc_does_not_use_are_noted():
         "idlc does not use ROS_SECURITY_ENABLE",
     )
     assert "; ".join(place.notes) in nodes_stderr(environ)
+
+
+@pytest.mark.parametrize(
+    ("address", "environ", "sentence"),
+    [
+        ("dds", {}, "idlc searched this machine only; `dds/HOST` also searches another one"),
+        ("dds", {RANGE: "OFF"}, f"{RANGE} is OFF, so idlc searched nothing"),
+        (
+            "dds/192.0.2.1",
+            {RANGE: "SUBNET"},
+            "idlc searched 127.0.0.1, 192.0.2.1, the subnet; no participant answered",
+        ),
+    ],
+)
+def test_a_place_without_participants_is_one_sentence(address, environ, sentence, monkeypatch):
+    used = {0}
+    monkeypatch.setattr("idlc.robot.dds.address._is_used", used.__contains__)
+    assert parse_place(address, None, environ).silence == sentence
+    used |= {5, 7}
+    if environ.get(RANGE) != "OFF":
+        sentence = "this machine has participants in other domains: `dds:5`, `dds:7`"
+    assert parse_place(address, None, environ).silence == sentence
+
+
+def test_the_domains_of_this_machine_are_known():
+    domain = next(domain for domain in range(101, 0, -1) if not _is_used(domain))
+    with socket.socket(type=socket.SOCK_DGRAM) as participant:
+        participant.bind(("", 7410 + 250 * domain))
+        assert _is_used(domain)
+    assert not _is_used(domain)
 
 
 def nodes_stderr(environ):

@@ -9,7 +9,7 @@ import pytest
 
 from idlc.robot.dds import discovery, formats, graph, wire
 from idlc.robot.dds.discovery import EndpointData
-from idlc.robot.dds.formats import MOST_WAITING, Received
+from idlc.robot.dds.formats import MOST_WAITING
 from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
 from idlc.robot.dds.reader import Reader
@@ -208,7 +208,7 @@ def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order)
     body = order + b"\0\0" + b"body"
     sent = discovery.wrap(body, inline)
     for end in range(len(sent) + 1):
-        sample = Received(b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
+        sample = wire.Data(b"", b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
         payload, named = discovery.unwrap(sample, b"a name o")
         assert (named is None) == (end < 20)
         assert named in (None, (b"a name of 16 byt", 2**40))
@@ -240,7 +240,7 @@ def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():
     nodes = [graph.NodeInfo(*each, (), ()) for each in names]
     remote = RemoteNodes(0)
     payload = graph.format_info(SOURCE, nodes)
-    assert remote.learn(Received(SOURCE + bytes(4), 1, wire.NONE, payload, False, 0))
+    assert remote.learn(wire.Data(b"", SOURCE + bytes(4), 1, wire.NONE, payload, False, 0))
     shown = [*remote.entities([SOURCE], ends, {})]
     assert [(entity.node, entity.name) for entity in shown] == [
         ("a", ""), ("_NODE_NAME_UNKNOWN_", "/a"),
@@ -256,7 +256,7 @@ def test_what_participants_tell_of_nodes_is_bounded():
         name = bytes([number]) * 12
         told = payload[:4] + name + payload[16:]
         for _ in range(2):
-            taken += remote.learn(Received(name + bytes(4), 1, wire.NONE, told, False, 0))
+            taken += remote.learn(wire.Data(b"", name + bytes(4), 1, wire.NONE, told, False, 0))
     assert taken == 2
     with pytest.raises(wire.WireError):
         graph.parse_info(bytes(2_000_000))

@@ -4,6 +4,7 @@ import heapq
 import itertools
 import random
 
+import msgspec
 import pytest
 
 from idlc.robot.dds import formats, wire
@@ -201,6 +202,23 @@ def test_endpoints_that_come_and_go_leave_nothing():
     assert all(end.writers == {} for end in right._ends.values() if end.qos is ALL)
     assert sum(len(writer.history) for writer in left._announcers.values()) <= 300
     assert received == []
+
+
+def test_late_readers_get_nothing_that_has_outlived_its_lifespan():
+    network = Network()
+    left, right = network.add(1), network.add(2)
+    short = msgspec.structs.replace(LATCHED, lifespan=10**9)
+    writer = network.writer(left, short)
+    for number in range(3):
+        network.write(left, writer, text(number))
+        network.run(0.6)
+    late = [network.reader(own, LATCHED, 5)[1] for own in (left, right)]
+    network.run(5)
+    later = [network.reader(own, LATCHED, 6)[1] for own in (left, right)]
+    network.write(left, writer, text(3))
+    network.run(1)
+    assert late == [[text(2), text(3)]] * 2
+    assert later == [[text(3)]] * 2
 
 
 def announcement(prefix, host="10.0.0.2"):

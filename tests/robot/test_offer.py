@@ -251,6 +251,126 @@ rclpy.shutdown()
 """
 
 
+CUSTOM = """\
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import rclpy
+from rclpy.callback_groups import CallbackGroup
+from rclpy.executors import Executor, ShutdownException, TimeoutException
+from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+
+
+class Pool(Executor):
+    def __init__(self):
+        super().__init__()
+        self.pool, self.ran = ThreadPoolExecutor(), []
+
+    def spin_once(self, timeout_sec=None):
+        try:
+            handler, entity, node = self.wait_for_ready_callbacks(timeout_sec=timeout_sec)
+        except (TimeoutException, ShutdownException) as error:
+            self.ran.append(type(error).__name__)
+            return
+        self.ran.append(node.get_name())
+        self.pool.submit(handler).result()
+        if handler.exception() is not None:
+            raise handler.exception()
+
+
+class Bucket(CallbackGroup):
+    tokens = ended = 2
+
+    def beginning_execution(self, entity):
+        self.tokens -= self.tokens > 0
+        return self.tokens > 0
+
+    def ending_execution(self, entity):
+        self.ended += 1
+
+
+def fail():
+    raise ValueError("a callback failed")
+
+
+rclpy.init()
+node = rclpy.create_node("blackboard", allow_undeclared_parameters=True)
+other = rclpy.create_node("asks")
+executor = Pool()
+executor.spin_once(timeout_sec=0)
+executor.add_node(node)
+executor.add_node(other)
+client = AsyncParameterClient(other, "blackboard")
+assert client.wait_for_services(30.0)
+answered = []
+
+
+def ask(future, name):
+    executor.spin_until_future_complete(future, 30)
+    return getattr(future.result(), name)
+
+
+two = [Parameter("gain", value=3), Parameter("name", value="x")]
+results = ask(client.set_parameters(two, answered.append), "results")
+print([each.successful for each in results])
+print(ask(client.load_parameter_file(sys.argv[1]), "results")[0].successful, sys.argv[1])
+print(ask(client.set_parameters_atomically([Parameter("gain", value=4)]), "result").successful)
+values = ask(client.get_parameters(["gain", "name", "rate"]), "values")
+print([parameter_value_to_python(each) for each in values])
+print(list(ask(client.get_parameter_types(["gain", "name"]), "types")))
+print([each.name for each in ask(client.describe_parameters(["gain"]), "descriptors")])
+print(sorted(ask(client.list_parameters(["gain", "deep"], 1), "result").names))
+print(ask(client.delete_parameters(["name"]), "results")[0].successful, len(answered))
+print(sorted(parameter_dict_from_yaml_file(sys.argv[1], True, ["/other"], "ns")))
+group, calls = Bucket(), []
+timer = node.create_timer(0.001, lambda: calls.append(1), callback_group=group)
+while group.tokens:
+    executor.spin_once(timeout_sec=1)
+for _ in range(3):
+    executor.spin_once(timeout_sec=0.01)
+print(len(calls), group.ended, {*executor.ran} == {"blackboard", "TimeoutException"})
+group.tokens = 3
+node.create_guard_condition(lambda: None).trigger()
+executor.spin_once()
+executor.spin_once()
+print(len(calls))
+timer.cancel()
+node.create_guard_condition(fail).trigger()
+try:
+    executor.spin_once()
+except ValueError as error:
+    print(error)
+executor.shutdown()
+executor.spin_once()
+print(executor.ran[-1])
+rclpy.shutdown()
+"""
+FILE = "/**: {ros__parameters: {any: 1}}\n/other: {ros__parameters: {rate: 2.5, deep: {er: y}}}\n"
+
+
+def test_executors_groups_and_parameter_clients_of_programs(start, tmp_path):
+    (tmp_path / "custom.py").write_text(CUSTOM, encoding="utf-8")
+    (tmp_path / "file.yaml").write_text(FILE, encoding="utf-8")
+    program = start("custom.py", "file.yaml", cwd=tmp_path)
+    assert program.ends() == 0, program.output
+    assert program.output.splitlines() == [
+        "[True, True]",
+        "True file.yaml",
+        "True",
+        "[4, 'x', 2.5]",
+        "[2, 4]",
+        "['gain']",
+        "['deep.er', 'gain']",
+        "True 1",
+        "['ns.any', 'ns.deep.er', 'ns.rate']",
+        "1 3 True",
+        "2",
+        "a callback failed",
+        "ShutdownException",
+    ]
+
+
 def test_nodes_of_each_kind_of_the_examples(start, tmp_path):
     (tmp_path / "kinds.py").write_text(KINDS, encoding="utf-8")
     override = "qos_overrides./words.publisher.depth:=7"

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
+from idlc.diagnostics.report import first_few
 from idlc.diagnostics.text import one_line
 from idlc.robot.dds.formats import Address
 from idlc.robot.errors import RobotError
@@ -17,6 +18,8 @@ from idlc.robot.errors import RobotError
 #: An address: the domain, and a peer.
 _ADDRESS = re.compile(r"dds(?::(\d{1,3}))?(?:/([\w.-]{1,253}))?", re.ASCII)
 MOST_DOMAIN = 232
+#: The ports of this domain and of later ones can be those of any program.
+_EPHEMERAL = 102
 #: Participants on one machine, each with a port of its own.
 PARTICIPANTS = 120
 GROUP = "239.255.0.1"
@@ -51,6 +54,20 @@ class Place(NamedTuple):
         """True if nothing leaves this machine."""
         return not self.subnet and all(host.startswith("127.") for host in self.hosts)
 
+    @property
+    def silence(self) -> str:
+        """A sentence for when there is no other participant."""
+        if not (self.hosts or self.subnet):
+            return "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, so idlc searched nothing"
+        domains = sorted({*range(_EPHEMERAL)} - {self.domain})
+        others = [f"`dds:{domain}`" for domain in domains if _is_used(domain)]
+        if others:
+            return f"this machine has participants in other domains: {first_few(others, 5)}"
+        if self.is_local:
+            return "idlc searched this machine only; `dds/HOST` also searches another one"
+        places = [*self.hosts, *(["the subnet"] if self.subnet else [])]
+        return f"idlc searched {', '.join(places)}; no participant answered"
+
 
 def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) -> Place:
     """Return where to search by an address and ROS 2's variables; raise RobotError.
@@ -65,11 +82,13 @@ def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) ->
     if domain is not None:
         text = str(domain)
     if not (re.fullmatch("[0-9]{1,3}", text) and int(text) <= MOST_DOMAIN):
-        raise RobotError(f"`{one_line(text)}` is not a domain", "set ROS_DOMAIN_ID to 0")
-    range_ = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
+        hint = "write a number up to 232, such as `dds:7`" if match[1] else "set ROS_DOMAIN_ID to 0"
+        raise RobotError(f"`{one_line(text)}` is not a domain", hint)
+    word = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip()
+    range_ = word.upper()
     if range_ not in _RANGES:
         hint = "write SUBNET, LOCALHOST or OFF"
-        raise RobotError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is `{one_line(range_)}`", hint)
+        raise RobotError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is `{one_line(word)}`", hint)
     peers = environ.get("ROS_STATIC_PEERS", "").split(";")
     if environ.get("ROS_LOCALHOST_ONLY", "").strip() == "1":
         range_, peers = "LOCALHOST", []
@@ -97,11 +116,25 @@ def _base(domain: int) -> int:
     return 7400 + 250 * domain
 
 
+def _ports(domain: int) -> range:
+    """Return the port of each participant on a machine."""
+    first = _base(domain) + 10
+    return range(first, min(first + 2 * PARTICIPANTS, 2**16), 2)
+
+
+def _is_used(domain: int) -> bool:
+    """Return whether the port of the first participant is taken on this machine."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((_LOOPBACK, _ports(domain)[0]))
+        except OSError:
+            return True
+    return False
+
+
 def searched(place: Place) -> list[Address]:
     """Return the addresses at which other participants may listen."""
-    first = _base(place.domain) + 10
-    ports = range(first, min(first + 2 * PARTICIPANTS, 2**16), 2)
-    addresses = [(host, port) for host in place.hosts for port in ports]
+    addresses = [(host, port) for host in place.hosts for port in _ports(place.domain)]
     return [*addresses, *([(GROUP, _base(place.domain))] if place.subnet else ())]
 
 
@@ -136,8 +169,7 @@ def _interfaces() -> Iterator[str]:
 def open_sockets(place: Place) -> list[socket.socket]:
     """Return the socket of a free participant, and that of the subnet; raise RobotError."""
     host = _LOOPBACK if place.is_local else "0.0.0.0"  # noqa: S104 - the environment asks for it
-    first = _base(place.domain) + 10
-    for port in range(first, min(first + 2 * PARTICIPANTS, 2**16), 2):
+    for port in _ports(place.domain):
         own = _socket()
         try:
             own.bind((host, port))

@@ -1,4 +1,8 @@
-"""A participant on sockets: one thread receives, sends what is due, and calls back."""
+"""A participant on sockets: one thread receives, sends what is due, and calls back.
+
+An executor that waits takes its turns, as to hand each message to another thread takes longer than
+to receive it.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from math import inf
 
 from idlc.robot.dds import address, formats, wire
 from idlc.robot.dds.formats import Outgoing
@@ -19,8 +24,8 @@ from idlc.robot.dds.writer import Writer
 _TICK = 0.05
 #: Seconds between two looks at the own addresses, which change with the network.
 _LOOK = 3.0
-#: Packets that are read before what is due is done: one after so many seconds without any.
-_AT_ONCE, _NAP = 64, 0.0001
+#: Seconds in which another thread that took a turn takes the next one.
+_LEASE = 0.01
 _MOST_PACKET = 65_536
 
 
@@ -35,8 +40,12 @@ class Connection:
         self._selector = selectors.DefaultSelector()
         for each in self._sockets:
             self._selector.register(each, selectors.EVENT_READ, each)
-        self._place, self._looked, self._ticked = place, 0.0, 0.0
+        self._place = place
+        self._looked = self._ticked = self._due_at = 0.0
         self._port = port = self._sockets[0].getsockname()[1]
+        self._own_address = "127.0.0.1", port
+        #: Who takes a turn, whether it waits for a packet, and until when the thread takes none.
+        self._turn, self._waits, self._lent_until = threading.RLock(), False, 0.0
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
         others = [each for each in address.searched(place) if each != ("127.0.0.1", port)]
         #: When the endpoints of others changed last.
@@ -72,34 +81,64 @@ class Connection:
 
     def _run(self) -> None:
         while self._is_open:
-            begin = time.monotonic()
-            ready = self._selector.select(max(self._due() - begin, 0))
-            # to look for another packet would let other threads run first
-            most = 1 if time.monotonic() - begin > _NAP else _AT_ONCE
+            if time.monotonic() < self._lent_until:
+                time.sleep(_LEASE)
+                continue
+            with self._turn:
+                self._take_turn(_TICK)
+
+    def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
+        """Take a turn of the thread on this one, unless it has one; return whether it was taken.
+
+        It ends at the first packet, at `wake`, and at once unless `is_idle()`. The thread waits a
+        little for the next turn of another one.
+        """
+        if not self._is_open or not self._turn.acquire(blocking=False):
+            self._lent_until = max(self._lent_until, time.monotonic() + _LEASE)
+            return False
+        try:
+            self._lent_until = inf
+            self._take_turn(timeout, is_idle)
+        finally:
+            self._lent_until = time.monotonic() + _LEASE
+            self._turn.release()
+        return True
+
+    def wake(self) -> None:
+        """End the turn that waits for a packet; for any thread."""
+        if self._waits:
+            with suppress(OSError):
+                self._send(b"", self._own_address)
+
+    def _take_turn(self, timeout: float, is_idle: Callable[[], bool] | None = None) -> None:
+        """Wait for a packet, receive it, and do what is due."""
+        wait = max(min(timeout, self._due_at - time.monotonic()), 0)
+        self._waits = is_idle is not None
+        if is_idle is not None and not is_idle():
+            wait = 0
+        ready = self._selector.select(wait)
+        self._waits = False
+        with self.lock:
+            if not self._is_open:
+                return
             for key, _ in ready:
-                self._receive(key.data, most)
+                self._receive(key.data)
+            now = time.monotonic()
             # most messages of others make nothing due
-            if (now := time.monotonic()) >= self._due() or self.changed_at > self._ticked:
-                with self.lock:
-                    if self._is_open:
-                        self._tick(now)
+            if now >= self._due() or self.changed_at > self._ticked:
+                self._tick(now)
+            self._due_at = self._due()
 
     def _due(self) -> float:
-        with self.lock:
-            return min(self.participant.deadline, self._ticked + _TICK)
+        return min(self.participant.deadline, self._ticked + _TICK)
 
-    def _receive(self, each: socket.socket, most: int) -> None:
-        for _ in range(most):
-            try:
-                packet, source = each.recvfrom(_MOST_PACKET)
-            except BlockingIOError:
-                return
-            except OSError:  # on Windows, an earlier packet did not reach anybody
-                continue
-            with self.lock:
-                if not self._is_open:
-                    return
-                self.send(self.participant.receive(packet, source[:2], time.monotonic()))
+    def _receive(self, each: socket.socket) -> None:
+        try:
+            packet, source = each.recvfrom(_MOST_PACKET)
+        except OSError:  # nothing is there, or on Windows: an earlier packet reached nobody
+            return
+        if packet:
+            self.send(self.participant.receive(packet, source[:2], time.monotonic()))
 
     def send(self, packets: Iterable[Outgoing]) -> None:
         """Send packets; one that the system refuses is lost, as one is on the way."""
@@ -140,6 +179,8 @@ class Connection:
         if was_open and threading.current_thread() is not self._thread:
             self._thread.join()
         if was_open:
-            self._selector.close()
-            for each in self._sockets:
-                each.close()
+            self.wake()
+            with self._turn:
+                self._selector.close()
+                for each in self._sockets:
+                    each.close()

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.formats import Address, Received, is_cyclone
+from idlc.robot.dds.formats import Address, is_cyclone
 from idlc.robot.qos import (
     INFINITE,
     MOST_DEPTH,
@@ -208,7 +208,7 @@ def parse_endpoint(payload: bytes) -> EndpointData:
     )
 
 
-def ended(part: wire.Data | Received) -> bytes | None:
+def ended(part: wire.Data) -> bytes | None:
     """Return the GUID of what a sample says is gone; `None` if it says something else."""
     status = _first(part.parameters, STATUS, 4)
     if status is None or not status[3] & 3:
@@ -249,7 +249,7 @@ def wrap(payload: bytes, inline: bytes) -> bytes:
     return payload[:_HEAD] + head + payload[_HEAD:]
 
 
-def unwrap(received: Received, start: bytes) -> tuple[bytes, tuple[bytes, int] | None]:
+def unwrap(received: wire.Data, start: bytes) -> tuple[bytes, tuple[bytes, int] | None]:
     """Return the payload of a request or reply, and the client and number that it names.
 
     Of a client of Cyclone DDS, the name is 8 bytes, which follow `start`.
@@ -268,8 +268,7 @@ def unwrap(received: Received, start: bytes) -> tuple[bytes, tuple[bytes, int] |
 
 
 def _string(text: str) -> bytes:
-    data = text.encode() + b"\0"
-    return struct.pack("<I", len(data)) + data
+    return _octets(text.encode() + b"\0")
 
 
 def _octets(data: bytes) -> bytes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from idlc.robot.dds import wire
 
@@ -157,6 +157,8 @@ class Shared:
         self.now = 0.0
         #: What the ends have to do, and when.
         self.due: dict[Callable[[], None], float] = {}
+        #: The readers of each matched writer.
+        self.matched: dict[bytes, list[Any]] = {}
         self._packets: list[Outgoing] = []
         self._used: Counter[bytes] = Counter()
         #: The bytes that participants may draw, and when that was so.
@@ -199,14 +201,3 @@ class Shared:
         self._used[prefix] -= size
         if not self._used[prefix]:
             del self._used[prefix]
-
-
-class Received(NamedTuple):
-    """A sample as a reader's callback gets it; without a payload, an instance ended."""
-
-    writer: bytes
-    number: int
-    parameters: wire.Parameters
-    payload: bytes
-    is_key: bool
-    time: int

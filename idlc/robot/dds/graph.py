@@ -8,24 +8,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from idlc.robot.dds import wire
 from idlc.robot.dds.discovery import EndpointData
-from idlc.robot.dds.formats import Received
 from idlc.robot.dds.wire import GUID, WireError
 from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
 from idlc.robot.nodes.interfaces import standard
 
-#: The topic about nodes, its type, and what one message of it may contain.
+#: The topic about nodes, its type, and the most bytes of one message of it.
 INFO_TOPIC = "ros_discovery_info"
 INFO_TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
-_MOST_NODES = 1024
-_MOST_ENDS = 4096
-_MOST_NAME = 512
-#: Bytes of a message.
 _MOST = 2**20
 #: The last byte of the id of a writer and of a reader.
 WRITER, READER = b"\x03", b"\x04"
@@ -46,34 +42,22 @@ _KINDS = {
 }
 
 
-#: The services that every node has, with the hashes of their requests and responses in Jazzy.
+#: The services that every node has, with the beginnings of the hashes of their requests and
+#: responses in Jazzy.
 _OF_NODES = """
-rcl_interfaces/srv/DescribeParameters
-05dd1c2bc87dec2627105c8070d6f9725c781a4f2ab852975bf105462b82b644
-ad6747319613c6131589e062e095b469a46cc764f7d0f12a001a49e6cd893995
-rcl_interfaces/srv/GetParameterTypes
-87d7ec5ef545d4daa289d500025d31fb2437bc8b8365ca367161c4dac4be33fd
-ac1335dce67c478e669434f6ac2fbff34fcd529580f272d3006785ba8b54e47f
-rcl_interfaces/srv/GetParameters
-135a9e1c3d7cebef792f6687d7ddf99949b21a0bd9a320d863a9110a3f5cf4d6
-9fa773b46e39cc5d02db6224d8fd520bb9caeeffc2b27c96c1e59431baba9f2a
-rcl_interfaces/srv/ListParameters
-a1b0b5d6b967a5b8ac5bc8563c3ea678f349e312a6a4967227c5a96bc5ce38df
-31b937b82de3612426be79f231e386259f97e8dc843e3f2845288b4bfa296bdd
-rcl_interfaces/srv/SetParameters
-130d46386b7e84ea9ecf60608a4d83cbe5e5cb7c6cc5b712b7a4e3a6c254e932
-7a0e8140a0b8d98308fa81a5403a766e610af29a239caf54b7553227906fc266
-rcl_interfaces/srv/SetParametersAtomically
-db0bd950ed5ed867a0e90b225e44dea382d762c0762ff3e0ee842190042a59e5
-31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8
-type_description_interfaces/srv/GetTypeDescription
-470f56ccbcf13d55c78c8b735fb12da03e639e5acded994426c89d94778d9e28
-648c49d976240861a482f961c5621ddd0d2135d8cce6f297a76d4f6376d93b75
+rcl_interfaces/srv/DescribeParameters 05dd1c2bc87dec26 ad6747319613c613
+rcl_interfaces/srv/GetParameterTypes 87d7ec5ef545d4da ac1335dce67c478e
+rcl_interfaces/srv/GetParameters 135a9e1c3d7cebef 9fa773b46e39cc5d
+rcl_interfaces/srv/ListParameters a1b0b5d6b967a5b8 31b937b82de36124
+rcl_interfaces/srv/SetParameters 130d46386b7e84ea 7a0e8140a0b8d983
+rcl_interfaces/srv/SetParametersAtomically db0bd950ed5ed867 31b1a38c5b0b9d89
+type_description_interfaces/srv/GetTypeDescription 470f56ccbcf13d55 648c49d976240861
 """
-#: The hashes of these services by their types and the hashes of their requests and responses.
-SERVICES: dict[tuple[str, str | None, str | None], str] = {
+_BEGINNING = len("RIHS01_") + 16
+#: The hashes of these services by their types and those beginnings.
+SERVICES: dict[tuple[str, ...], str] = {
     (name, f"RIHS01_{request}", f"RIHS01_{response}"): standard(name).hash
-    for name, request, response in zip(*[iter(_OF_NODES.split())] * 3, strict=True)
+    for name, request, response in map(str.split, _OF_NODES.strip().splitlines())
 }
 
 
@@ -87,7 +71,7 @@ class NodeInfo(NamedTuple):
 
 
 class _Cursor:
-    """Reads CDR; raises WireError where it ends early or is too large."""
+    """Reads CDR; raises WireError where it ends early."""
 
     def __init__(self, payload: bytes) -> None:
         self.order = "<" if payload[1:2] == b"\x01" else ">"
@@ -101,25 +85,19 @@ class _Cursor:
         self.at += size
         return self.data[self.at - size : self.at]
 
-    def count(self, most: int) -> int:
+    def count(self) -> int:
         """Return a length."""
         self.at += -self.at % 4
         (number,) = struct.unpack(self.order + "I", self.take(4))
-        if number > most:
-            raise WireError("too many")
         return int(number)
 
     def text(self) -> str:
-        """Return a string."""
-        data = self.take(self.count(_MOST_NAME))
-        try:
-            return data.rstrip(b"\0").decode("ascii")
-        except UnicodeDecodeError:
-            raise WireError("a name that is not ASCII") from None
+        """Return a string, which need not be a valid name."""
+        return self.take(self.count()).rstrip(b"\0").decode("ascii", "replace")
 
     def gids(self, size: int) -> tuple[bytes, ...]:
         """Return GUIDs."""
-        return tuple(self.take(size)[:GUID] for _ in range(self.count(_MOST_ENDS)))
+        return tuple(self.take(size)[:GUID] for _ in range(self.count()))
 
 
 def parse_info(payload: bytes) -> tuple[bytes, tuple[NodeInfo, ...]]:
@@ -140,7 +118,7 @@ def _parse(payload: bytes, size: int) -> tuple[bytes, tuple[NodeInfo, ...]]:
     guid = cursor.take(size)[:GUID]
     nodes = tuple(
         NodeInfo(cursor.text(), cursor.text(), cursor.gids(size), cursor.gids(size))
-        for _ in range(cursor.count(_MOST_NODES))
+        for _ in range(cursor.count())
     )
     if len(cursor.data) - cursor.at > 3:  # more than the padding
         raise WireError("a rest")
@@ -192,7 +170,7 @@ class RemoteNodes:
         self._domain = domain
         self._nodes: dict[bytes, tuple[NodeInfo, ...]] = {}
 
-    def learn(self, received: Received) -> bool:
+    def learn(self, received: wire.Data) -> bool:
         """Take a message of `ros_discovery_info`; return whether it is valid."""
         try:
             guid, nodes = parse_info(received.payload)
@@ -218,37 +196,28 @@ class RemoteNodes:
         the own ones by name and type.
         """
         self._nodes = {each: self._nodes[each] for each in prefixes if each in self._nodes}
-        owners: dict[bytes, _Owner] = {}
+        owners: dict[bytes, Entity | None] = {}
         for prefix, nodes in self._nodes.items():
             for number, node in enumerate(nodes):
-                owner = _Owner(self._domain, number, node.namespace, node.name)
-                if entity := _entity(prefix, owner, number, EntityKind.NODE):
-                    yield entity
+                owner = _node(self._domain, prefix, number, node.namespace, node.name)
+                if owner is not None:
+                    yield owner
                 owners |= dict.fromkeys((*node.readers, *node.writers), owner)
-        unknown = _Owner(self._domain, 0, "/", _UNKNOWN)
         sides = [(end, _side(end)) for end in endpoints]
         halves: dict[_Side, dict[str, str]] = {}
         for end, side in sides:
             halves.setdefault(side, {})[end.topic.partition("/")[0]] = end.hash
         for end, side in sides:
             _, name, type_, _ = side
-            of_nodes = SERVICES.get((type_, halves[side].get("rq"), halves[side].get("rr")), "")
-            service = hashes.get((name, type_), of_nodes)
+            told = (halves[side].get(half, "")[:_BEGINNING] for half in HALVES)
+            service = hashes.get((name, type_)) or SERVICES.get((type_, *told), "")
+            unknown = _node(self._domain, end.guid[: wire.PREFIX], 0, "/", _UNKNOWN)
             if entity := _endpoint(end, owners.get(end.guid, unknown), service):
                 yield entity
 
 
 def _size(nodes: tuple[NodeInfo, ...]) -> int:
     return sum(1 + len(node.readers) + len(node.writers) for node in nodes)
-
-
-class _Owner(NamedTuple):
-    """The node of an endpoint."""
-
-    domain: int
-    number: int
-    namespace: str
-    name: str
 
 
 def _names(end: EndpointData) -> tuple[str, str]:
@@ -271,40 +240,35 @@ def _side(end: EndpointData) -> _Side:
 
 
 @lru_cache(_MOST_CACHED)
-def _endpoint(end: EndpointData, owner: _Owner, service: str) -> Entity | None:
+def _node(domain: int, prefix: bytes, number: int, namespace: str, name: str) -> Entity | None:
+    """Return a node of another participant; `None` if its name is not valid."""
+    if not (is_namespace(namespace) and is_node_name(name)):
+        return None
+    return Entity(
+        domain=domain,
+        session=prefix.hex(),
+        node_id=number,
+        id=number,
+        kind=EntityKind.NODE,
+        namespace=namespace,
+        node=name,
+    )
+
+
+@lru_cache(_MOST_CACHED)
+def _endpoint(end: EndpointData, owner: Entity | None, service: str) -> Entity | None:
     """Return what ROS 2 shows of an endpoint; `None` if it shows nothing.
 
     `service` is the hash of a service if the participant tells none.
     """
     half = end.topic.partition("/")[0]
     kind, hash_ = _KINDS.get((half, end.is_writer)), end.hash
-    if kind is None:
+    name, type_ = _names(end)
+    if kind is None or owner is None or not is_absolute(name):
         return None
     if half in HALVES and not end.guid.startswith(wire.VENDOR):
         hash_ = service  # it told the hash of the request or of the response
     number = int.from_bytes(end.guid[12:15], "big")
-    name, type_ = _names(end)
-    more = {"name": name, "type": type_, "hash": hash_, "qos": end.qos}
-    return _entity(end.guid[: wire.PREFIX], owner, number, kind, **more)
-
-
-def _entity(
-    prefix: bytes, owner: _Owner, number: int, kind: EntityKind, **more: Any
-) -> Entity | None:
-    """Return an entity of another participant; `None` if a name or its type is not valid."""
-    is_valid = is_namespace(owner.namespace) and is_node_name(owner.name)
-    if not is_valid or (kind is not EntityKind.NODE and not is_absolute(more["name"])):
-        return None
-    try:
-        return Entity(
-            domain=owner.domain,
-            session=prefix.hex(),
-            node_id=owner.number,
-            id=number,
-            kind=kind,
-            namespace=owner.namespace,
-            node=owner.name,
-            **more,
-        )
-    except ValueError:
-        return None
+    with suppress(ValueError):  # it is not a type of ROS 2
+        return owner.replace(id=number, kind=kind, name=name, type=type_, hash=hash_, qos=end.qos)
+    return None

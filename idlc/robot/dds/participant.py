@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.discovery import EndpointData, Peer, fits
-from idlc.robot.dds.formats import Address, Outgoing, Received, Remote, Shared
+from idlc.robot.dds.formats import Address, Outgoing, Remote, Shared
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.writer import Writer
 
@@ -61,8 +61,7 @@ class Participant:
         self._changed = changed
         #: The own ends by their ids, and what was announced of them by their GUIDs.
         self._ends: dict[bytes, Writer | Reader] = {}
-        self._local: dict[bytes, EndpointData] = {}
-        self._numbers: dict[bytes, int] = {}
+        self._local: dict[bytes, tuple[EndpointData, int]] = {}
         self._removed: deque[tuple[Writer, int]] = deque()
         self._periods = iter(_PERIODS)
         self._announce_at = 0.0
@@ -90,7 +89,7 @@ class Participant:
         self._add(end, writer)
         return writer
 
-    def add_reader(self, end: EndpointData, deliver: Callable[[Received], None]) -> Reader:
+    def add_reader(self, end: EndpointData, deliver: Callable[[wire.Data], None]) -> Reader:
         """Announce a reader."""
         reader = Reader(end.guid, end.qos, deliver, self.shared)
         self._add(end, reader)
@@ -100,29 +99,28 @@ class Participant:
         self._ends[own.id] = own
         announcer = self._announcers[end.is_writer]
         announcer.write(discovery.format_endpoint(end))
-        self._numbers[end.guid] = announcer.last
-        for other in self._local.values():
+        for other, _ in self._local.values():
             near = self._ends[other.id]
             writer, reader = (own, near) if end.is_writer else (near, own)
             if fits(end, other) and isinstance(writer, Writer) and isinstance(reader, Reader):
                 writer.match_local(reader)
-        self._local[end.guid] = end
+        self._local[end.guid] = end, announcer.last
         for peer in self.peers.values():
             for other in peer.endpoints.values():
                 self._match(end, other, peer)
 
     def remove(self, guid: bytes) -> None:
         """Withdraw an endpoint; a second time does nothing."""
-        end = self._local.pop(guid, None)
-        if end is None:
+        if guid not in self._local:
             return
+        end, number = self._local.pop(guid)
         own = self._ends.pop(end.id)
         own.close()
         for writer in self._ends.values():
             if isinstance(writer, Writer):
                 writer.local = [reader for reader in writer.local if reader is not own]
         announcer = self._announcers[end.is_writer]
-        announcer.forget(self._numbers.pop(guid))
+        announcer.forget(number)
         announcer.write(b"", discovery.format_end(guid))
         self._removed.append((announcer, announcer.last))
         if len(self._removed) > _ENDS:
@@ -133,7 +131,7 @@ class Participant:
         """Tell all that this participant ends."""
         end = discovery.format_end(self.prefix + discovery.PARTICIPANT_ID)
         for peer in self.peers.values():
-            self._send(peer.meta, bytes(wire.PREFIX), self._edition + 1, end, b"")
+            self._announce(peer.meta, ended=end)
 
     def move(self, addresses: list[Address]) -> bool:
         """Announce these addresses of this participant from now on; return whether they are new."""
@@ -149,7 +147,7 @@ class Participant:
         if fits(own, other):
             self._ends[own.id].match(other.guid, peer.address(other), other.qos)
 
-    def _learn(self, sample: Received) -> None:
+    def _learn(self, sample: wire.Data) -> None:
         """Take an announcement of an endpoint."""
         peer = self.peers.get(sample.writer[: wire.PREFIX])
         if peer is None:
@@ -172,7 +170,7 @@ class Participant:
             self.refused += 1
             return
         peer.endpoints[end.guid] = end
-        for own in [*self._local.values()]:
+        for own, _ in [*self._local.values()]:
             self._match(own, end, peer)
         self._changed()
 
@@ -204,22 +202,18 @@ class Participant:
             self._lose(peer)
             peer = None
         if peer is None:
-            if len(self.peers) >= MOST_PEERS and not self._make_room():
-                self.refused += 1
-                return
+            if len(self.peers) >= MOST_PEERS:
+                strangers = (each for each in self.peers.values() if not each.is_known)
+                oldest = next(strangers, None)
+                if oldest is None:
+                    self.refused += 1
+                    return
+                del self.peers[oldest.prefix]
             peer = self.peers[about.prefix] = Peer(about, host, now)
         if peer.host == host:
             peer.about = about._replace(meta_port=peer.about.meta_port) if peer.is_known else about
             peer.seen = now
             self._greet(peer)
-
-    def _make_room(self) -> bool:
-        """Forget the oldest stranger."""
-        for peer in self.peers.values():
-            if not peer.is_known:
-                del self.peers[peer.prefix]
-                return True
-        return False
 
     def _greet(self, peer: Peer) -> None:
         """Announce this participant to one that does not know it yet, not for ever."""
@@ -232,15 +226,13 @@ class Participant:
         self._greetings += 1
         self._announce(peer.meta, peer.prefix)
 
-    def _announce(self, address: Address, prefix: bytes = bytes(wire.PREFIX)) -> None:
-        self._send(address, prefix, self._edition, b"", self._announcement)
-
-    def _send(
-        self, address: Address, prefix: bytes, number: int, inline: bytes, payload: bytes
-    ) -> None:
-        """Send a sample about this participant."""
+    def _announce(self, address: Address, prefix: bytes = wire.ALL, ended: bytes = b"") -> None:
+        """Send a sample about this participant, or about its end."""
         ids = discovery.SPDP_READER, discovery.SPDP_WRITER
-        part = formats.format_data(*ids, number, inline, payload)
+        number, payload = self._edition, self._announcement
+        if ended:
+            number, payload = number + 1, b""
+        part = formats.format_data(*ids, number, ended, payload)
         self.shared.send(Remote(prefix + ids[0], address, False), part)
 
     def _know(self, peer: Peer) -> None:
@@ -272,8 +264,7 @@ class Participant:
             return []
         peer = self.peers.get(prefix)
         for destination, part in parts:
-            is_for_all = destination == bytes(wire.PREFIX)
-            if prefix == self.prefix or not (is_for_all or destination == self.prefix):
+            if prefix == self.prefix or destination not in (self.prefix, wire.ALL):
                 continue
             if isinstance(part, wire.Data) and part.writer == discovery.SPDP_WRITER:
                 self._meet(part, source[0])
@@ -282,7 +273,7 @@ class Participant:
                 continue
             is_same_host = peer.host == source[0]
             if not peer.is_known:
-                if is_for_all or not is_same_host:
+                if destination == wire.ALL or not is_same_host:
                     continue
                 self._know(peer)
             peer.seen = now if is_same_host else peer.seen
@@ -293,24 +284,13 @@ class Participant:
         """Pass a part on to the end that it is for; without a reader, to all of its writer."""
         if isinstance(part, (wire.AckNack, wire.NackFragment)):
             writer, guid = self._ends.get(part.writer), prefix + part.reader
-            if isinstance(writer, Writer) and isinstance(part, wire.AckNack):
-                writer.acknack(guid, part)
-            elif isinstance(writer, Writer) and isinstance(part, wire.NackFragment):
-                writer.nack_fragment(guid, part)
+            if isinstance(writer, Writer):
+                writer.receive(guid, part)
             return
         guid = prefix + part.writer
-        ends = [self._ends.get(part.reader)] if any(part.reader) else [*self._ends.values()]
-        for reader in ends:
-            if not isinstance(reader, Reader) or guid not in reader.writers:
-                continue
-            if isinstance(part, wire.Data):
-                reader.data(guid, part)
-            elif isinstance(part, wire.Fragment):
-                reader.fragment(guid, part)
-            elif isinstance(part, wire.Heartbeat):
-                reader.heartbeat(guid, part)
-            else:
-                reader.gap(guid, part)
+        for reader in [*self.shared.matched.get(guid, ())]:
+            if part.reader in (reader.id, wire.ALL_READERS):
+                reader.receive(guid, part)
 
     @property
     def deadline(self) -> float:
@@ -331,7 +311,7 @@ class Participant:
             names = {peer.meta: peer.prefix for peer in self.peers.values() if not peer.is_known}
             known = [peer.meta for peer in self.peers.values() if peer.is_known]
             for address in dict.fromkeys((*self._searched, *known)):
-                self._announce(address, names.get(address, bytes(wire.PREFIX)))
+                self._announce(address, names.get(address, wire.ALL))
         return self.shared.collect()
 
     @property

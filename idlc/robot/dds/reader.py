@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
+from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
+from idlc.robot.dds.wire import Data
 from idlc.robot.qos import QoSProfile, ReliabilityPolicy
 
 #: Bytes of a sample.
@@ -64,7 +65,7 @@ class RemoteWriter(Remote):
         self.next: int | None = None
         #: The number of the newest sample that it has told of.
         self.last = 0
-        self.early: dict[int, Received | None] = {}
+        self.early: dict[int, Data | None] = {}
         self.partial: OrderedDict[int, _Partial] = OrderedDict()
         self.bytes = 0
         self.count = 0
@@ -79,7 +80,7 @@ class Reader:
         self,
         guid: bytes,
         qos: QoSProfile,
-        deliver: Callable[[Received], None],
+        deliver: Callable[[Data], None],
         shared: Shared,
         *,
         remembers: bool = True,
@@ -109,6 +110,7 @@ class Reader:
             return
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         writer = self.writers[guid] = RemoteWriter(guid, address, reliable)
+        self._shared.matched.setdefault(guid, []).append(self)
         if self._remembered:
             writer.next = self._remembered.pop(guid, None)
         if reliable:
@@ -124,6 +126,9 @@ class Reader:
         if (writer := self.writers.pop(guid, None)) is None:
             return
         self._release(writer, writer.bytes)
+        self._shared.matched[guid].remove(self)
+        if not self._shared.matched[guid]:
+            del self._shared.matched[guid]
         if writer.next is not None and self._remembered is not None:
             self._remembered[guid] = writer.next
             if len(self._remembered) > _MOST_REMEMBERED:
@@ -147,7 +152,7 @@ class Reader:
         writer.bytes -= size
         self._shared.free(writer.prefix, size)
 
-    def _drop(self, writer: RemoteWriter, number: int) -> Received | None:
+    def _drop(self, writer: RemoteWriter, number: int) -> Data | None:
         """Forget a sample that waits, or its fragments; return the sample."""
         if (partial := writer.partial.pop(number, None)) is not None:
             self._release(writer, partial.bytes)
@@ -155,15 +160,24 @@ class Reader:
             self._release(writer, len(sample.payload) + _OVERHEAD)
         return sample
 
-    def data(self, guid: bytes, part: wire.Data) -> None:
-        """Take a sample of a matched writer."""
-        self._take(self.writers[guid], Received(guid, *part[2:]))
+    def receive(self, guid: bytes, part: wire.Submessage) -> None:
+        """Take a part of a packet of a matched writer."""
+        writer = self.writers[guid]
+        if isinstance(part, Data):
+            self._take(writer, part)
+        elif isinstance(part, wire.Fragment):
+            self._fragment(writer, part)
+        elif writer.reliable and isinstance(part, wire.Heartbeat):
+            self._heartbeat(writer, part)
+        elif writer.reliable and isinstance(part, wire.Gap):
+            self._gap(writer, part)
 
-    def _take(self, writer: RemoteWriter, sample: Received) -> None:
+    def _take(self, writer: RemoteWriter, part: Data) -> None:
         if writer.next is None and not writer.reliable:
-            writer.next = sample.number
-        if writer.next is not None and sample.number < writer.next:
+            writer.next = part.number
+        if writer.next is not None and part.number < writer.next:
             return
+        sample = Data(part.reader, writer.guid, *part[2:])
         if not writer.reliable:
             writer.next = sample.number + 1
             self.deliver(sample)
@@ -189,12 +203,9 @@ class Reader:
             if sample is not None:
                 self.deliver(sample)
 
-    def fragment(self, guid: bytes, part: wire.Fragment) -> None:
-        """Take fragments of a matched writer; the last one completes the sample."""
-        writer = self.writers[guid]
-        if part.number in writer.early:
-            return
-        if writer.next is not None and part.number < writer.next:
+    def _fragment(self, writer: RemoteWriter, part: wire.Fragment) -> None:
+        """Take fragments; the last one completes the sample."""
+        if part.number in writer.early or part.number < (writer.next or 0):
             return
         if part.total > MOST_SAMPLE:
             writer.early.setdefault(part.number, None)  # else the reader would ask for ever
@@ -215,14 +226,11 @@ class Reader:
         if len(partial.parts) == partial.count:
             payload = b"".join(partial.parts[number] for number in range(1, partial.count + 1))
             self._drop(writer, part.number)
-            values = (guid, part.number, partial.parameters, payload, False, partial.time)
-            self._take(writer, Received(*values))
+            values = (*part[:3], partial.parameters, payload, False, partial.time)
+            self._take(writer, Data(*values))
 
-    def gap(self, guid: bytes, part: wire.Gap) -> None:
-        """Go on without numbers of a matched writer that never come."""
-        writer = self.writers[guid]
-        if not writer.reliable:
-            return
+    def _gap(self, writer: RemoteWriter, part: wire.Gap) -> None:
+        """Go on without numbers that never come."""
         if writer.next is None:
             writer.next = part.first
         if part.first <= writer.next < part.base:
@@ -239,11 +247,8 @@ class Reader:
                 self.deliver(sample)
         writer.next = number
 
-    def heartbeat(self, guid: bytes, part: wire.Heartbeat) -> None:
-        """Ask a matched writer for what is missing."""
-        writer = self.writers[guid]
-        if not writer.reliable:
-            return
+    def _heartbeat(self, writer: RemoteWriter, part: wire.Heartbeat) -> None:
+        """Ask for what is missing."""
         writer.last = part.last
         if writer.next is None:
             writer.next = part.first

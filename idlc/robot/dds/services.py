@@ -14,7 +14,7 @@ import msgspec
 from idlc.robot.dds import discovery, wire
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import EndpointData
-from idlc.robot.dds.formats import Received, is_cyclone
+from idlc.robot.dds.formats import is_cyclone
 from idlc.robot.dds.graph import HALVES, READER, WRITER, guid_of
 from idlc.robot.dds.reader import Reader
 from idlc.robot.dds.writer import Writer
@@ -57,7 +57,7 @@ class _Client:
         reader, writer = self.pair
         return bool(writer.local or (writer.readers and reader.writers))
 
-    def receive(self, received: Received) -> None:
+    def receive(self, received: wire.Data) -> None:
         """Take a reply; those to other clients arrive, too."""
         start = self.pair.reader.guid[:8]
         payload, named = discovery.unwrap(received, start)
@@ -88,7 +88,7 @@ class _Waiting(NamedTuple):
 class _Request:
     """A request, which is answered to the client that sent it."""
 
-    def __init__(self, services: Services, writer: Writer, received: Received) -> None:
+    def __init__(self, services: Services, writer: Writer, received: wire.Data) -> None:
         self._services = services
         self._writer = writer
         self.payload, named = discovery.unwrap(received, bytes(8))
@@ -119,7 +119,7 @@ class Services:
         self._waiting: list[_Waiting] = []
         self._settled_at = 0.0
 
-    def _pair(self, entity: Entity, deliver: Callable[[Received], None]) -> Pair:
+    def _pair(self, entity: Entity, deliver: Callable[[wire.Data], None]) -> Pair:
         """Declare the two ends of a service or a client."""
         qos = msgspec.structs.replace(entity.qos, depth=max(entity.qos.depth, _DEPTH))
         is_service = entity.kind is EntityKind.SERVICE
@@ -133,14 +133,10 @@ class Services:
             writer = participant.add_writer(ends[False])
             return Pair(participant.add_reader(ends[True], deliver), writer)
 
-    def withdraw(self, pair: Pair) -> None:
-        """Withdraw both ends."""
-        self._connection.remove(*(each.guid for each in pair))
-
     def serve(self, entity: Entity, callback: Callable[[Request], None]) -> Pair:
         """Declare a service."""
 
-        def deliver(received: Received) -> None:
+        def deliver(received: wire.Data) -> None:
             if not received.is_key:
                 callback(_Request(self, pair.writer, received))
 
@@ -159,7 +155,7 @@ class Services:
 
     def withdraw_client(self, entity: Entity) -> None:
         """Withdraw an announced client, which waits for nothing any more."""
-        self.withdraw(self._clients.pop(entity.id).pair)
+        self._connection.remove(*(each.guid for each in self._clients.pop(entity.id).pair))
 
     def call(
         self, client: _Client, payload: bytes, attachment: bytes, callback: OnReply, limit: float

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import NamedTuple
 
 from idlc.robot.dds import graph
 from idlc.robot.dds.address import Place
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import EndpointData
-from idlc.robot.dds.formats import Received
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
 from idlc.robot.dds.services import Services
+from idlc.robot.dds.wire import Data
 from idlc.robot.dds.writer import Writer, unpadded
 from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.names import dds_type
@@ -27,35 +29,26 @@ _SETTLED, _ALONE, _PATIENCE = 0.3, 1.0, 3.0
 _PERIOD = 0.05
 
 
-class _Closer:
-    """A declaration."""
-
-    def __init__(self, withdraw: Callable[[], None]) -> None:
-        self._withdraw: Callable[[], None] | None = withdraw
-
-    @property
-    def is_closed(self) -> bool:
-        """True after `close`."""
-        return self._withdraw is None
-
-    def close(self) -> None:
-        """Withdraw it."""
-        withdraw, self._withdraw = self._withdraw, None
-        if withdraw is not None:
-            withdraw()
+def _closing(withdraw: Callable[..., None], *args: object) -> Closeable:
+    """Return a declaration, which is withdrawn once."""
+    declaration = ExitStack()
+    declaration.callback(withdraw, *args)
+    return declaration
 
 
-class _Sender(_Closer):
-    def __init__(self, connection: Connection, writer: Writer) -> None:
-        super().__init__(lambda: connection.remove(writer.guid))
-        self._connection = connection
-        self._writer = writer
+class _Sender(NamedTuple):
+    connection: Connection
+    writer: Writer
 
     def put(self, payload: bytes, *, attachment: bytes) -> None:  # noqa: ARG002 - it is Zenoh's
         """Send a message."""
-        if self.is_closed:
+        if self.writer.is_closed:
             raise RuntimeError("the publisher is closed")
-        self._connection.write(self._writer, payload)
+        self.connection.write(self.writer, payload)
+
+    def close(self) -> None:
+        """Withdraw the writer."""
+        self.connection.remove(self.writer.guid)
 
 
 class DdsTransport:
@@ -86,6 +79,14 @@ class DdsTransport:
             self._infos = participant.add_reader(reader, self._learn)
         self._connection.start()
 
+    def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
+        """Receive on this thread."""
+        return self._connection.pump(timeout, is_idle)
+
+    def wake(self) -> None:
+        """End `pump`."""
+        self._connection.wake()
+
     def _guid(self, number: int, kind: bytes) -> bytes:
         return guid_of(self._connection.prefix, number, kind)
 
@@ -108,7 +109,7 @@ class DdsTransport:
     def subscriber(self, entity: Entity, callback: Callable[[Sample], None]) -> Closeable:
         """Declare a reader."""
 
-        def deliver(received: Received) -> None:
+        def deliver(received: Data) -> None:
             if not received.is_key:
                 sent = received.time or time.time_ns()
                 attachment = pack_attachment(received.number, sent, received.writer)
@@ -116,12 +117,12 @@ class DdsTransport:
 
         with self._connection.acting() as participant:
             reader = participant.add_reader(self._topic(entity, READER), deliver)
-        return _Closer(lambda: self._connection.remove(reader.guid))
+        return _closing(self._connection.remove, reader.guid)
 
     def service(self, entity: Entity, callback: Callable[[Request], None]) -> Closeable:
         """Declare the ends of a service."""
         pair = self._services.serve(entity, callback)
-        return _Closer(lambda: self._services.withdraw(pair))
+        return _closing(self._connection.remove, *(each.guid for each in pair))
 
     def call(
         self,
@@ -156,7 +157,7 @@ class DdsTransport:
             if entity.kind is EntityKind.CLIENT:
                 self._services.client(entity, is_announced=True)
             self._change()
-        return _Closer(lambda: self._conceal(entity))
+        return _closing(self._conceal, entity)
 
     def _conceal(self, entity: Entity) -> None:
         with self._connection.lock:
@@ -178,7 +179,7 @@ class DdsTransport:
         self._connection.write(self._info, payload)
         self._is_news, self._news_at = False, now + _PERIOD
 
-    def _learn(self, received: Received) -> None:
+    def _learn(self, received: Data) -> None:
         self._is_stale |= self._remote.learn(received)
 
     def _entities(self) -> dict[str, None]:
@@ -213,7 +214,7 @@ class DdsTransport:
             self._watchers.append(callback)
             for token in self._shown:
                 callback(token, True)
-        return _Closer(lambda: self._watchers.remove(callback))
+        return _closing(self._watchers.remove, callback)
 
     def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:  # noqa: ARG002
         """Yield the tokens that exist, as soon as the others have told all of theirs."""
@@ -237,8 +238,8 @@ class DdsTransport:
         """Return the variables that idlc does not use, and where it did not find anybody."""
         participant = self._connection.participant
         notes = [*self.place.notes]
-        if not participant.peers and self.place.is_local:
-            notes.append("idlc searched this machine only; `dds/HOST` also searches another one")
+        if not participant.peers:
+            notes.append(self.place.silence)
         if participant.without_udp:
             notes.append("some participants offer no UDP over IPv4; idlc does not see them")
         if participant.refused:

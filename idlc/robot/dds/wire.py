@@ -16,6 +16,8 @@ VENDOR = b"\x01\xee"
 #: The bytes of a participant's name, which begins each GUID, and of an endpoint in it.
 PREFIX = 12
 GUID = 16
+#: The names of all participants, and of all readers.
+ALL, ALL_READERS = bytes(PREFIX), bytes(GUID - PREFIX)
 #: A list of parameters in one payload has at most these.
 _MOST_PARAMETERS = 256
 #: The most bits of a set of numbers.
@@ -42,7 +44,10 @@ class WireError(ValueError):
 
 
 class Data(NamedTuple):
-    """A sample; without a payload, or with only a key, it says that an instance ended."""
+    """A sample; without a payload, or with only a key, it says that an instance ended.
+
+    Callbacks of readers get it with the GUID of the writer.
+    """
 
     reader: bytes
     writer: bytes
@@ -120,44 +125,37 @@ class Packet(NamedTuple):
 
 def parse_packet(data: bytes) -> Packet:
     """Return the parts of a packet up to a malformed one; raise WireError if it is not RTPS."""
-    if len(data) < 20 or data[:4] != b"RTPS" or data[4] != 2:
+    size = len(data)
+    if size < 20 or data[:4] != b"RTPS" or data[4] != 2:
         raise WireError("not RTPS")
     parts: list[tuple[bytes, Submessage]] = []
-    destination, time, at = bytes(PREFIX), 0, 20
-    while at + 4 <= len(data):
+    destination, time, at = ALL, 0, 20
+    while at + 4 <= size:
         kind, flags = data[at], data[at + 1]
         order = "<" if flags & LITTLE else ">"
         (length,) = struct.unpack_from(order + "H", data, at + 2)
-        at += 4
-        end = at + length
-        if length == 0 and kind not in (TIMESTAMP, 1):
-            end = len(data)
-        if end > len(data):
+        end = at + 4 + length if length or kind in (TIMESTAMP, 1) else size
+        content = data[at + 4 : end]
+        # one from another participant was forwarded, which nobody does for idlc
+        if end > size or kind == SOURCE:
             break
         try:
-            if kind == DESTINATION:
-                destination = _exactly(data[at:end], PREFIX)
+            if (parse := _PARSERS.get(kind)) is not None:
+                parts.append((destination, parse(content, order, flags, time)))
             elif kind == TIMESTAMP:
-                time = 0 if flags & 2 else _nanoseconds(data[at:end], order)
-            elif kind == SOURCE:
-                break  # forwarded for another participant, which nobody does for idlc
-            elif kind in _PARSERS:
-                parts.append((destination, _PARSERS[kind](data[at:end], order, flags, time)))
+                time = 0 if flags & 2 else _nanoseconds(content, order)
+            elif kind == DESTINATION:
+                (destination,) = struct.unpack_from("12s", content)
         except (struct.error, WireError):
             break
         at = end
     return Packet(data[8:20], data[6:8], tuple(parts))
 
 
-def _exactly(data: bytes, size: int) -> bytes:
-    if len(data) < size:
-        raise WireError("cut off")
-    return data[:size]
-
-
 def _nanoseconds(data: bytes, order: str) -> int:
     seconds, fraction = struct.unpack_from(order + "II", data)
-    return int(seconds) * 10**9 + (int(fraction) * 10**9 >> 32)
+    nanoseconds: int = seconds * 10**9 + (fraction * 10**9 >> 32)
+    return nanoseconds
 
 
 def _number(high: int, low: int) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from idlc.robot.dds import discovery, formats, wire
-from idlc.robot.dds.formats import Address, Received, Remote, Shared, is_cyclone
+from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
 from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
@@ -35,6 +35,7 @@ class HistorySample(NamedTuple):
     payload: bytes
     inline: bytes
     time: int
+    written: float
 
 
 def _padded(payload: bytes) -> bytes:
@@ -60,7 +61,7 @@ class Writer:
         self.readers: dict[bytes, RemoteReader] = {}
         self.local: list[Reader] = []
         self.history: OrderedDict[int, HistorySample] = OrderedDict()
-        self.last = 0
+        self.last, self.is_closed = 0, False
         self._shared = shared
         self._count = 0
         self._bytes = 0
@@ -70,6 +71,7 @@ class Writer:
         """Send to a reader from now on, and what is kept if both sides want that."""
         if guid in self.readers:
             return
+        self._expire()
         reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
         is_late = self.qos.is_latched and qos.is_latched
         first = next(iter(self.history), self.last + 1) if is_late else self.last + 1
@@ -85,6 +87,7 @@ class Writer:
 
     def match_local(self, reader: Reader) -> None:
         """Deliver to a reader of the same participant."""
+        self._expire()
         self.local.append(reader)
         if self.qos.is_latched and reader.qos.is_latched:
             for number, sample in [*self.history.items()]:
@@ -92,6 +95,7 @@ class Writer:
 
     def close(self) -> None:
         """Forget all readers."""
+        self.is_closed = True
         self.readers.clear()
         self.local.clear()
 
@@ -103,7 +107,7 @@ class Writer:
         """Send a sample to all readers; it stays in the history."""
         payload = _padded(payload)
         self.last += 1
-        sample = self.history[self.last] = HistorySample(payload, inline, time)
+        sample = self.history[self.last] = HistorySample(payload, inline, time, self._shared.now)
         self._bytes += len(payload)
         while self._bytes > MOST_HISTORY or len(self.history) == (self._depth or 0) + 1:
             if len(self.history) == 1:
@@ -121,6 +125,12 @@ class Writer:
             self.history.clear()
             self._bytes = 0
 
+    def _expire(self) -> None:
+        """Forget the samples whose lifespan has ended."""
+        limit = self._shared.now - self.qos.lifespan / 1e9
+        for number in [number for number, each in self.history.items() if each.written < limit]:
+            self.forget(number)
+
     def forget(self, number: int) -> None:
         """Remove a sample from the history."""
         if (sample := self.history.pop(number, None)) is not None:
@@ -128,9 +138,11 @@ class Writer:
 
     def _deliver(self, reader: Reader, number: int, sample: HistorySample) -> None:
         """Deliver a sample to a reader of the same participant."""
-        payload, inline, time = sample
+        payload, inline, time, _ = sample
         parameters = wire.parse_parameters(inline, 0, "<")[0] if inline else wire.NONE
-        reader.deliver(Received(self.guid, number, parameters, payload, not payload, time))
+        reader.deliver(
+            wire.Data(reader.id, self.guid, number, parameters, payload, not payload, time)
+        )
 
     def _send(
         self, reader: RemoteReader, number: int, *tail: bytes, chosen: Sequence[int] = ()
@@ -139,7 +151,7 @@ class Writer:
 
         `tail` follows in the same packet.
         """
-        payload, inline, time = self.history[number]
+        payload, inline, time, _ = self.history[number]
         if inline and payload and is_cyclone(reader.guid):
             payload, inline = discovery.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
@@ -157,13 +169,21 @@ class Writer:
         first = max(next(iter(self.history), self.last + 1), reader.start)
         return formats.format_heartbeat(reader.id, self.id, first, self.last, self._count)
 
-    def acknack(self, guid: bytes, part: wire.AckNack) -> None:
-        """Send what a reader lacks, or say that it never comes."""
+    def receive(self, guid: bytes, part: wire.AckNack | wire.NackFragment) -> None:
+        """Send again what a reader asks for."""
         reader = self.readers.get(guid)
-        if reader is None or not reader.reliable or part.base > self.last + 1:
+        if reader is None or not reader.reliable:
             return
-        if part.beat == reader.count:
-            return  # the network repeated it
+        if isinstance(part, wire.AckNack):
+            self._acknack(reader, part)
+        else:
+            self._nack_fragment(reader, part)
+
+    def _acknack(self, reader: RemoteReader, part: wire.AckNack) -> None:
+        """Send what a reader lacks, or say that it never comes."""
+        if part.base > self.last + 1 or part.beat == reader.count:
+            return  # the network repeats packets
+        self._expire()
         reader.count = part.beat
         reader.base = max(reader.base, part.base)
         reader.is_told |= part.base > 0
@@ -181,10 +201,9 @@ class Writer:
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
 
-    def nack_fragment(self, guid: bytes, part: wire.NackFragment) -> None:
+    def _nack_fragment(self, reader: RemoteReader, part: wire.NackFragment) -> None:
         """Send fragments again."""
-        reader = self.readers.get(guid)
-        if reader is None or not reader.reliable or part.number not in self.history:
+        if part.number not in self.history:
             return
         may_draw = self._shared.may_draw
         chosen = [each for each in part.missing if may_draw(reader.prefix, reader.size)]

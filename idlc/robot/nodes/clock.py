@@ -141,7 +141,13 @@ class Timer(Ready):
     def reset(self) -> None:
         """Begin a period now, also after `cancel`."""
         self.begin_period()
-        if self._executor is not None:
+        self.wake()
+
+    def wake(self) -> None:
+        """Queue a call that is due, or have the executor look when the next one is."""
+        if self.nanoseconds_left() <= 0:
+            super().wake()
+        elif self._executor is not None:
             self._executor.wake()
 
     def is_canceled(self) -> bool:

@@ -18,7 +18,7 @@ from idlc.robot.nodes.clock import Timer
 from idlc.robot.nodes.events import EventCallbacks, Events
 from idlc.robot.nodes.executor import Ready
 from idlc.robot.nodes.interfaces import M, interface_of
-from idlc.robot.qos import HistoryPolicy, QoSProfile, qos_profile
+from idlc.robot.qos import HistoryPolicy, LivelinessPolicy, QoSProfile, qos_profile
 from idlc.robot.transport import Closeable, Sample, unread_bytes
 from idlc.runtime.names import DecodeError
 from idlc.runtime.typeinfo import is_copy
@@ -185,6 +185,12 @@ class Publisher(Endpoint, Generic[M]):
             raise RobotError(f"`{self.topic_name}`: {one_line(str(error))}") from None
         if self.deadline is not None:
             self.deadline.begin_period()
+
+    def assert_liveliness(self) -> None:
+        """Do nothing, as the middleware does it; raise RobotError if the profile forbids that."""
+        if self.qos_profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC:
+            problem = f"`{self.topic_name}`: idlc does not assert liveliness by hand"
+            raise RobotError(problem, "use `LivelinessPolicy.AUTOMATIC`")
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions that receive the messages."""

@@ -18,6 +18,7 @@ from threading import Lock
 from typing import Any, TypeAlias, TypeVar
 
 from idlc.robot.nodes.context import Context, get_default_context
+from idlc.robot.transport import Transport
 
 T = TypeVar("T")
 #: On Windows, a signal does not interrupt a wait, so that no wait is longer than these seconds.
@@ -29,6 +30,14 @@ Callback: TypeAlias = Callable[[], Any]
 
 class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
     """The context was shut down, for example by SIGTERM, while an executor waited."""
+
+
+class ShutdownException(Exception):  # noqa: N818 - rclpy's name
+    """The executor was shut down while it waited for a callback."""
+
+
+class TimeoutException(Exception):  # noqa: N818 - rclpy's name
+    """No callback was ready in time."""
 
 
 class Future(futures.Future[T]):
@@ -99,7 +108,10 @@ async def call(callback: Callable[..., Any], *args: Any) -> Any:
 
 
 class CallbackGroup:
-    """Decides which callbacks may run while a coroutine of the group waits."""
+    """Decides which callbacks may run while a coroutine of the group waits.
+
+    Groups of one's own can override `beginning_execution` and `ending_execution`.
+    """
 
     #: Functions to call at the end of the callback that runs; `None` if others need not wait.
     waiting: list[Callback] | None = None
@@ -124,6 +136,13 @@ class CallbackGroup:
         for resume in waiting or ():
             resume()
 
+    def beginning_execution(self, entity: Any) -> bool:  # noqa: ARG002 - for groups of one's own
+        """Return whether a callback may run now; else it is tried again after the next one."""
+        return True
+
+    def ending_execution(self, entity: Any) -> None:
+        """Take note that a callback has ended."""
+
 
 class MutuallyExclusiveCallbackGroup(CallbackGroup):
     """One callback at a time, coroutines included; each node has such a group as the default."""
@@ -138,6 +157,7 @@ class Ready:
 
     def __init__(self, group: CallbackGroup | None) -> None:
         self.callback_group = group or ReentrantCallbackGroup()
+        self.node: Any = None
         self._executor: Executor | None = None
         self._is_queued = False
 
@@ -167,14 +187,34 @@ class Ready:
             waiting = []
         if not group.begin(waiting, partial(executor.schedule, self.run, executor)):
             return False
+        if not group.beginning_execution(self):
+            group.end(waiting)
+            executor.refused.append(self)
+            return False
         self._is_queued = False
         callback = self.take()
         if callback is None:
-            group.end(waiting)
+            self._end(waiting)
             return False
-        future: Future[Any] = Future(executor=executor)
-        future.wake_at_end(partial(group.end, waiting))
-        return executor.step(future, callback)
+        return executor.begin(self, callback, partial(self._end, waiting))
+
+    def _end(self, waiting: list[Callback] | None) -> None:
+        self.callback_group.ending_execution(self)
+        self.callback_group.end(waiting)
+
+
+class Task(Future[Any]):
+    """A callback that an executor of one's own runs by a call, on any thread."""
+
+    def __init__(self, executor: Executor, callback: Callback, end: Callback) -> None:
+        super().__init__(executor=executor)
+        self._callback = callback
+        self.wake_at_end(end)
+
+    def __call__(self) -> None:
+        """Run the callback; `result` and `exception` return what came of it."""
+        with suppress(BaseException):
+            Executor.step(self.executor, self, self._callback)  # type: ignore[arg-type]
 
 
 class Executor(AbstractContextManager["Executor"]):
@@ -190,6 +230,12 @@ class Executor(AbstractContextManager["Executor"]):
         # its `put` may be called in signal handlers
         self._queue: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._is_shutdown = False
+        #: The transport of the last node, which receives while the executor waits.
+        self.transport: Transport | None = None
+        #: What its callback group did not let run.
+        self.refused: list[Ready] = []
+        #: What `wait_for_ready_callbacks` returns, while it waits.
+        self._found: list[tuple[Task, Ready, Any]] | None = None
         self.context.sleepers.add(self)
 
     def add_node(self, node: Any) -> bool:
@@ -215,6 +261,23 @@ class Executor(AbstractContextManager["Executor"]):
         self.schedule(self.step, future, work)
         return future
 
+    def begin(self, ready: Ready, callback: Callback, end: Callback) -> bool:
+        """Run a callback, and call `end` after it; a coroutine goes on as a task."""
+        if self._found is not None:
+            self._found.append((Task(self, callback, end), ready, ready.node))
+            return True
+        try:
+            result = callback()
+        except BaseException:
+            end()
+            raise
+        if not iscoroutine(result):  # most callbacks are functions; a future is slow to make
+            end()
+            return True
+        future: Future[Any] = Future(executor=self)
+        future.wake_at_end(end)
+        return self.step(future, result)
+
     def step(self, future: Future[Any], work: Any) -> bool:
         """Run a function, or a coroutine to its next `await`; the future gets the result."""
         if future.done():
@@ -238,6 +301,8 @@ class Executor(AbstractContextManager["Executor"]):
     def schedule(self, work: Callable[..., bool], *args: Any) -> None:
         """Append to the queue, from any thread; `work` returns whether it ran a callback."""
         self._queue.put(partial(work, *args))
+        if self.transport is not None:
+            self.transport.wake()
 
     def wake(self) -> None:
         """End the current wait, so that the executor looks at timers and the context again."""
@@ -270,11 +335,29 @@ class Executor(AbstractContextManager["Executor"]):
     def spin_until_future_complete(self, future: Future[Any], timeout_sec: Limit = None) -> None:
         """Run callbacks until the future is done or cancelled, or the time is over."""
         end = _end(timeout_sec)
-        future.wake_at_end(self.wake)
+        future.wake_at_end(partial(self.schedule, lambda: True))
         while not future.done() and self.context.ok() and not self._is_shutdown:
-            self._spin_once(end)
+            self.spin_once(timeout_sec=max(0.0, end - time.monotonic()))
             if time.monotonic() >= end:
                 return
+
+    def wait_for_ready_callbacks(self, timeout_sec: Limit = None) -> tuple[Task, Ready, Any]:
+        """Wait for a callback; return a task that runs it, its entity, and its node.
+
+        The `spin_once` of an executor of one's own calls it. Raises TimeoutException,
+        ShutdownException, and ExternalShutdownException.
+        """
+        end, self._found = _end(timeout_sec), []
+        try:
+            while not self._found:
+                if self._is_shutdown:
+                    raise ShutdownException
+                self._spin_once(end)
+                if not self._found and time.monotonic() >= end:
+                    raise TimeoutException
+            return self._found[0]
+        finally:
+            self._found = None
 
     def _spin_once(self, end: float) -> bool:
         """Take from the queue once; return whether a callback ran, or the time is over."""
@@ -283,10 +366,22 @@ class Executor(AbstractContextManager["Executor"]):
         waits = [timer.wake_if_ready() for node in self._nodes for timer in node.timers]
         wait = min(_TICK, end - time.monotonic(), *waits)
         try:
-            work = self._queue.get(timeout=max(0.0, wait))
+            work = self._next(max(0.0, wait))
         except Empty:
             return time.monotonic() >= end
-        return work()
+        has_run = work()
+        if has_run and self.refused:
+            refused, self.refused = self.refused, []
+            for ready in refused:
+                self.schedule(ready.run, self)
+        return has_run
+
+    def _next(self, wait: float) -> Callable[[], bool]:
+        """Return work from the queue; raise Empty if there is none for so many seconds or less."""
+        is_idle = self._queue.empty
+        if is_idle() and self.transport is not None and self.transport.pump(wait, is_idle):
+            wait = 0.0
+        return self._queue.get(block=wait > 0, timeout=wait)
 
 
 SingleThreadedExecutor = Executor
@@ -299,15 +394,22 @@ class MultiThreadedExecutor(Executor):
         super().__init__(context=context)
         self._pool = futures.ThreadPoolExecutor(num_threads or max(2, os.cpu_count() or 2))
 
+    def begin(self, ready: Ready, callback: Callback, end: Callback) -> bool:
+        """Run a callback in a thread."""
+        return self._submit(super().begin, ready, callback, end)
+
     def step(self, future: Future[Any], work: Any) -> bool:
         """Run a function, or a coroutine to its next `await`, in a thread."""
+        return self._submit(super().step, future, work)
+
+    def _submit(self, work: Callable[..., bool], *args: Any) -> bool:
         with suppress(RuntimeError):  # the executor is shut down
-            self._pool.submit(self._step, future, work)
+            self._pool.submit(self._run, work, *args)
         return True
 
-    def _step(self, future: Future[Any], work: Any) -> None:
+    def _run(self, work: Callable[..., bool], *args: Any) -> None:
         try:
-            super().step(future, work)
+            work(*args)
         except BaseException as error:
             self.schedule(_fail, error)
 

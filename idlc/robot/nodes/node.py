@@ -121,6 +121,8 @@ class Node(HasParameters):
     def attach(self, executor: Executor | None) -> None:
         """Run callbacks in this executor; called by it."""
         self.executor = executor
+        if executor is not None:
+            executor.transport = self.transport
         for part in (*self.timers, *self.endpoints):
             # a coroutine of another executor does not go on
             part.callback_group.waiting = None
@@ -130,6 +132,7 @@ class Node(HasParameters):
         """Have the executor run the callbacks of a timer or an endpoint."""
         parts: list[Any] = self.timers if isinstance(part, Timer) else self.endpoints
         parts.append(part)
+        part.node = self
         part.attach(self.executor)
 
     def destroy_timer(self, part: Timer | Endpoint) -> bool:

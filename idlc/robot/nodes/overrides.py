@@ -1,5 +1,6 @@
 """Values of parameters from the command line: `-p name:=value`, and YAML files of ROS 2.
 
+They also come from other nodes, to which AsyncParameterClient sends them.
 Values have the types that ROS 2 gives them, which is neither YAML 1.1 nor 1.2: `1:30` and `null`
 are strings, `y` is true, `010` is 8, `1e3` is a double.
 """
@@ -7,8 +8,9 @@ are strings, `y` is true, `010` is 8, `1e3` is a double.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,10 +20,20 @@ from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.nodes.arguments import Arguments
 from idlc.robot.nodes.interfaces import standard
-from idlc.robot.parameters import Parameter, ParameterAlreadyDeclaredException
-from idlc.robot.qos import QoSPolicyKind, QoSProfile, qos_profile
+from idlc.robot.parameters import (
+    PARAMETER_SERVICES,
+    Parameter,
+    ParameterAlreadyDeclaredException,
+)
+from idlc.robot.qos import (
+    QoSPolicyKind,
+    QoSProfile,
+    qos_profile,
+    qos_profile_services_default,
+)
 
 _MARK = "ros__parameters"
+_ANY = "/**"
 _PLAIN = "!plain"
 _STRING = "tag:yaml.org,2002:str"
 _TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
@@ -51,15 +63,18 @@ def overrides_of(arguments: Arguments, node: str) -> dict[str, Parameter]:
     the name of a node means any name, `**` any names. Raises RobotError.
     """
     parameters: dict[str, Parameter] = {}
+    fits = partial(_matches, node)
     for path in arguments.parameter_files:
-        parameters.update(_read(node, path))
+        parameters.update(_read(fits, path))
     for only, name, text in arguments.overrides:
-        parameters.update(_read(node, f"-p {name}:={text}", text, only or "/**", _MARK, name))
+        parameters.update(_read(fits, f"-p {name}:={text}", text, only or _ANY, _MARK, name))
     return parameters
 
 
-def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[str, Parameter]:
-    """Return the parameters for a node in a file, or in a text that belongs below names."""
+def _read(
+    fits: Callable[[str], bool], source: str, text: str | None = None, *names: str
+) -> dict[str, Parameter]:
+    """Return the parameters for nodes in a file, or in a text that belongs below names."""
     parameters: dict[str, Parameter] = {}
     mark = None
     try:
@@ -71,7 +86,7 @@ def _read(node: str, source: str, text: str | None = None, *names: str) -> dict[
                 raise ValueError(f"expected `node:`, `{_MARK}:` and `name: value`")
             end = path.index(_MARK)
             parameter = Parameter(".".join(path[end + 1 :]), value=_value(value))
-            if _matches("/".join(path[:end]), node):
+            if fits("/".join(path[:end])):
                 parameters[parameter.name] = parameter
     except (OSError, yaml.YAMLError, RecursionError, TypeError, ValueError) as error:
         mark = getattr(error, "problem_mark", None) or mark
@@ -92,7 +107,7 @@ def _entries(node: yaml.Node, *names: str) -> Iterator[tuple[tuple[str, ...], ya
         yield from _entries(value, *names, key.value)
 
 
-def _matches(pattern: str, node: str) -> bool:
+def _matches(node: str, pattern: str) -> bool:
     name = node.strip("/").split("/")
     reached = {0}
     for part in filter(None, pattern.split("/")):
@@ -124,6 +139,117 @@ def _value(node: yaml.Node) -> object:
     if _DOUBLE.fullmatch(text):
         return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
     return text
+
+
+def parameter_dict_from_yaml_file(
+    parameter_file: str,
+    use_wildcard: bool = False,
+    target_nodes: Sequence[str] = (),
+    namespace: str = "",
+) -> dict[str, Any]:
+    """Return the parameters in a file as messages by their names, of all nodes or some.
+
+    `use_wildcard` adds those for `/**`. Raises RobotError.
+    """
+    found = _read(lambda node: use_wildcard and node == _ANY, parameter_file)
+    found |= _read(lambda node: node != _ANY and node in (target_nodes or (node,)), parameter_file)
+    messages = [parameter.to_parameter_msg() for parameter in found.values()]
+    for message in messages:
+        message.name = f"{namespace}.{message.name}" if namespace else message.name
+    return {message.name: message for message in messages}
+
+
+class AsyncParameterClient:
+    """Asks another node about its parameters; methods return the future of a response.
+
+    `node` is a Node. `callback` gets the future when it is done.
+    """
+
+    def __init__(
+        self,
+        node: Any,
+        remote_node_name: str,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: Any = None,
+    ) -> None:
+        self.node, self.remote_node_name = node, remote_node_name
+        self._clients = {
+            verb: node.create_client(
+                standard(f"rcl_interfaces/srv/{verb.title().replace('_', '')}"),
+                f"{remote_node_name}/{verb}",
+                qos_profile=qos_profile,
+                callback_group=callback_group,
+            )
+            for verb in PARAMETER_SERVICES
+        }
+
+    def services_are_ready(self) -> bool:
+        """Return whether the node has all services of parameters."""
+        return all(client.service_is_ready() for client in self._clients.values())
+
+    def wait_for_services(self, timeout_sec: float | None = None) -> bool:
+        """Wait for the services of the node; return whether they are there."""
+        client: Any = self._clients["list_parameters"]
+        return bool(client.wait_for(self.services_are_ready, timeout_sec))
+
+    def _ask(self, verb: str, callback: Any, **values: Any) -> Any:
+        client = self._clients[verb]
+        future = client.call_async(client.interface.kind.Request(**values))
+        if callback is not None:
+            future.add_done_callback(callback)
+        return future
+
+    def list_parameters(
+        self, prefixes: Sequence[str] | None = None, depth: int | None = None, callback: Any = None
+    ) -> Any:
+        """Ask for the names of parameters, at most `depth` parts longer than a prefix."""
+        values = {"prefixes": [*(prefixes or ())], "depth": depth or 0}
+        return self._ask("list_parameters", callback, **values)
+
+    def get_parameters(self, names: Sequence[str], callback: Any = None) -> Any:
+        """Ask for values."""
+        return self._ask("get_parameters", callback, names=names)
+
+    def get_parameter_types(self, names: Sequence[str], callback: Any = None) -> Any:
+        """Ask for types."""
+        return self._ask("get_parameter_types", callback, names=names)
+
+    def describe_parameters(self, names: Sequence[str], callback: Any = None) -> Any:
+        """Ask for descriptors."""
+        return self._ask("describe_parameters", callback, names=names)
+
+    def set_parameters(self, parameters: Iterable[Any], callback: Any = None) -> Any:
+        """Set parameters one by one; each is a Parameter or its message."""
+        return self._ask("set_parameters", callback, parameters=_messages(parameters))
+
+    def set_parameters_atomically(self, parameters: Iterable[Any], callback: Any = None) -> Any:
+        """Set all of the parameters or none."""
+        return self._ask("set_parameters_atomically", callback, parameters=_messages(parameters))
+
+    def delete_parameters(self, names: Iterable[str], callback: Any = None) -> Any:
+        """Set parameters to NOT_SET."""
+        return self.set_parameters(map(Parameter, names), callback)
+
+    def load_parameter_file(
+        self, parameter_file: str, use_wildcard: bool = False, callback: Any = None
+    ) -> Any:
+        """Set the parameters in a file."""
+        messages = parameter_dict_from_yaml_file(parameter_file, use_wildcard)
+        return self.set_parameters(messages.values(), callback)
+
+    def load_parameter_file_atomically(
+        self, parameter_file: str, use_wildcard: bool = False, callback: Any = None
+    ) -> Any:
+        """Set all of the parameters in a file or none."""
+        messages = parameter_dict_from_yaml_file(parameter_file, use_wildcard)
+        return self.set_parameters_atomically(messages.values(), callback)
+
+
+def _messages(parameters: Iterable[Any]) -> list[Any]:
+    return [
+        parameter.to_parameter_msg() if isinstance(parameter, Parameter) else parameter
+        for parameter in parameters
+    ]
 
 
 class InvalidQosOverridesError(Exception):
