@@ -26,8 +26,9 @@ from idlc.cli import completion, options
 )
 @click.option("--strict", is_flag=True, help="Also fail on warnings.")
 @click.option(
-    "--prefix",
-    metavar="DIR",
+    "--ament",
+    "prefix",
+    metavar="PREFIX",
     type=click.Path(),
     help="Check whether C++ tools can load the packages in this install prefix.",
 )
@@ -54,7 +55,7 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
         if word and not is_selector(word):
             raise click.UsageError(f"{word!r} is not a rule; {similar_selector(word)}")
     if arguments["prefix"] is not None and (paths or arguments["fix"] or arguments["diff"]):
-        raise click.UsageError("--prefix checks an install prefix; omit PATH, --fix and --diff")
+        raise click.UsageError("--ament checks an install prefix; omit PATH, --fix and --diff")
     if arguments["diff"] and arguments["style"] != "text":
         raise click.UsageError("--diff writes text; omit --format")
     return check_paths(paths, **arguments)

@@ -18,7 +18,7 @@ from idlc.cli import completion, options
         "idlc columns rec.mcap /imu --where 'linear_acceleration.z > 12'",
         "idlc columns rec.mcap -o columns/",
         "idlc columns rec.mcap /imu /joints:position --grid /imu -o train.parquet",
-        "idlc columns 'ep_*.mcap' /camera /joints:position --grid 30Hz --lerobot train/",
+        "idlc columns 'ep_*.mcap' /camera /joints:position --grid 30Hz --format lerobot -o train/",
     ),
 )
 @click.argument("subject", metavar="REC", type=click.Path())
@@ -36,9 +36,11 @@ from idlc.cli import completion, options
 @click.option(
     "--format",
     "style",
-    type=click.Choice(("text", "parquet", "arrow", "csv")),
+    type=click.Choice(("text", "parquet", "arrow", "csv", "lerobot")),
     help="Output format. By default, idlc uses the format of OUT's extension. If OUT is a folder, "
-    "it writes Parquet files.",
+    "it writes Parquet files. `lerobot` needs --grid PERIOD and a new folder OUT: idlc writes a "
+    "data set for LeRobot, in version 3.0 of its format, with an episode for each REC. Images "
+    "become videos.",
 )
 @click.option(
     "--fields",
@@ -90,27 +92,20 @@ from idlc.cli import completion, options
     help="With --grid: use the time of recording (`log`) or of `header.stamp` (`header`).",
 )
 @click.option(
-    "--lerobot",
-    metavar="DIR",
-    type=click.Path(),
-    help="With --grid PERIOD: write a new data set for LeRobot, in version 3.0 of its format, with "
-    "an episode for each REC. Images become videos.",
-)
-@click.option(
     "--feature",
     "features",
     metavar="NAME=COLUMN,...",
     multiple=True,
-    help="With --lerobot: make feature NAME of these columns, as in `action=/cmd_vel.linear`. Each "
-    "other TOPIC becomes a feature, such as `observation.imu`.",
+    help="With --format lerobot: make feature NAME of these columns, such as "
+    "`action=/cmd_vel.linear`. Each other TOPIC becomes a feature, such as `observation.imu`.",
 )
 @click.option(
     "--episodes",
     metavar="TOPIC",
-    help="With --lerobot: begin an episode at each message of TOPIC, and end the one before. The "
-    "field `data` can be the text of --task. If it is empty or false, no episode begins.",
+    help="With --format lerobot: each message of TOPIC ends an episode and begins the next one. "
+    "The field `data` can be the text of --task. If it is empty or false, no episode begins.",
 )
-@click.option("--task", metavar="TEXT", help="With --lerobot: describe what the robot does.")
+@click.option("--task", metavar="TEXT", help="With --format lerobot: describe what the robot does.")
 @click.option(
     "--each",
     metavar="FIELD",
@@ -119,25 +114,15 @@ from idlc.cli import completion, options
 )
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(
-    "--datetimes/--no-datetimes",
-    default=True,
-    show_default=True,
-    help="Convert each Time and Duration to one column.",
+    "--no-datetimes", is_flag=True, help="Do not convert each Time and Duration to one column."
 )
 @click.option(
     "--check/--no-check",
     default=None,
     help="Verify the checksums of the recording. By default, idlc verifies them only if it finds "
-    "damage, such as a missing end.",
+    "damage, such as a missing end. With --no-check, idlc ignores all checksums and indexes.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
-@click.option(
-    "--index/--no-index",
-    "use_index",
-    default=True,
-    show_default=True,
-    help="Use the indexes of MCAP files.",
-)
 @click.option(
     "--type",
     "type_name",

@@ -21,7 +21,13 @@ class _Command(click.Command):
 
 
 @click.command("gen", cls=_Command, epilog=EPILOG)
-@click.argument("paths", metavar="PATH|PACKAGE|TYPE|REC...", nargs=-1, type=click.Path())
+@click.argument(
+    "paths",
+    metavar="PATH|PACKAGE|TYPE|REC...",
+    nargs=-1,
+    type=click.Path(),
+    shell_complete=completion.topics_and_paths,
+)
 @click.option("-o", "--out", metavar="OUT", type=click.Path(), help="Output folder.")
 @click.option(
     "--ament",
@@ -29,14 +35,6 @@ class _Command(click.Command):
     type=click.Path(),
     default="",
     help="Install into this prefix, for ROS 2's tools.",
-)
-@click.option(
-    "--topic",
-    "topics",
-    metavar="NAME",
-    multiple=True,
-    shell_complete=completion.topics,
-    help="Use only this recorded topic. Repeatable.",
 )
 @options.packages
 @options.distro
@@ -52,11 +50,6 @@ class _Command(click.Command):
     help="Also copy types of other packages that you use.",
 )
 @click.option(
-    "--runtime",
-    type=click.Choice(["carried", "installed"]),
-    help="Copy the shared code into the package (`carried`, the default), or import idlc-runtime.",
-)
-@click.option(
     "--force",
     is_flag=True,
     help="Also replace files that idlc did not write, and keep backups.",
@@ -66,8 +59,9 @@ def command(**arguments: Any) -> int:
     """Compile interface files into a Python package.
 
     PATH is a file or folder, PACKAGE and TYPE are names such as std_msgs and std_msgs/msg/Header,
-    and REC is a recording. idlc writes the package to the folder OUT, or several packages to
-    OUT/NAME. Without arguments, it compiles the package in the working folder.
+    and REC is a recording, which topics to select can follow (`drive.mcap /odom`). idlc writes the
+    package to the folder OUT, or several packages to OUT/NAME. Without arguments, it compiles the
+    package in the working folder.
 
     With --ament, `source PREFIX/setup.bash` makes the packages available to ROS 2.
     """

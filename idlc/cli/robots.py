@@ -58,7 +58,8 @@ def call_command(**arguments: Any) -> None:
 @click.option(
     "--fields",
     metavar="FIELD,...",
-    help="Print only these fields, such as `header.stamp,position[0]`. idlc decodes nothing else.",
+    help="Print only these fields, such as `header.stamp,position[0]`. `position.elbow` is the "
+    "element that the message names `elbow`.",
 )
 @options.output_style(
     ("yaml", "json", "csv"), "Output format: YAML documents, one JSON object per line, or CSV."
@@ -110,6 +111,7 @@ def record_command(**arguments: Any) -> bool:
 
 
 @click.command("router", epilog=options.example("idlc router"))
+@click.argument("connect", metavar="[ADDRESS]...", nargs=-1)
 @click.option(
     "--listen",
     metavar="ENDPOINT",
@@ -119,14 +121,10 @@ def record_command(**arguments: Any) -> bool:
     help="Accept connections at this endpoint. `tcp/0.0.0.0:7447` admits other machines. May be "
     "repeated.",
 )
-@click.option(
-    "--connect",
-    metavar="ENDPOINT",
-    multiple=True,
-    help="Also connect to this router, such as `tcp/robot:7447`. May be repeated.",
-)
 def router_command(**arguments: Any) -> int:
     """Run a Zenoh router for ROS 2 nodes. It replaces rmw_zenohd. Ctrl-C stops it.
+
+    ADDRESS is another router to connect to, such as tcp/robot:7447.
 
     Nodes on one machine find each other through the router. Other machines can reach the router
     only if --listen admits them.

@@ -59,11 +59,11 @@ def command() -> None:
 
 def writing(function: Command) -> Command:
     """Add the options of a command that writes files."""
-    dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the changes.")
+    diff = click.option("--diff", "dry_run", is_flag=True, help="Write nothing; show the changes.")
     force = click.option(
         "--force", is_flag=True, help="Replace existing files that differ, and keep backups."
     )
-    return dry(force(function))
+    return diff(force(function))
 
 
 def common(function: Command) -> Command:
@@ -93,7 +93,6 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
 @click.option(
     "--interfaces",
-    "--interfaces-only",
     "interfaces_only",
     is_flag=True,
     help="Create a package that contains only interfaces. CMake builds it for nodes in any "

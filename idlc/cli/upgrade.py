@@ -6,10 +6,10 @@ from typing import Any
 
 import click
 
-from idlc.cli import options
+from idlc.cli import completion, options
 
 EPILOG = options.example(
-    "idlc upgrade rec.mcap --to distro:lyrical --dry-run",
+    "idlc upgrade rec.mcap --to distro:lyrical --diff",
     "idlc upgrade rec.mcap --to distro:lyrical -o upgraded",
 )
 
@@ -22,7 +22,14 @@ EPILOG += "\n" + options.example(
 
 
 @click.command("upgrade", epilog=EPILOG)
-@click.argument("paths", metavar="REC...", nargs=-1, required=True, type=click.Path())
+@click.argument(
+    "paths",
+    metavar="REC... [TOPIC]...",
+    nargs=-1,
+    required=True,
+    type=click.Path(),
+    shell_complete=completion.topics_and_paths,
+)
 @click.option(
     "-o",
     "--out",
@@ -44,13 +51,6 @@ EPILOG += "\n" + options.example(
     "of Humble.",
 )
 @click.option(
-    "--topic",
-    "topics",
-    metavar="TOPIC",
-    multiple=True,
-    help="Upgrade only this topic. May be repeated.",
-)
-@click.option(
     "--rules",
     metavar="PATH",
     multiple=True,
@@ -64,7 +64,12 @@ EPILOG += "\n" + options.example(
     type=click.Path(),
     help="Write a Python file with a function for each field that needs a rule.",
 )
-@click.option("--dry-run", is_flag=True, help="Show how idlc converts each changed field.")
+@click.option(
+    "--diff",
+    "dry_run",
+    is_flag=True,
+    help="Write nothing; show how idlc converts each changed field.",
+)
 @click.option(
     "--allow-loss",
     is_flag=True,
@@ -78,10 +83,12 @@ EPILOG += "\n" + options.example(
 def command(**arguments: Any) -> int:
     """Convert recordings to the current versions of their types.
 
-    REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc compares
-    the recorded definitions with the new ones. Added fields get their defaults, removed fields are
-    dropped, and numbers get wider types. Other changes need a rule: a Python function that returns
-    the value of the new field.
+    REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. With TOPIC,
+    idlc upgrades only these topics.
+
+    idlc compares the recorded definitions with the new ones. Added fields get their defaults,
+    removed fields are dropped, and numbers get wider types. Other changes need a rule: a Python
+    function that returns the value of the new field.
     """
     from idlc.cli.run.upgrade import run
 

@@ -711,7 +711,8 @@ def obtaining(draft: Draft) -> list[str]:
     """Return the commands after which a repository contains what its CI runs."""
     text = "".join(draft.text(path) or "" for path in draft.reasons)
     if "./tools/idlc" in text:  # the action installs the wheel
-        return [_WHEEL, _ACTION, "git add --force wheels tools/idlc"]
+        ignored = "touch tools/idlc/COLCON_IGNORE"  # by checks of this package
+        return [_WHEEL, _ACTION, ignored, "git add --force wheels tools/idlc"]
     return [_WHEEL, "git add --force wheels"] if "wheels/idlc" in text else []
 
 

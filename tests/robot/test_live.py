@@ -178,6 +178,16 @@ def test_fields_are_printed_without_the_rest(robot, address, capsys):
         {"name[1]": None, "position": [], "header.stamp": {"sec": 0, "nanosec": 0}},
         {"name[1]": "b", "position": [0.5, 0.5], "header.stamp": {"sec": 0, "nanosec": 0}},
     ]
+    assert main([*words, "position.b,velocity.b,position.c,name[0]"]) == 0
+    out, err = capsys.readouterr()
+    absent = {"position.b": None, "velocity.b": None, "position.c": None, "name[0]": None}
+    assert list(map(json.loads, out.splitlines())) == [
+        absent,
+        {**absent, "position.b": 0.5, "name[0]": "a"},
+    ]
+    assert err == ""
+    assert main([*words, "effort.elbw"]) == 0
+    assert main([*words, "name.b"]) == 2
     assert main([*words, "positoin"]) == 2
     assert "did you mean `position`?" in capsys.readouterr().err
 

@@ -657,13 +657,13 @@ def test_a_service_gets_the_file_of_the_documents(service, after, path, project,
 def test_a_service_gets_the_idlc_that_it_runs(project, capsys):
     """A workflow needs idlc in the repository; pre-commit needs a fixed commit of a clone."""
     (block,) = re.findall(r"(?ms)^```sh\n(python3 -I.*?)^```$", (DOCS / "ci.md").read_text())
-    wheel, action, added = block.splitlines()
+    wheel, action, ignored, added = block.splitlines()
     git("init", "-q")
     git("init", "-q", "../idlc")
     git("commit", "-q", "--allow-empty", "-m", "one", cwd="../idlc")
     write_all(SAMPLES["ament_cmake"].files)
     expected = {
-        "github": [wheel, action, added],
+        "github": [wheel, action, ignored, added],
         "gitlab": [wheel, added.removesuffix(" tools/idlc")],
         "pre-commit": [],
     }
