@@ -202,7 +202,7 @@ Example:
   echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
   idlc gen demo -o out/demo
 
-Complete commands, options, types and codes in bash, zsh or fish:
+To complete words with the Tab key in bash, zsh or fish, run the first, second or third line:
 
 \b
   eval "$(_IDLC_COMPLETE=bash_source idlc)"

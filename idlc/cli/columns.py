@@ -65,18 +65,18 @@ from idlc.cli import completion, options
 @click.option(
     "--grid",
     metavar="GRID",
-    help="Write one table with all topics: a row for each message of topic GRID, or for each "
-    "period, such as `100ms` or `30Hz`. An argument such as `/imu:orientation` selects fields of "
-    "a topic. Before it writes, idlc shows for each topic how many rows have a value, and how old "
-    "these values are.",
+    help="Write one table with all topics. GRID is a topic, each message of which becomes a row, "
+    "or the period between two rows, such as `100ms` or `30Hz`. A TOPIC such as "
+    "`/imu:orientation` selects fields. Before it writes, idlc shows for each topic how many rows "
+    "have a value, and how old these values are.",
 )
 @click.option(
     "--how",
     metavar="WAY",
     multiple=True,
-    help="With --grid: take the `last` message before a row, the `nearest`, or a value between two "
-    "(`linear`). To set it for a single topic, write `/imu=linear`. --tolerance and --clock "
-    "take the same form, such as `/imu=50ms`.",
+    help="With --grid: which value a row has. WAY is `last` (of the last message before the row), "
+    "`nearest`, or `linear` (interpolated). For a single topic, write `/imu=linear`. --tolerance "
+    "and --clock take the same form, such as `/imu=50ms`.",
 )
 @click.option(
     "--tolerance",
@@ -89,23 +89,25 @@ from idlc.cli import completion, options
     "--clock",
     metavar="CLOCK",
     multiple=True,
-    help="With --grid: use the time of recording (`log`) or of `header.stamp` (`header`).",
+    help="With --grid: which time a message has. CLOCK is `log` (the time of recording) or "
+    "`header` (the field `header.stamp`).",
 )
 @click.option(
     "--feature",
     "features",
     metavar="NAME=COLUMN,...",
     multiple=True,
-    help="With --format lerobot: make feature NAME of these columns, such as "
-    "`action=/cmd_vel.linear`. Each other TOPIC becomes a feature, such as `observation.imu`.",
+    help="With --format lerobot: combine these columns into the feature NAME, as "
+    "in `action=/cmd_vel.linear`. Each other TOPIC becomes a feature, such as `observation.imu`.",
 )
 @click.option(
     "--episodes",
     metavar="TOPIC",
     help="With --format lerobot: each message of TOPIC ends an episode and begins the next one. "
-    "The field `data` can be the text of --task. If it is empty or false, no episode begins.",
+    "The field `data` of the message can contain its --task. If `data` is empty or false, no "
+    "episode begins.",
 )
-@click.option("--task", metavar="TEXT", help="With --format lerobot: describe what the robot does.")
+@click.option("--task", metavar="TEXT", help="With --format lerobot: the robot's task, in words.")
 @click.option(
     "--each",
     metavar="FIELD",
@@ -114,7 +116,9 @@ from idlc.cli import completion, options
 )
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(
-    "--no-datetimes", is_flag=True, help="Do not convert each Time and Duration to one column."
+    "--no-datetimes",
+    is_flag=True,
+    help="Write each Time and Duration as two columns, `sec` and `nanosec`.",
 )
 @click.option(
     "--check/--no-check",

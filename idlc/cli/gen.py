@@ -34,7 +34,7 @@ class _Command(click.Command):
     metavar="PREFIX",
     type=click.Path(),
     default="",
-    help="Install into this prefix, for ROS 2's tools.",
+    help="Install into the folder PREFIX, for ROS 2's tools.",
 )
 @options.packages
 @options.distro
@@ -47,7 +47,7 @@ class _Command(click.Command):
     is_flag=False,
     flag_value="private",
     metavar="",
-    help="Also copy types of other packages that you use.",
+    help="Also compile types of other packages that yours uses.",
 )
 @click.option(
     "--force",
@@ -59,11 +59,11 @@ def command(**arguments: Any) -> int:
     """Compile interface files into a Python package.
 
     PATH is a file or folder, PACKAGE and TYPE are names such as std_msgs and std_msgs/msg/Header,
-    and REC is a recording, which topics to select can follow (`drive.mcap /odom`). idlc writes the
-    package to the folder OUT, or several packages to OUT/NAME. Without arguments, it compiles the
-    package in the working folder.
+    and REC is a recording (`drive.mcap /odom` selects a topic). idlc writes the package to the
+    folder OUT, or several packages to OUT/NAME. Without arguments, it compiles the package in the
+    working folder.
 
-    With --ament, `source PREFIX/setup.bash` makes the packages available to ROS 2.
+    After `idlc gen --ament PREFIX`, ROS 2 finds the packages if you source PREFIX/setup.bash.
     """
     from idlc.cli.run.gen import run
 

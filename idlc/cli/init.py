@@ -18,7 +18,7 @@ from idlc.cli import options
     "--ci",
     "service",
     type=click.Choice(["github", "gitlab", "pre-commit"]),
-    help="Also write the configuration with which this service checks the interfaces.",
+    help="Also write a file with which this service checks the interfaces.",
 )
 @click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 def command(**arguments: Any) -> int:

@@ -16,8 +16,8 @@ from idlc.cli import completion, options
 def list_command(**arguments: Any) -> None:
     """List the packages that idlc can find, or the interfaces in each PACKAGE.
 
-    idlc searches the working folder, the -I folders and the ament prefixes. It also contains the
-    standard packages of each distribution.
+    idlc searches the working folder, the -I folders and the folders in AMENT_PREFIX_PATH. The
+    standard packages of each distribution are a part of idlc.
     """
     from idlc.cli.run.look import list_names
 

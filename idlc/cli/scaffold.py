@@ -90,7 +90,12 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
     default="",
     help="Maintainer of the package.  [default: git's user.name and user.email]",
 )
-@click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
+@click.option(
+    "--license",
+    "licence",
+    type=click.Choice(LICENSES),
+    help="License of the package.  [default: Apache-2.0]",
+)
 @click.option(
     "--interfaces",
     "interfaces_only",

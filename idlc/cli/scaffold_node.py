@@ -87,9 +87,11 @@ def _role_options(function: Any) -> Any:
 def command(**arguments: Any) -> int:
     """Create a node in the package that contains the working folder.
 
-    idlc writes the module and a test. It adds the command to setup.py and the dependencies to
-    package.xml. It also adds the node to the launch file, unless the node performs a single task
-    and exits.
+    Each option from --publisher to --action-client adds an endpoint to the node.
+
+    idlc writes the module and a test. It adds the node's command to setup.py and the dependencies
+    to package.xml. It also adds the node to the launch file, unless the node only sends a request
+    or a goal and then exits.
     """
     from idlc.cli.run.scaffold import new_node
 

@@ -55,8 +55,8 @@ EPILOG += "\n" + options.example(
     metavar="PATH",
     multiple=True,
     type=click.Path(),
-    help="Run the rules in this Python file or folder. Without --rules, idlc runs no rules. May be "
-    "repeated.",
+    help="Run the rules in this Python file or folder. Without --rules, idlc runs no rules. "
+    "Repeatable.",
 )
 @click.option(
     "--write-rules",

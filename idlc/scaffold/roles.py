@@ -215,7 +215,7 @@ ROLES: tuple[Role, ...] = (
             "rclpy.action.client": ("ActionClient",),
         },
         kind="action",
-        help="Execute goals, which clients can cancel and, with --robust, replace.",
+        help="Execute goals. Clients can cancel them and, with --robust, replace them.",
         answer="act",
         summary="Executes {} goals",
         family="action",
