@@ -15,6 +15,7 @@ from typing import Any
 import click
 import msgspec
 
+from idlc.api.reader import Absent, field_reader, reader
 from idlc.diagnostics.ci import Form, silenced
 from idlc.diagnostics.text import one_line
 from idlc.runtime.names import ValidationError
@@ -79,8 +80,6 @@ def fields_of(
     `complain` is called if the first message has no element of a name, such as `position.elbow`.
     Raises ValueError for paths that the class does not have.
     """
-    from idlc.api.reader import Absent, field_reader, reader
-
     elements: dict[str, Any] = {}
     try:
         reader(kind, *paths)  # which names all that are wrong
