@@ -199,6 +199,8 @@ def test_unknown_names_and_robots_are_errors(robot, address, capsys):
     assert main(["call", address, "/word"]) == 2
     assert main(["record", address, "-o", "a.mcap", "/word"]) == 2
     assert not Path("a.mcap").exists()
+    assert main(["show", "ddss"]) == 2
+    assert "did you mean `dds`?" in capsys.readouterr().err
     assert main(["show", "tcp/localhost"]) == 2
     assert "IDL642" in capsys.readouterr().err
     assert main(["columns", address]) != 0
