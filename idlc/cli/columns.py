@@ -51,7 +51,8 @@ from idlc.cli import completion, options
     "--from",
     "start",
     metavar="TIME",
-    help="Start time: an offset from the start (`10` or `1m30s`), a ROS time, or a UTC date.",
+    help="Start time: an offset from the start (`10` or `1m30s`), a ROS time such as "
+    "`1700000000.5`, or a UTC date.",
 )
 @click.option("--to", "end", metavar="TIME", help="End time (exclusive).")
 @click.option(
@@ -65,18 +66,17 @@ from idlc.cli import completion, options
 @click.option(
     "--grid",
     metavar="GRID",
-    help="Write one table with all topics. GRID is a topic, each message of which becomes a row, "
-    "or the period between two rows, such as `100ms` or `30Hz`. A TOPIC such as "
-    "`/imu:orientation` selects fields. Before it writes, idlc shows for each topic how many rows "
-    "have a value, and how old these values are.",
+    help="Write one table with all topics. If GRID is a topic, each of its messages becomes a row. "
+    "If GRID is a period, such as `100ms` or `30Hz`, there is a row for each period. Before it "
+    "writes, idlc shows for each topic how many rows have a value, and how old these values are.",
 )
 @click.option(
     "--how",
     metavar="WAY",
     multiple=True,
     help="With --grid: which value a row has. WAY is `last` (of the last message before the row), "
-    "`nearest`, or `linear` (interpolated). For a single topic, write `/imu=linear`. --tolerance "
-    "and --clock take the same form, such as `/imu=50ms`.",
+    "`nearest`, or `linear` (interpolated). `/imu=linear` is for the topic /imu alone. "
+    "--tolerance and --clock take the same form, such as `/imu=50ms`.",
 )
 @click.option(
     "--tolerance",
@@ -97,17 +97,22 @@ from idlc.cli import completion, options
     "features",
     metavar="NAME=COLUMN,...",
     multiple=True,
-    help="With --format lerobot: combine these columns into the feature NAME, as "
-    "in `action=/cmd_vel.linear`. Each other TOPIC becomes a feature, such as `observation.imu`.",
+    help="With --format lerobot: combine these columns of the table into NAME, a feature of the "
+    "data set, as in `action=/cmd_vel.linear`. A topic that no --feature names becomes a feature "
+    "of its own: /imu becomes `observation.imu`.",
 )
 @click.option(
     "--episodes",
     metavar="TOPIC",
-    help="With --format lerobot: each message of TOPIC ends an episode and begins the next one. "
-    "The field `data` of the message can contain its --task. If `data` is empty or false, no "
-    "episode begins.",
+    help="With --format lerobot: each message of TOPIC ends the current episode. It also begins "
+    "the next one, unless its field `data` is false or an empty text. Another text in `data` is "
+    "the task of the next episode.",
 )
-@click.option("--task", metavar="TEXT", help="With --format lerobot: the robot's task, in words.")
+@click.option(
+    "--task",
+    metavar="TEXT",
+    help="With --format lerobot: the robot's task, in words, if --episodes does not give it.",
+)
 @click.option(
     "--each",
     metavar="FIELD",
@@ -123,8 +128,9 @@ from idlc.cli import completion, options
 @click.option(
     "--check/--no-check",
     default=None,
-    help="Verify the checksums of the recording. By default, idlc verifies them only if it finds "
-    "damage, such as a missing end. With --no-check, idlc ignores all checksums and indexes.",
+    help="Verify all checksums of the recording. By default, idlc verifies them only if it finds "
+    "other damage, such as a missing end. --no-check is for recordings with wrong checksums or "
+    "indexes: idlc uses neither.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @click.option(
@@ -140,8 +146,9 @@ def command(**arguments: Any) -> int:
     """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.
 
     REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc reads
-    several recordings as one recording. Without TOPIC, it reads all topics. In the table of a
-    topic, each row is a message. The columns are the recording time and the fields.
+    several recordings as one recording. TOPIC is the name of a topic. With --grid,
+    `/imu:orientation` selects a field of a topic. Without TOPIC, idlc reads all topics. In the
+    table of a topic, each row is a message. The columns are the recording time and the fields.
     """
     from idlc.cli.run.columns import run
 

@@ -23,12 +23,18 @@ class _Command(click.Command):
 @click.command("gen", cls=_Command, epilog=EPILOG)
 @click.argument(
     "paths",
-    metavar="PATH|PACKAGE|TYPE|REC...",
+    metavar="[PATH|PACKAGE|TYPE|REC]...",
     nargs=-1,
     type=click.Path(),
     shell_complete=completion.topics_and_paths,
 )
-@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="Output folder.")
+@click.option(
+    "-o",
+    "--out",
+    metavar="OUT",
+    type=click.Path(),
+    help="Output folder.  [default: `out` in pyproject.toml]",
+)
 @click.option(
     "--ament",
     metavar="PREFIX",
@@ -47,7 +53,7 @@ class _Command(click.Command):
     is_flag=False,
     flag_value="private",
     metavar="",
-    help="Also compile types of other packages that yours uses.",
+    help="Also compile the types of other packages that your package uses.",
 )
 @click.option(
     "--force",

@@ -57,9 +57,10 @@ def doctor_command(**arguments: Any) -> None:
 @click.command("explain", epilog=options.example("idlc explain wide-string"))
 @click.argument("code", metavar="[CODE]", required=False, shell_complete=completion.codes)
 def explain_command(**arguments: Any) -> int:
-    """Explain what a rule reports and why, with a bad and a good example.
+    """Explain a problem that idlc reports, with a bad and a good example.
 
-    CODE is an id such as IDL201 or a name such as unknown-type. Without CODE, idlc lists all rules.
+    CODE is an id such as IDL201 or a name such as unknown-type. Without CODE, idlc lists all
+    codes.
     """
     from idlc.cli.run.look import explain
 

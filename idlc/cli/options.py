@@ -52,7 +52,7 @@ def typed(*without: str) -> tuple[str, ...]:
 package = click.option(
     "--package",
     metavar="NAME",
-    help="Package name.  [default: from package.xml]",
+    help="Name of the ROS 2 package.  [default: from package.xml, or the folder's name]",
 )
 include = click.option(
     "-I",
@@ -66,7 +66,7 @@ exclude = click.option(
     "--exclude",
     metavar="PATTERN",
     multiple=True,
-    help="Exclude files (`msg/ros1/**`). Repeatable.",
+    help="Exclude interface files (`msg/ros1/**`). Repeatable.",
 )
 
 

@@ -101,12 +101,13 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
     "interfaces_only",
     is_flag=True,
     help="Create a package that contains only interfaces. CMake builds it for nodes in any "
-    "language, and pip builds it for Python. INTERFACE is an interface to create, such as "
-    "`Drive` or `srv/Ask`.",
+    "language, and pip builds it for Python.",
 )
 @common
 def package_command(**arguments: Any) -> int:
     """Create a package that you can build with colcon and install with pip.
+
+    INTERFACE is an interface to create, such as `Drive` or `srv/Ask`, and needs --interfaces.
 
     Each build of the package compiles the interfaces in its msg/, srv/ and action/ folders.
     `idlc init` creates the same package in an empty folder, with an example, and compiles it.

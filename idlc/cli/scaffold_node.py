@@ -12,8 +12,9 @@ from idlc.cli.scaffold import common
 from idlc.scaffold.roles import QOS_NAMES, ROLES
 
 EPILOG = """\
-TYPE is an interface in your package (RobotCommand) or in another package (std_msgs/String). If you
-give no endpoints on a terminal, idlc asks for them.
+TYPE is an interface in your package (RobotCommand) or in another package (std_msgs/String). For
+--param, TYPE is bool, int, float or string. If you give no endpoints on a terminal, idlc asks for
+them.
 
 Example, within a package:
 
@@ -81,7 +82,8 @@ def _role_options(function: Any) -> Any:
     "--robust",
     is_flag=True,
     help="Also handle rare cases: a signal while the node starts, a goal that is replaced or "
-    "cancelled, a server that does not answer.",
+    "cancelled, a server that does not answer. A node that calls a service or sends a goal takes "
+    "the values of its fields from the command line.",
 )
 @common
 def command(**arguments: Any) -> int:

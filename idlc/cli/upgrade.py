@@ -41,7 +41,7 @@ EPILOG += "\n" + options.example(
     "--to",
     metavar="PATH|REC|git:REF|distro:NAME",
     help="The types to upgrade to: a package folder, another recording, a git revision, or the "
-    "standard interfaces of a distribution. By default, idlc uses the types of this machine.",
+    "standard interfaces of a distribution. By default, idlc takes types that `idlc list` finds.",
 )
 @click.option(
     "--from",
@@ -55,8 +55,7 @@ EPILOG += "\n" + options.example(
     metavar="PATH",
     multiple=True,
     type=click.Path(),
-    help="Run the rules in this Python file or folder. Without --rules, idlc runs no rules. "
-    "Repeatable.",
+    help="Run the rules in this Python file or folder. Repeatable.",
 )
 @click.option(
     "--write-rules",
@@ -73,8 +72,8 @@ EPILOG += "\n" + options.example(
 @click.option(
     "--allow-loss",
     is_flag=True,
-    help="If a type was removed, keep its messages under the old type. Without this option, idlc "
-    "reports an error.",
+    help="Accept that a type was removed: copy its messages unchanged, under the old type. Without "
+    "this option, idlc reports an error.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @options.packages
@@ -87,8 +86,10 @@ def command(**arguments: Any) -> int:
     idlc upgrades only these topics.
 
     idlc compares the recorded definitions with the new ones. Added fields get their defaults,
-    removed fields are dropped, and numbers get wider types. Other changes need a rule: a Python
-    function that returns the value of the new field.
+    removed fields are dropped, and a number is converted if its new type can hold each value of the
+    old type. Other changes need a rule: a Python function that returns the value of the new field.
+
+    --package, -I, --exclude and --distro are about the new types.
     """
     from idlc.cli.run.upgrade import run
 
