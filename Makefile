@@ -184,7 +184,7 @@ playground: $(SITE_ENV)/installed ## write the playground into build/site/playgr
 release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
 	$(RELEASE_ENV)/bin/python -m maintenance.release check $(ARGS)
 
-runtime-wheel: $(TEST_ENV)/installed ## build idlc-runtime, what --runtime installed imports, into dist/
+runtime-wheel: $(TEST_ENV)/installed ## build idlc-runtime, what packages with runtime = "installed" import, into dist/
 	$(TEST_ENV)/bin/python -m build --outdir dist maintenance/runtime
 
 lock: ## choose the versions for CI again, and write down their hashes

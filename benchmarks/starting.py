@@ -60,7 +60,7 @@ def scaffold(work: Work):
     """Return candidates that make a package of interfaces."""
     python, folder = place(work)
     name = "made_msgs"
-    options = ("--interfaces-only",)
+    options = ("--interfaces",)
     commands = {IDLC: [python, "-m", "idlc", "scaffold", "package", name, *options]}
     if installed(PEER):
         words = [python, "-m", "ros2_pkg_create", *PEER_OPTIONS, "--package-name", name, "."]

@@ -55,7 +55,7 @@ class Condition(NamedTuple):
         """
         if not (isinstance(self.operator, str) and self.operator in OPERATORS):
             raise ValueError(f"`{self.operator}` is not one of {' '.join(OPERATORS)}")
-        element = _named_element(kind, self.path)
+        element = named_element(kind, self.path)
         type_ = type_at(kind, f"{element.values}[0]" if element else self.path)
         try:
             return self._replace(value=_comparable(self.value, type_, start))
@@ -65,13 +65,13 @@ class Condition(NamedTuple):
             raise ValueError(problem) from None
 
 
-def _named_element(kind: type, path: str) -> ListElement | None:
+def named_element(kind: type, path: str) -> ListElement | None:
     """Return the element that a path names, as in `position.elbow`, or None for other paths."""
     element = element_of(structure_of(kind), path) if isinstance(path, str) else None
     return element if element and element.names else None
 
 
-class _ElementReader:
+class ElementReader:
     """Reads the element that a path names; raises Absent for a message without it."""
 
     def __init__(self, kind: type, element: ListElement) -> None:
@@ -83,6 +83,7 @@ class _ElementReader:
         self.others: dict[str, None] | None = {}
 
     def __call__(self, view: Raw) -> Any:
+        """Return the element; raise Absent if the message lacks it."""
         names, values = self.read(view)
         index = self.element.index_in(names, values)
         if self.element.name in names:
@@ -132,16 +133,16 @@ class Filter:
 
     def __init__(self, kind: type, conditions: tuple[Condition, ...]) -> None:
         self.absent = 0
-        self._elements: list[_ElementReader] = []
+        self._elements: list[ElementReader] = []
         self._parts = [
             (self._reader(kind, path), OPERATORS[sign], value) for path, sign, value in conditions
         ]
 
     def _reader(self, kind: type, path: str) -> Callable[[Raw], Any]:
-        element = _named_element(kind, path)
+        element = named_element(kind, path)
         if element is None:
             return field_reader(kind, (path,), True, True)
-        self._elements.append(_ElementReader(kind, element))
+        self._elements.append(ElementReader(kind, element))
         return self._elements[-1]
 
     def matches(self, view: Raw) -> bool:

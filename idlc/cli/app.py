@@ -157,6 +157,14 @@ SYNONYMS = {
     **dict.fromkeys(("rule", "rules", "why", "codes"), "explain"),
 }
 
+#: Options of other tools and of earlier versions, with the options here.
+OPTION_SYNONYMS = {
+    "--dry-run": "--diff",
+    "--lerobot": "--format",
+    "--no-index": "--no-check",
+    "--prefix": "--ament",
+}
+
 
 class App(LazyGroup):
     """The group of all commands, which `idlc help` explains too."""
@@ -194,7 +202,7 @@ Example:
   echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
   idlc gen demo -o out/demo
 
-Complete commands, options, types and codes in bash, zsh or fish:
+To complete words with the Tab key in bash, zsh or fish, run the first, second or third line:
 
 \b
   eval "$(_IDLC_COMPLETE=bash_source idlc)"
@@ -234,8 +242,9 @@ def _through_click(words: list[str]) -> object:
 
         context = getattr(error, "ctx", None)
         message, _, hint = error.format_message().partition("; ")
-        if isinstance(error, click.NoSuchOption) and error.possibilities:
-            message, hint = error.message, f"did you mean `{error.possibilities[0]}`?"
+        if isinstance(error, click.NoSuchOption):
+            similar = _similar_option(error)
+            message, hint = error.message, f"did you mean `{similar}`?" if similar else ""
         missing = error.param if isinstance(error, click.MissingParameter) else None
         if context and "address" in context.params and isinstance(missing, click.Argument):
             address = shlex.quote(context.params["address"])
@@ -251,3 +260,12 @@ def _through_click(words: list[str]) -> object:
         return 2
     except click.Abort as error:
         raise KeyboardInterrupt from error
+
+
+def _similar_option(error: click.NoSuchOption) -> str | None:
+    """Return the option of the command that may have been meant."""
+    synonym = OPTION_SYNONYMS.get(error.option_name)
+    parameters = error.ctx.command.params if error.ctx else []
+    if any(synonym in (*each.opts, *each.secondary_opts) for each in parameters):
+        return synonym
+    return next(iter(error.possibilities or ()), None)

@@ -51,6 +51,8 @@ EPILOG += "\n" + options.example(
 def command(**arguments: Any) -> int:
     """Compare two versions of interfaces and report breaking changes.
 
+    PATH is a file or folder with the new version. --against names the old version.
+
     idlc assigns one or more of these levels to each breaking change:
 
     \b
@@ -59,16 +61,16 @@ def command(**arguments: Any) -> int:
     source     code that uses the interface fails
     behaviour  the same code behaves differently
 
-    With distro:NAME, idlc compares two versions of each standard interface that PATH uses: the
-    version in your distribution and the version in the distribution NAME. Without PATH, it compares
-    all standard interfaces.
+    With --against distro:NAME, idlc compares two versions of each standard interface that PATH
+    uses: the version in your distribution and the version in the distribution NAME. Without PATH,
+    it compares all standard interfaces.
 
-    With a recording, idlc reports changes that prevent programs with your interfaces from reading
+    With --against REC, idlc reports changes that prevent programs with your interfaces from reading
     the recording. If PATH is a recording, too, idlc compares the recorded types with each other.
     Without PATH, it compares every recorded type with the type on this machine.
 
-    With `graph` or the address of a robot, idlc reports each type that running nodes use in
-    different versions. It also compares these versions with your files and your installed packages.
+    With --against graph or ADDRESS, idlc reports each type that running nodes use in different
+    versions. It also compares these versions with your files and your installed packages.
     """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli.run.breaking import run
 

@@ -26,10 +26,12 @@ from idlc.cli import completion, options
 )
 @click.option("--strict", is_flag=True, help="Also fail on warnings.")
 @click.option(
-    "--prefix",
-    metavar="DIR",
+    "--ament",
+    "prefix",
+    metavar="PREFIX",
     type=click.Path(),
-    help="Check whether C++ tools can load the packages in this install prefix.",
+    help="Instead of PATH, check the packages that are installed in the folder PREFIX: can C++ "
+    "tools load them?",
 )
 @options.packages
 @options.distros
@@ -41,8 +43,8 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
     pyproject.toml, idlc checks the package that the file belongs to. Without PATH, idlc checks the
     `paths` in pyproject.toml. If `paths` is not set, idlc checks the working folder.
 
-    If you select several distributions, idlc reports each problem once and names the affected
-    distributions.
+    If you name several distributions, idlc reports each problem once, with the distributions that
+    it affects.
 
     The categories of rules are correctness, portability, style and package. `idlc explain` lists
     all rules.
@@ -54,7 +56,7 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
         if word and not is_selector(word):
             raise click.UsageError(f"{word!r} is not a rule; {similar_selector(word)}")
     if arguments["prefix"] is not None and (paths or arguments["fix"] or arguments["diff"]):
-        raise click.UsageError("--prefix checks an install prefix; omit PATH, --fix and --diff")
+        raise click.UsageError("--ament checks an install prefix; omit PATH, --fix and --diff")
     if arguments["diff"] and arguments["style"] != "text":
         raise click.UsageError("--diff writes text; omit --format")
     return check_paths(paths, **arguments)
@@ -77,12 +79,12 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
 def fmt_command(**arguments: Any) -> int:
     """Normalize whitespace and keep deliberate alignment.
 
-    idlc leaves a wide gap unchanged if the gap aligns names or comments in a column, or if every
-    line of the block has the same gap. If the lines above and below a line are aligned, idlc aligns
-    that line with them. Every other gap becomes one space, or two spaces before a comment. idlc
-    puts spaces on both sides of `=` or on neither side, and keeps at most two consecutive empty
-    lines. If idlc changes a file, it also removes trailing whitespace and adds a missing final
-    newline.
+    idlc keeps a wide gap that aligns names or comments in a column. It also keeps a wide gap that
+    all lines up to the next empty line have. If the lines above and below a line are aligned, idlc
+    aligns that line with them. Every other gap becomes one space, or two spaces before a comment.
+    idlc puts spaces on both sides of `=` or on neither side, and keeps at most two consecutive
+    empty lines. If idlc changes a file, it also removes trailing whitespace and adds a missing
+    final newline.
 
     Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
     as in `idlc check`.

@@ -18,7 +18,7 @@ from idlc.cli import completion, options
         "idlc columns rec.mcap /imu --where 'linear_acceleration.z > 12'",
         "idlc columns rec.mcap -o columns/",
         "idlc columns rec.mcap /imu /joints:position --grid /imu -o train.parquet",
-        "idlc columns 'ep_*.mcap' /camera /joints:position --grid 30Hz --lerobot train/",
+        "idlc columns 'ep_*.mcap' /camera /joints:position --grid 30Hz --format lerobot -o train/",
     ),
 )
 @click.argument("subject", metavar="REC", type=click.Path())
@@ -36,9 +36,11 @@ from idlc.cli import completion, options
 @click.option(
     "--format",
     "style",
-    type=click.Choice(("text", "parquet", "arrow", "csv")),
+    type=click.Choice(("text", "parquet", "arrow", "csv", "lerobot")),
     help="Output format. By default, idlc uses the format of OUT's extension. If OUT is a folder, "
-    "it writes Parquet files.",
+    "it writes Parquet files. `lerobot` needs --grid PERIOD and a new folder OUT: idlc writes a "
+    "data set for LeRobot, in version 3.0 of its format, with an episode for each REC. Images "
+    "become videos.",
 )
 @click.option(
     "--fields",
@@ -49,7 +51,8 @@ from idlc.cli import completion, options
     "--from",
     "start",
     metavar="TIME",
-    help="Start time: an offset from the start (`10` or `1m30s`), a ROS time, or a UTC date.",
+    help="Start time: an offset from the start (`10` or `1m30s`), a ROS time such as "
+    "`1700000000.5`, or a UTC date.",
 )
 @click.option("--to", "end", metavar="TIME", help="End time (exclusive).")
 @click.option(
@@ -63,18 +66,17 @@ from idlc.cli import completion, options
 @click.option(
     "--grid",
     metavar="GRID",
-    help="Write one table with all topics: a row for each message of topic GRID, or for each "
-    "period, such as `100ms` or `30Hz`. An argument such as `/imu:orientation` selects fields of "
-    "a topic. Before it writes, idlc shows for each topic how many rows have a value, and how old "
-    "these values are.",
+    help="Write one table with all topics. If GRID is a topic, each of its messages becomes a row. "
+    "If GRID is a period, such as `100ms` or `30Hz`, there is a row for each period. Before it "
+    "writes, idlc shows for each topic how many rows have a value, and how old these values are.",
 )
 @click.option(
     "--how",
     metavar="WAY",
     multiple=True,
-    help="With --grid: take the `last` message before a row, the `nearest`, or a value between two "
-    "(`linear`). To set it for a single topic, write `/imu=linear`. --tolerance and --clock "
-    "take the same form, such as `/imu=50ms`.",
+    help="With --grid: which value a row has. WAY is `last` (of the last message before the row), "
+    "`nearest`, or `linear` (interpolated). `/imu=linear` is for the topic /imu alone. "
+    "--tolerance and --clock take the same form, such as `/imu=50ms`.",
 )
 @click.option(
     "--tolerance",
@@ -87,30 +89,30 @@ from idlc.cli import completion, options
     "--clock",
     metavar="CLOCK",
     multiple=True,
-    help="With --grid: use the time of recording (`log`) or of `header.stamp` (`header`).",
-)
-@click.option(
-    "--lerobot",
-    metavar="DIR",
-    type=click.Path(),
-    help="With --grid PERIOD: write a new data set for LeRobot, in version 3.0 of its format, with "
-    "an episode for each REC. Images become videos.",
+    help="With --grid: which time a message has. CLOCK is `log` (the time of recording) or "
+    "`header` (the field `header.stamp`).",
 )
 @click.option(
     "--feature",
     "features",
     metavar="NAME=COLUMN,...",
     multiple=True,
-    help="With --lerobot: make feature NAME of these columns, as in `action=/cmd_vel.linear`. Each "
-    "other TOPIC becomes a feature, such as `observation.imu`.",
+    help="With --format lerobot: combine these columns of the table into NAME, a feature of the "
+    "data set, as in `action=/cmd_vel.linear`. A topic that no --feature names becomes a feature "
+    "of its own: /imu becomes `observation.imu`.",
 )
 @click.option(
     "--episodes",
     metavar="TOPIC",
-    help="With --lerobot: begin an episode at each message of TOPIC, and end the one before. The "
-    "field `data` can be the text of --task. If it is empty or false, no episode begins.",
+    help="With --format lerobot: each message of TOPIC ends the current episode. It also begins "
+    "the next one, unless its field `data` is false or an empty text. Another text in `data` is "
+    "the task of the next episode.",
 )
-@click.option("--task", metavar="TEXT", help="With --lerobot: describe what the robot does.")
+@click.option(
+    "--task",
+    metavar="TEXT",
+    help="With --format lerobot: the robot's task, in words, if --episodes does not give it.",
+)
 @click.option(
     "--each",
     metavar="FIELD",
@@ -119,25 +121,18 @@ from idlc.cli import completion, options
 )
 @click.option("--nested", is_flag=True, help="Write each nested message as one column of structs.")
 @click.option(
-    "--datetimes/--no-datetimes",
-    default=True,
-    show_default=True,
-    help="Convert each Time and Duration to one column.",
+    "--no-datetimes",
+    is_flag=True,
+    help="Write each Time and Duration as two columns, `sec` and `nanosec`.",
 )
 @click.option(
     "--check/--no-check",
     default=None,
-    help="Verify the checksums of the recording. By default, idlc verifies them only if it finds "
-    "damage, such as a missing end.",
+    help="Verify all checksums of the recording. By default, idlc verifies them only if it finds "
+    "other damage, such as a missing end. --no-check is for recordings with wrong checksums or "
+    "indexes: idlc uses neither.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
-@click.option(
-    "--index/--no-index",
-    "use_index",
-    default=True,
-    show_default=True,
-    help="Use the indexes of MCAP files.",
-)
 @click.option(
     "--type",
     "type_name",
@@ -151,8 +146,9 @@ def command(**arguments: Any) -> int:
     """Show recorded topics, or convert them to columns for pandas, DuckDB and other tools.
 
     REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc reads
-    several recordings as one recording. Without TOPIC, it reads all topics. In the table of a
-    topic, each row is a message. The columns are the recording time and the fields.
+    several recordings as one recording. TOPIC is the name of a topic. With --grid,
+    `/imu:orientation` selects a field of a topic. Without TOPIC, idlc reads all topics. In the
+    table of a topic, each row is a message. The columns are the recording time and the fields.
     """
     from idlc.cli.run.columns import run
 

@@ -29,6 +29,7 @@ def _offer(name: str) -> Offer:
 packages = _offer("packages")
 types_and_paths = _offer("types_and_paths")
 topics = _offer("topics")
+topics_and_paths = _offer("topics_and_paths")
 robot_names = _offer("robot_names")
 robot_fields = _offer("robot_fields")
 endpoint = _offer("endpoint")

@@ -21,22 +21,26 @@ class _Command(click.Command):
 
 
 @click.command("gen", cls=_Command, epilog=EPILOG)
-@click.argument("paths", metavar="PATH|PACKAGE|TYPE|REC...", nargs=-1, type=click.Path())
-@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="Output folder.")
+@click.argument(
+    "paths",
+    metavar="[PATH|PACKAGE|TYPE|REC]...",
+    nargs=-1,
+    type=click.Path(),
+    shell_complete=completion.topics_and_paths,
+)
+@click.option(
+    "-o",
+    "--out",
+    metavar="OUT",
+    type=click.Path(),
+    help="Output folder.  [default: `out` in pyproject.toml]",
+)
 @click.option(
     "--ament",
     metavar="PREFIX",
     type=click.Path(),
     default="",
-    help="Install into this prefix, for ROS 2's tools.",
-)
-@click.option(
-    "--topic",
-    "topics",
-    metavar="NAME",
-    multiple=True,
-    shell_complete=completion.topics,
-    help="Use only this recorded topic. Repeatable.",
+    help="Install into the folder PREFIX, for ROS 2's tools.",
 )
 @options.packages
 @options.distro
@@ -49,12 +53,7 @@ class _Command(click.Command):
     is_flag=False,
     flag_value="private",
     metavar="",
-    help="Also copy types of other packages that you use.",
-)
-@click.option(
-    "--runtime",
-    type=click.Choice(["carried", "installed"]),
-    help="Copy the shared code into the package (`carried`, the default), or import idlc-runtime.",
+    help="Also compile the types of other packages that your package uses.",
 )
 @click.option(
     "--force",
@@ -66,10 +65,11 @@ def command(**arguments: Any) -> int:
     """Compile interface files into a Python package.
 
     PATH is a file or folder, PACKAGE and TYPE are names such as std_msgs and std_msgs/msg/Header,
-    and REC is a recording. idlc writes the package to the folder OUT, or several packages to
-    OUT/NAME. Without arguments, it compiles the package in the working folder.
+    and REC is a recording (`drive.mcap /odom` selects a topic). idlc writes the package to the
+    folder OUT, or several packages to OUT/NAME. Without arguments, it compiles the package in the
+    working folder.
 
-    With --ament, `source PREFIX/setup.bash` makes the packages available to ROS 2.
+    After `idlc gen --ament PREFIX`, ROS 2 finds the packages if you source PREFIX/setup.bash.
     """
     from idlc.cli.run.gen import run
 

@@ -11,16 +11,17 @@ from idlc.cli import options
 
 @click.command(
     "init",
-    epilog=options.example("mkdir my_robot", "idlc init my_robot --yes", "cd my_robot", "idlc gen"),
+    epilog=options.example("mkdir my_robot", "idlc init my_robot --yes"),
 )
 @click.argument("path", metavar="[PATH]", default=".", type=click.Path())
 @click.option(
     "--ci",
     "service",
     type=click.Choice(["github", "gitlab", "pre-commit"]),
-    help="Also write the configuration with which this service checks the interfaces.",
+    help="Also write the configuration file with which GitHub, GitLab or pre-commit checks the "
+    "interfaces.",
 )
-@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
+@click.option("--yes", is_flag=True, help="Write without asking, and always test.")
 def command(**arguments: Any) -> int:
     """Set up ROS 2 interfaces in a package, library or workspace.
 
@@ -31,7 +32,9 @@ def command(**arguments: Any) -> int:
     idlc shows every change first. On a terminal, it asks before it writes; elsewhere, it writes
     only with --yes. It then compiles the interfaces, installs a copy of the package into a
     temporary folder, and imports the classes from that folder. The installation runs the package's
-    own build. A second run changes nothing. To test again, add --yes.
+    own build.
+
+    If there is nothing to change, idlc does not test the package again unless you add --yes.
     """
     from idlc.cli.run.init import run
 

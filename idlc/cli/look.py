@@ -16,8 +16,8 @@ from idlc.cli import completion, options
 def list_command(**arguments: Any) -> None:
     """List the packages that idlc can find, or the interfaces in each PACKAGE.
 
-    idlc searches the working folder, the -I folders and the ament prefixes. It also contains the
-    standard packages of each distribution.
+    idlc searches the working folder, the -I folders and the folders in AMENT_PREFIX_PATH. The
+    standard packages of each distribution are a part of idlc.
     """
     from idlc.cli.run.look import list_names
 
@@ -57,9 +57,10 @@ def doctor_command(**arguments: Any) -> None:
 @click.command("explain", epilog=options.example("idlc explain wide-string"))
 @click.argument("code", metavar="[CODE]", required=False, shell_complete=completion.codes)
 def explain_command(**arguments: Any) -> int:
-    """Explain what a rule reports and why, with a bad and a good example.
+    """Explain a problem that idlc reports, with a bad and a good example.
 
-    CODE is an id such as IDL201 or a name such as unknown-type. Without CODE, idlc lists all rules.
+    CODE is an id such as IDL201 or a name such as unknown-type. Without CODE, idlc lists all
+    codes.
     """
     from idlc.cli.run.look import explain
 

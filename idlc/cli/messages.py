@@ -9,13 +9,13 @@ import math
 import re
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from functools import cache, partial
 from typing import Any
 
 import click
 import msgspec
 
+from idlc.api.reader import Absent, field_reader, reader
 from idlc.diagnostics.ci import Form, silenced
 from idlc.diagnostics.text import one_line
 from idlc.runtime.names import ValidationError
@@ -72,21 +72,39 @@ def field_words(kind: Any, word: str) -> list[str]:
     ]
 
 
-def fields_of(kind: Any, paths: Sequence[str]) -> Callable[[bytes], dict[str, Any]]:
+def fields_of(
+    kind: Any, paths: Sequence[str], complain: Callable[[str], object]
+) -> Callable[[bytes], dict[str, Any]]:
     """Return a function that reads fields of a message as `to_dict` has them; absent ones are None.
 
+    `complain` is called if the first message has no element of a name, such as `position.elbow`.
     Raises ValueError for paths that the class does not have.
     """
-    from idlc.api.reader import Absent, field_reader, reader
-
-    reader(kind, *paths)  # which names all that are wrong
-    readers = {path: field_reader(kind, (path,), False, True) for path in paths}
+    elements: dict[str, Any] = {}
+    try:
+        reader(kind, *paths)  # which names all that are wrong
+    except ValueError as error:
+        try:
+            from idlc.api.conditions import ElementReader, named_element
+        except ModuleNotFoundError:  # numpy
+            raise error from None
+        named = {path: named_element(kind, path) for path in paths}
+        elements = {path: ElementReader(kind, each) for path, each in named.items() if each}
+        if fields := [path for path in paths if path not in elements]:
+            reader(kind, *fields)
+    readers = {
+        path: elements.get(path) or field_reader(kind, (path,), False, True) for path in paths
+    }
 
     def read(buffer: bytes) -> dict[str, Any]:
         values: dict[str, Any] = dict.fromkeys(readers)
         for path, read_field in readers.items():
-            with suppress(Absent):
+            try:
                 values[path] = _plain(read_field(buffer))
+            except Absent:
+                element = elements.get(path)
+                if element and element.others and element.lacking == 1:
+                    complain(element.element.missing(element.others, "this message"))
         return values
 
     return read

@@ -52,7 +52,7 @@ def typed(*without: str) -> tuple[str, ...]:
 package = click.option(
     "--package",
     metavar="NAME",
-    help="Package name.  [default: from package.xml]",
+    help="Name of the ROS 2 package.  [default: from package.xml, or the folder's name]",
 )
 include = click.option(
     "-I",
@@ -66,7 +66,7 @@ exclude = click.option(
     "--exclude",
     metavar="PATTERN",
     multiple=True,
-    help="Exclude files (`msg/ros1/**`). Repeatable.",
+    help="Exclude interface files (`msg/ros1/**`). Repeatable.",
 )
 
 
@@ -94,13 +94,13 @@ def _distro(metavar: str, text: str, callback: Any) -> Callable[[Command], Comma
     return click.option(
         "--distro",
         metavar=metavar,
-        help=f"{text}  [default: the installed]",
+        help=f"{text}  [default: the installed one]",
         callback=callback,
         shell_complete=completion.distros,
     )
 
 
-distro = _distro("NAME", "ROS 2 distribution.", _single)
+distro = _distro("NAME", "ROS 2 distribution, such as jazzy.", _single)
 distros = _distro("NAME,...", "ROS 2 distributions in which the interfaces have to work.", _several)
 
 
@@ -113,7 +113,7 @@ def output_style(formats: Sequence[str], text: str) -> Callable[[Command], Comma
 
 
 style = output_style(FORMATS, "Output format.")
-report_style = output_style(REPORT_FORMATS, "Output format.")
+report_style = output_style(REPORT_FORMATS, "Format of the report.")
 
 
 def scoped(

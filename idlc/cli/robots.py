@@ -29,7 +29,8 @@ from idlc.cli import completion, options
 def call_command(**arguments: Any) -> None:
     """Call a service of a robot and print the response.
 
-    ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447.
+    ADDRESS is `dds` for robots that use DDS, or the endpoint of a Zenoh router, such as
+    tcp/robot:7447.
     FIELD=VALUE sets a field of the request: write `goal.x=1.5`, for example. Write lists and
     messages as JSON, such as `ids=[1,2]`. Other fields have their default values. idlc checks all
     values before it sends the request.
@@ -58,7 +59,8 @@ def call_command(**arguments: Any) -> None:
 @click.option(
     "--fields",
     metavar="FIELD,...",
-    help="Print only these fields, such as `header.stamp,position[0]`. idlc decodes nothing else.",
+    help="Print only these fields, such as `header.stamp,position[0]`. `position.elbow` is the "
+    "element that the message names `elbow`.",
 )
 @options.output_style(
     ("yaml", "json", "csv"), "Output format: YAML documents, one JSON object per line, or CSV."
@@ -66,12 +68,13 @@ def call_command(**arguments: Any) -> None:
 def echo_command(**arguments: Any) -> None:
     """Print the messages of a robot's topic as they arrive.
 
-    ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447. To use a
-    Zenoh configuration file instead, write zenoh:FILE. ROS_DOMAIN_ID selects the domain. idlc needs
-    no interface files, because the robot's nodes send the definition of the type.
+    ADDRESS is `dds` for robots that use DDS, or the endpoint of a Zenoh router, such as
+    tcp/robot:7447. To use a Zenoh configuration file instead, write zenoh:FILE. The variable
+    ROS_DOMAIN_ID selects the domain. idlc needs no interface files, because the robot's nodes send
+    the definition of the type.
 
-    In CSV, lists are JSON. In JSON, numbers that are not finite are null. On a terminal, YAML
-    shows the first 16 elements of an array that has more than 32.
+    In CSV, each list is written as JSON. In JSON, numbers that are not finite are null. On a
+    terminal, YAML shows the first 16 elements of an array that has more than 32.
     """
     from idlc.cli.run.robots import echo
 
@@ -99,10 +102,10 @@ def echo_command(**arguments: Any) -> None:
 def record_command(**arguments: Any) -> bool:
     """Record topics of a robot into an MCAP file.
 
-    ADDRESS is `dds`, or the endpoint of the robot's Zenoh router, such as tcp/robot:7447. Without
-    TOPIC, idlc records all topics except the topics of actions, and adds topics that appear later.
-    The file contains the definitions of all types. `idlc columns`, rosbag2 and Foxglove can read
-    it.
+    ADDRESS is `dds` for robots that use DDS, or the endpoint of a Zenoh router, such as
+    tcp/robot:7447. Without TOPIC, idlc records all topics except the topics of actions, and adds
+    topics that appear later. The file contains the definitions of all types. `idlc columns`,
+    rosbag2 and Foxglove can read it.
     """
     from idlc.cli.run.robots import record
 
@@ -110,26 +113,23 @@ def record_command(**arguments: Any) -> bool:
 
 
 @click.command("router", epilog=options.example("idlc router"))
+@click.argument("connect", metavar="[ADDRESS]...", nargs=-1)
 @click.option(
     "--listen",
     metavar="ENDPOINT",
     multiple=True,
     default=("tcp/127.0.0.1:7447",),
-    show_default="tcp/127.0.0.1:7447",
-    help="Accept connections at this endpoint. `tcp/0.0.0.0:7447` admits other machines. May be "
-    "repeated.",
-)
-@click.option(
-    "--connect",
-    metavar="ENDPOINT",
-    multiple=True,
-    help="Also connect to this router, such as `tcp/robot:7447`. May be repeated.",
+    show_default=True,
+    help="Accept connections at this endpoint. With `tcp/0.0.0.0:7447`, other machines "
+    "can connect. Repeatable.",
 )
 def router_command(**arguments: Any) -> int:
     """Run a Zenoh router for ROS 2 nodes. It replaces rmw_zenohd. Ctrl-C stops it.
 
+    ADDRESS is another router to connect to, such as tcp/robot:7447.
+
     Nodes on one machine find each other through the router. Other machines can reach the router
-    only if --listen admits them.
+    only with --listen.
     """
     from idlc.cli.run.robots import router
 

@@ -59,11 +59,11 @@ def command() -> None:
 
 def writing(function: Command) -> Command:
     """Add the options of a command that writes files."""
-    dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the changes.")
+    diff = click.option("--diff", "dry_run", is_flag=True, help="Write nothing; show the changes.")
     force = click.option(
         "--force", is_flag=True, help="Replace existing files that differ, and keep backups."
     )
-    return dry(force(function))
+    return diff(force(function))
 
 
 def common(function: Command) -> Command:
@@ -90,19 +90,24 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
     default="",
     help="Maintainer of the package.  [default: git's user.name and user.email]",
 )
-@click.option("--license", "licence", type=click.Choice(LICENSES), help="License of the package.")
+@click.option(
+    "--license",
+    "licence",
+    type=click.Choice(LICENSES),
+    help="License of the package.  [default: Apache-2.0]",
+)
 @click.option(
     "--interfaces",
-    "--interfaces-only",
     "interfaces_only",
     is_flag=True,
     help="Create a package that contains only interfaces. CMake builds it for nodes in any "
-    "language, and pip builds it for Python. INTERFACE is an interface to create, such as "
-    "`Drive` or `srv/Ask`.",
+    "language, and pip builds it for Python.",
 )
 @common
 def package_command(**arguments: Any) -> int:
     """Create a package that you can build with colcon and install with pip.
+
+    INTERFACE is an interface to create, such as `Drive` or `srv/Ask`, and needs --interfaces.
 
     Each build of the package compiles the interfaces in its msg/, srv/ and action/ folders.
     `idlc init` creates the same package in an empty folder, with an example, and compiles it.

@@ -12,8 +12,9 @@ from idlc.cli.scaffold import common
 from idlc.scaffold.roles import QOS_NAMES, ROLES
 
 EPILOG = """\
-TYPE is an interface in your package (RobotCommand) or in another package (std_msgs/String). If you
-give no endpoints on a terminal, idlc asks for them.
+TYPE is an interface in your package (RobotCommand) or in another package (std_msgs/String). For
+--param, TYPE is bool, int, float or string. If you give no endpoints on a terminal, idlc asks for
+them.
 
 Example, within a package:
 
@@ -81,15 +82,18 @@ def _role_options(function: Any) -> Any:
     "--robust",
     is_flag=True,
     help="Also handle rare cases: a signal while the node starts, a goal that is replaced or "
-    "cancelled, a server that does not answer.",
+    "cancelled, a server that does not answer. A node that calls a service or sends a goal takes "
+    "the values of its fields from the command line.",
 )
 @common
 def command(**arguments: Any) -> int:
     """Create a node in the package that contains the working folder.
 
-    idlc writes the module and a test. It adds the command to setup.py and the dependencies to
-    package.xml. It also adds the node to the launch file, unless the node performs a single task
-    and exits.
+    Each option from --publisher to --action-client adds an endpoint to the node.
+
+    idlc writes the module and a test. It adds the node's command to setup.py and the dependencies
+    to package.xml. It also adds the node to the launch file, unless the node only sends a request
+    or a goal and then exits.
     """
     from idlc.cli.run.scaffold import new_node
 

@@ -22,8 +22,8 @@ from idlc.cli import completion, options
 @options.output_style(
     ("text", "json", "hash", "type-description", "ros2idl", "jsonschema", "mcap", "msg"),
     "Output format. `hash` is the type hash (RIHS01), `type-description` the JSON file that ROS 2 "
-    "installs, `ros2idl` an IDL file, and `mcap` the schema of an MCAP file. `msg` writes the "
-    "recorded definitions as files (see --out).",
+    "installs, `ros2idl` an IDL file, `jsonschema` a JSON Schema, and `mcap` the schema of an MCAP "
+    "file. `msg` writes the recorded definitions as files (see --out).",
 )
 @click.option(
     "-o",
@@ -37,6 +37,8 @@ from idlc.cli import completion, options
 def command(**arguments: Any) -> None:
     """Show an interface with its nested messages and all comments.
 
+    TYPE is a name such as std_msgs/msg/Header, PATH is a file or folder, and REC is a recording.
+
     For a recording, idlc lists each topic with its type, message count and type hash, and shows
     whether your local type matches. With TOPIC, it shows the recorded definitions of these topics.
 
@@ -44,8 +46,8 @@ def command(**arguments: Any) -> None:
     topics, services and actions, and the nodes that use them. It also reports incompatible
     endpoints.
 
-    With --format hash, you can give several arguments, and idlc prints the hash of each type. For a
-    service or action, it also prints the hashes of its messages, such as the request.
+    With --format hash, idlc prints the hash of each type that you name. For a service or action, it
+    also prints the hashes of its messages, such as the request.
     """
     from idlc.cli.run.show import run
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import click
 
-from idlc.cli import options
+from idlc.cli import completion, options
 
 EPILOG = options.example(
-    "idlc upgrade rec.mcap --to distro:lyrical --dry-run",
+    "idlc upgrade rec.mcap --to distro:lyrical --diff",
     "idlc upgrade rec.mcap --to distro:lyrical -o upgraded",
 )
 
@@ -22,7 +22,14 @@ EPILOG += "\n" + options.example(
 
 
 @click.command("upgrade", epilog=EPILOG)
-@click.argument("paths", metavar="REC...", nargs=-1, required=True, type=click.Path())
+@click.argument(
+    "paths",
+    metavar="REC... [TOPIC]...",
+    nargs=-1,
+    required=True,
+    type=click.Path(),
+    shell_complete=completion.topics_and_paths,
+)
 @click.option(
     "-o",
     "--out",
@@ -34,7 +41,7 @@ EPILOG += "\n" + options.example(
     "--to",
     metavar="PATH|REC|git:REF|distro:NAME",
     help="The types to upgrade to: a package folder, another recording, a git revision, or the "
-    "standard interfaces of a distribution. By default, idlc uses the types of this machine.",
+    "standard interfaces of a distribution. By default, idlc takes types that `idlc list` finds.",
 )
 @click.option(
     "--from",
@@ -44,19 +51,11 @@ EPILOG += "\n" + options.example(
     "of Humble.",
 )
 @click.option(
-    "--topic",
-    "topics",
-    metavar="TOPIC",
-    multiple=True,
-    help="Upgrade only this topic. May be repeated.",
-)
-@click.option(
     "--rules",
     metavar="PATH",
     multiple=True,
     type=click.Path(),
-    help="Run the rules in this Python file or folder. Without --rules, idlc runs no rules. May be "
-    "repeated.",
+    help="Run the rules in this Python file or folder. Repeatable.",
 )
 @click.option(
     "--write-rules",
@@ -64,12 +63,17 @@ EPILOG += "\n" + options.example(
     type=click.Path(),
     help="Write a Python file with a function for each field that needs a rule.",
 )
-@click.option("--dry-run", is_flag=True, help="Show how idlc converts each changed field.")
+@click.option(
+    "--diff",
+    "dry_run",
+    is_flag=True,
+    help="Write nothing; show how idlc converts each changed field.",
+)
 @click.option(
     "--allow-loss",
     is_flag=True,
-    help="If a type was removed, keep its messages under the old type. Without this option, idlc "
-    "reports an error.",
+    help="Accept that a type was removed: copy its messages unchanged, under the old type. Without "
+    "this option, idlc reports an error.",
 )
 @click.option("--strict", is_flag=True, help="Refuse a damaged recording.")
 @options.packages
@@ -78,10 +82,14 @@ EPILOG += "\n" + options.example(
 def command(**arguments: Any) -> int:
     """Convert recordings to the current versions of their types.
 
-    REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. idlc compares
-    the recorded definitions with the new ones. Added fields get their defaults, removed fields are
-    dropped, and numbers get wider types. Other changes need a rule: a Python function that returns
-    the value of the new field.
+    REC is an .mcap or .db3 file, a bag folder, or a pattern such as 'drive_*.mcap'. With TOPIC,
+    idlc upgrades only these topics.
+
+    idlc compares the recorded definitions with the new ones. Added fields get their defaults,
+    removed fields are dropped, and a number is converted if its new type can hold each value of the
+    old type. Other changes need a rule: a Python function that returns the value of the new field.
+
+    --package, -I, --exclude and --distro are about the new types.
     """
     from idlc.cli.run.upgrade import run
 

@@ -385,7 +385,7 @@ def _similar(text: str, library: Library, root: Root) -> str:
         every = (name for package in library.packages() for name in library.interfaces(package))
         named = {interface.name: str(interface) for interface in every}
         files = (path.name for path in entries(root.base))
-        near = closest(parts[0], [*files, *named, *library.packages()])
+        near = closest(parts[0], [*files, *named, *library.packages(), "dds"])
         if near:
             return f"did you mean `{named.get(near, near)}`?"
         return near_file or "`idlc list` lists the known packages and types"

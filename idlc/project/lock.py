@@ -112,6 +112,7 @@ COPY_HEAD = """\
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """
 #: Raised when an older idlc could not read what a newer one writes.

@@ -121,6 +121,17 @@ def split_recordings(words: Iterable[str], root: Root) -> tuple[list[str], list[
     return recordings, others
 
 
+def split_topics(words: Sequence[str], root: Root) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return words without the topics of recordings among them, and these topics.
+
+    Beside a recording, `/odom` is a topic unless there is such a file.
+    """
+    recordings, others = split_recordings(words, root)
+    names = [word for word in others if word.startswith("/")] if recordings else []
+    topics = tuple(name for name in names if not os.path.lexists(root.path(name)))
+    return tuple(word for word in words if word not in topics), topics
+
+
 def files(words: Iterable[str], root: Root) -> list[Path]:
     """Return the files of the recordings among words."""
     recordings, _ = split_recordings(words, root)

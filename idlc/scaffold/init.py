@@ -596,10 +596,12 @@ def _outdated_builds(draft: Draft, layout: Layout, out: str) -> str:
     if tool == "setuptools" and layout.kind != "library":
         return ""  # setup.py stops the build
     if tool == "setuptools":
-        setup = Setup(Source(SETUP_PY, draft.text(SETUP_PY) or _PLAIN_SETUP))
+        own = draft.text(SETUP_PY)
+        setup = Setup(Source(SETUP_PY, own or f"# mypy: ignore-errors\n{_PLAIN_SETUP}"))
         edits = step_before_setup(setup, out, is_library=True)
         if edits and step not in setup.source.text:
-            draft.put(SETUP_PY, apply(setup.source.text, edits)[0], reason)
+            edited = apply(setup.source.text, edits)[0]
+            draft.put(SETUP_PY, edited if own else edited.replace("'", '"'), reason)
     elif tool in _HOOKS and (new := _with_setting(text, *_HOOKS[tool], step)):
         draft.put(SETTINGS_FILE, new, reason)
     if any(step in (draft.text(path) or "") for path in (SETUP_PY, SETTINGS_FILE)):
@@ -720,7 +722,8 @@ def obtaining(draft: Draft) -> list[str]:
     """Return the commands after which a repository contains what its CI runs."""
     text = "".join(draft.text(path) or "" for path in draft.reasons)
     if "./tools/idlc" in text:  # the action installs the wheel
-        return [_WHEEL, _ACTION, "git add --force wheels tools/idlc"]
+        ignored = "touch tools/idlc/COLCON_IGNORE"  # by checks of this package
+        return [_WHEEL, _ACTION, ignored, "git add --force wheels tools/idlc"]
     return [_WHEEL, "git add --force wheels"] if "wheels/idlc" in text else []
 
 

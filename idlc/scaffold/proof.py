@@ -178,6 +178,8 @@ def prove(
 def _imported(scratch: Path, site: Path, classes: tuple[str, ...], tried: str) -> Proof:
     """Import classes from a folder; where the package itself cannot be imported, say why."""
     failure = _failure(scratch, "-I", "-c", _IMPORT, site, *classes)
+    if failure.endswith("No module named 'numpy'"):
+        return Proof("", "", "the import, because `numpy` is missing: install it, and test again")
     top = classes[0].partition(".")[0]
     obstacle = ""
     if failure and not _is_generated(site / top / "__init__.py"):

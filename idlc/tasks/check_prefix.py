@@ -1,4 +1,4 @@
-"""The pipeline of `idlc check --prefix`: can C++ tools load the installed libraries."""
+"""The pipeline of `idlc check --ament`: can C++ tools load the installed libraries."""
 
 from __future__ import annotations
 

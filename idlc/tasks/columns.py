@@ -233,7 +233,6 @@ class ColumnsOptions(msgspec.Struct, frozen=True):
     datetimes: bool = True
     check: bool | None = None
     strict: bool = False
-    use_index: bool = True
     force: bool = False
     include: tuple[str, ...] = ()
     distro: str | None = None
@@ -278,7 +277,7 @@ def columns(
         warnings.catch_warnings(record=True) as caught,
         Recording(
             paths[0] if len(paths) == 1 else paths,
-            index=options.use_index,
+            index=options.check is not False,
             check=options.check,
             strict=options.strict,
             include=options.include,

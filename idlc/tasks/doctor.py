@@ -135,7 +135,7 @@ def _installed(root: Root) -> Iterator[Finding]:
             check_prefix(str(prefix), root, report)
             problems = [problem for problem in report if problem.code != codes.NO_SUCH_PATH.id]
             text = f"{prefix}: {counted(len(packages), 'package')} with interfaces"
-            details = f"`idlc check --prefix {shlex.quote(str(prefix))}` shows the details"
+            details = f"`idlc check --ament {shlex.quote(str(prefix))}` shows the details"
             hint = details if problems else ""
             reason = f"; {problems[0].message}" if problems else ""
             yield Finding("prefix", text + reason, hint)

@@ -63,7 +63,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
     return options._replace(
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
-        runtime=options.runtime or settings.runtime,
+        runtime=settings.runtime,
         vendoring=options.vendoring or settings.vendoring,
     )
 

@@ -1,4 +1,4 @@
-"""`idlc columns --lerobot`: recordings as the episodes of a data set for LeRobot."""
+"""`idlc columns --format lerobot`: recordings as the episodes of a data set for LeRobot."""
 
 from __future__ import annotations
 
@@ -47,9 +47,8 @@ CHANNELS = {
 
 
 class LeRobot(msgspec.Struct, frozen=True):
-    """A data set: its folder, the columns of features, and what begins an episode."""
+    """A data set: the columns of features, and what begins an episode."""
 
-    folder: str
     features: tuple[str, ...] = ()
     episodes: str | None = None
     task: str | None = None
@@ -86,7 +85,7 @@ def write_data_set(
     progress: Progress,
 ) -> list[WrittenFile]:
     """Write a data set, whole or not at all, with an episode or more for each recording."""
-    folder = Path(request.folder)
+    folder = Path(options.out)
     if os.path.lexists(folder):
         what, hint = f"`{folder}` exists", "choose another folder"
         report.add(codes.EXISTING_FILE.of(str(folder), what, hint=hint))
@@ -106,7 +105,7 @@ def write_data_set(
                 raise RecordingError("in no row, each topic has a value")
             data.finish()
         episodes = f"{len(data):,} episode{'s' * (len(data) != 1)}"
-        written.append(WrittenFile(episodes, request.folder, data.frames))
+        written.append(WrittenFile(episodes, options.out, data.frames))
     return written
 
 
@@ -146,7 +145,7 @@ def _add(
         where = "outside of episodes, or " if request.episodes else ""
         what = f"left out {cut:,} of {len(table):,} rows: {where}before or after values of a topic"
         report.notes.append(f"`{path}`: {what}")
-    return [WrittenFile(path, request.folder, data.frames - before)]
+    return [WrittenFile(path, options.out, data.frames - before)]
 
 
 def _without_ends(table: Aligned) -> Aligned:

@@ -136,7 +136,9 @@ class RuntimeArchives(Archives):
     def _install_and_use(self, archive: Path, folder: Path) -> None:
         """Use what this project's idlc compiles, in a Python without it."""
         python = _installed(archive, folder, alone=True)
-        words = ("gen", "demo", "-o", "out/demo", "--runtime", "installed")
+        settings = '[tool.idlc]\nruntime = "installed"\n'
+        (folder / "pyproject.toml").write_text(settings, encoding="utf-8")
+        words = ("gen", "demo", "-o", "out/demo")
         root = str(self.project.root)
         run(sys.executable, "-m", "idlc", *words, cwd=folder, PYTHONPATH=root)
         _use(python, folder)

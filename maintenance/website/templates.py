@@ -45,6 +45,7 @@ _FILES = {
     "  <depend>std_msgs</depend>\n</package>\n",
     "more/msg/Stamped.msg": "std_msgs/Header header\n",
     "more/srv/Stop.srv": "bool now\n---\nbool stopped\n",
+    "light/pyproject.toml": '[tool.idlc]\nruntime = "installed"\n',
     "more/action/Turn.action": "float64 angle\n---\n---\nfloat64 left\n",
 }
 #: Lines of further outputs of one template that are shown.
@@ -54,7 +55,7 @@ _PERSON = ("--maintainer", "Ada <ada@example.com>")
 _COMMANDS = [
     (".", ("gen", "demo", "-o", "out/demo")),
     (".", ("gen", "more", "-o", "out/more", "--vendor-deps")),
-    (".", ("gen", "demo", "-o", "light/demo", "--runtime", "installed")),
+    ("light", ("gen", "../demo", "-o", "demo")),
     (".", ("gen", "demo", "--ament", "prefix")),
     (".", ("gen", "bare", "--package", "bare", "--ament", "prefix")),
     (".", ("docs", "demo", "more", "-o", "site")),

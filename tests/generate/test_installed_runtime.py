@@ -1,4 +1,4 @@
-"""`--runtime installed`: packages import idlc-runtime, and mix with those that carry a copy."""
+"""`runtime = "installed"`: packages import idlc-runtime, and mix with those that carry a copy."""
 
 import json
 import shutil
@@ -38,14 +38,22 @@ def write(folder, files):
     return folder
 
 
+def choose(mode):
+    """Set the runtime mode of packages that are generated in the working folder."""
+    Path("pyproject.toml").write_text(f'[tool.idlc]\nruntime = "{mode}"\n', encoding="utf-8")
+
+
 def compile_packages(folder, packages, *, installed=None):
     """Generate packages into a folder; those `installed`, by default all, import the runtime."""
     for name, files in packages.items():
         write(folder / "in" / name, files)
     for name in packages:
         mode = "installed" if installed is None or name in installed else "carried"
-        words = ("--package", name, "-I", folder / "in", "--runtime", mode)
-        status = main([*map(str, ("gen", folder / "in" / name, "-o", folder / name, *words))])
+        words = ("--package", name, "-I", folder / "in")
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(folder)
+            choose(mode)
+            status = main([*map(str, ("gen", folder / "in" / name, "-o", folder / name, *words))])
         assert status == 0, name
 
 
@@ -70,7 +78,8 @@ def execute(*folders, code, options=("-I", "-S")):
 
 def test_one_field_is_little(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(write(tmp_path / "demo", ONE_FIELD).parent)
-    assert main(["gen", "demo", "-o", "out/demo", "--runtime", "installed"]) == 0
+    choose("installed")
+    assert main(["gen", "demo", "-o", "out/demo"]) == 0
     line = "wrote out/demo: 7 files from 1 interface; imports idlc_runtime\n"
     assert capsys.readouterr().out == line
     files = [path for path in Path("out").rglob("*") if path.is_file()]
@@ -246,23 +255,22 @@ def test_switching_removes_or_writes_the_copy(tmp_path, monkeypatch, capsys):
     copies = len(list((ROOT / "idlc/runtime").rglob("*.py")))
     assert gen()[0] == 0
     assert mode() == "carried"
-    assert gen("--check", "--runtime", "installed")[0] == 1
+    choose("installed")
+    assert gen("--check")[0] == 1
     assert mode() == "carried"
     said = f"(1 written, {copies} removed); imports idlc_runtime"
-    assert gen("--runtime", "installed") == (0, said)
+    assert gen() == (0, said)
     assert mode() == "installed"
+    Path("pyproject.toml").unlink()
     assert gen() == (0, "(unchanged); imports idlc_runtime")
     assert gen("--check") == (0, "(up to date)")
     Path("demo/msg/More.msg").write_text("int8 x\n", encoding="utf-8")
     assert gen()[0] == 0
     assert mode() == "installed"
-    assert gen("--check", "--runtime", "carried")[0] == 1
-    Path("pyproject.toml").write_text('[tool.idlc]\nruntime = "carried"\n', encoding="utf-8")
+    choose("carried")
     assert gen("--check")[0] == 1
     assert gen() == (0, f"s ({copies} written, 1 removed)")
     assert mode() == "carried"
-    assert gen("--runtime", "installed")[0] == 0
-    assert mode() == "installed"
 
 
 def test_an_edited_copy_is_not_removed(tmp_path, monkeypatch, capsys):
@@ -270,7 +278,8 @@ def test_an_edited_copy_is_not_removed(tmp_path, monkeypatch, capsys):
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
     edited = Path("out/demo/_idlc/names.py")
     edited.write_text(edited.read_text(encoding="utf-8") + "#\n", encoding="utf-8")
-    assert main(["gen", "demo", "-o", "out/demo", "--runtime", "installed"]) == 1
+    choose("installed")
+    assert main(["gen", "demo", "-o", "out/demo"]) == 1
     assert "IDL613" in capsys.readouterr().err
     assert edited.is_file()
     assert not Path("out/demo/_idlc.py").exists()
@@ -287,10 +296,10 @@ def test_a_setting_that_is_neither_is_refused(tmp_path, monkeypatch, capsys):
 def test_setup_py_compiles_in_the_mode_of_the_package(place, tmp_path, monkeypatch):
     folder = write(tmp_path / "demo", {**ONE_FIELD, "setup.py": "", "package.xml": MANIFEST})
     monkeypatch.chdir(folder)
+    choose("installed")
     if place == "lock":
-        assert main(["gen", "--runtime", "installed"]) == 0
-    else:
-        write(folder, {"pyproject.toml": '[tool.idlc]\nruntime = "installed"\n'})
+        assert main(["gen"]) == 0
+        Path("pyproject.toml").unlink()
     monkeypatch.setattr(sys, "argv", ["setup.py", "--version"])
     distribution = Distribution({"name": "demo", "packages": ["demo"]})
     distribution.commands = []
@@ -328,7 +337,8 @@ setup(
 def test_a_package_that_does_not_require_it_is_reported(tmp_path, monkeypatch, capsys):
     files = {**ONE_FIELD, "setup.py": SETUP, "package.xml": MANIFEST, "resource/demo": ""}
     monkeypatch.chdir(write(tmp_path / "demo", files))
-    assert main(["gen", "--runtime", "installed"]) == 0
+    choose("installed")
+    assert main(["gen"]) == 0
     capsys.readouterr()
     assert main(["check"]) == 0
     said = capsys.readouterr().out
@@ -342,7 +352,8 @@ def test_a_package_that_does_not_require_it_is_reported(tmp_path, monkeypatch, c
     assert main(["check"]) == 0
     assert "IDL459" not in capsys.readouterr().out
     write(Path(), {"setup.py": SETUP})
-    assert main(["gen", "--runtime", "carried"]) == 0
+    choose("carried")
+    assert main(["gen"]) == 0
     capsys.readouterr()
     assert main(["check"]) == 0
     assert "IDL459" not in capsys.readouterr().out

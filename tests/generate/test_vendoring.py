@@ -314,8 +314,10 @@ def other_library(request, tmp_path_factory):
     """A folder with another library, in both modes of the runtime."""
     folder = tmp_path_factory.mktemp("other")
     write(folder / "files", {"msg/Bee.msg": "std_msgs/Header[] headers\n"})
-    words = ("--vendor-deps", "--runtime", request.param)
-    gen(folder / "files", folder / "out/bees", *words, package="bee_msgs")
+    write(folder, {"pyproject.toml": f'[tool.idlc]\nruntime = "{request.param}"\n'})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        gen("files", "out/bees", "--vendor-deps", package="bee_msgs")
     assert (folder / "out/bees/_idlc").exists() == (request.param == "carried")
     if request.param == "installed":
         shutil.copytree(ROOT / "idlc/runtime", folder / "out/idlc_runtime")

@@ -83,7 +83,7 @@ ROWS = {
         ["columns", "a.mcap", ALL],
     ],
     "upgrade": [
-        ["upgrade", "a.mcap", "--to", "good", "--dry-run"],
+        ["upgrade", "a.mcap", "--to", "good", "--diff"],
         ["upgrade", ALL, "--to", "good"],
     ],
     "echo": [["echo", ALL, "/x"]],

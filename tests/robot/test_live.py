@@ -178,6 +178,16 @@ def test_fields_are_printed_without_the_rest(robot, address, capsys):
         {"name[1]": None, "position": [], "header.stamp": {"sec": 0, "nanosec": 0}},
         {"name[1]": "b", "position": [0.5, 0.5], "header.stamp": {"sec": 0, "nanosec": 0}},
     ]
+    assert main([*words, "position.b,velocity.b,position.c,name[0]"]) == 0
+    out, err = capsys.readouterr()
+    absent = {"position.b": None, "velocity.b": None, "position.c": None, "name[0]": None}
+    assert list(map(json.loads, out.splitlines())) == [
+        absent,
+        {**absent, "position.b": 0.5, "name[0]": "a"},
+    ]
+    assert err == ""
+    assert main([*words, "effort.elbw"]) == 0
+    assert main([*words, "name.b"]) == 2
     assert main([*words, "positoin"]) == 2
     assert "did you mean `position`?" in capsys.readouterr().err
 
@@ -189,6 +199,8 @@ def test_unknown_names_and_robots_are_errors(robot, address, capsys):
     assert main(["call", address, "/word"]) == 2
     assert main(["record", address, "-o", "a.mcap", "/word"]) == 2
     assert not Path("a.mcap").exists()
+    assert main(["show", "ddss"]) == 2
+    assert "did you mean `dds`?" in capsys.readouterr().err
     assert main(["show", "tcp/localhost"]) == 2
     assert "IDL642" in capsys.readouterr().err
     assert main(["columns", address]) != 0

@@ -84,7 +84,7 @@ def change(package, number):
 
 def checked(prefix):
     """Return the status of a check of what is installed, and what it says."""
-    command = [sys.executable, "-m", "idlc", "check", "--prefix", prefix]
+    command = [sys.executable, "-m", "idlc", "check", "--ament", prefix]
     return programs.ended(*command, cwd=ROOT, environment={**os.environ, "PYTHONPATH": str(ROOT)})
 
 

@@ -66,10 +66,11 @@ def test_behaviour(behaviour, start):
 
 @pytest.fixture(scope="module")
 def light(tmp_path_factory) -> str:
-    """The same packages with `--runtime installed`, and a folder that has the runtime."""
+    """The same packages with `runtime = "installed"`, and a folder that has the runtime."""
     folder = tmp_path_factory.mktemp("light")
+    (folder / "pyproject.toml").write_text('[tool.idlc]\nruntime = "installed"\n', encoding="utf-8")
     for package in ("std_msgs", "std_srvs"):
-        generate(SHARE / package, folder / package, "--runtime", "installed")
+        generate(SHARE / package, folder / package, cwd=folder)
     return f"{folder}{os.pathsep}{ROOT / 'maintenance/runtime'}"
 
 

@@ -126,7 +126,7 @@ NODE = ["scaffold", "node", "talker", "--publisher", "std_msgs/String:chatter"]
 def test_a_dry_run_shows_what_patch_would_need(package, capsys):
     before = tree(package)
     capsys.readouterr()
-    assert main([*NODE, "--dry-run"]) == 0
+    assert main([*NODE, "--diff"]) == 0
     diff = capsys.readouterr().out
     assert tree(package) == before
     subprocess.run([tool("git"), "apply", "-"], input=diff, text=True, check=True, cwd=package)
@@ -270,7 +270,7 @@ def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
 def test_a_package_of_interfaces_has_one_to_begin_with(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     package = ["scaffold", "package", "--interfaces", "demo_msgs"]
-    assert main([*package, "--dry-run"]) == 0
+    assert main([*package, "--diff"]) == 0
     assert "+++ b/demo_msgs/msg/Example.msg" in capsys.readouterr().out
     assert not (tmp_path / "demo_msgs").exists()
     assert main(package) == 0

@@ -15,7 +15,7 @@ import yaml
 
 from idlc.cli.main import main
 from idlc.project.settings import toml
-from idlc.scaffold.proof import Proof, missing_tool
+from idlc.scaffold.proof import Proof, missing_tool, prove
 from tests.support.files import write, write_all
 from tests.support.paths import DOCS, ROOT
 from tests.support.programs import ended, run
@@ -540,6 +540,15 @@ def test_a_package_for_both_versions_of_ros_is_one_of_ros_2(project, capsys):
     assert "bot is an ament_python package" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("project")
+def test_classes_that_need_an_absent_numpy_are_not_tested(tmp_path):
+    write("kit/__init__.py", "")
+    write("kit/msg.py", "raise ModuleNotFoundError(\"No module named 'numpy'\")\n")
+    proof = prove(tmp_path, "", ("kit.msg.A",), Path.cwd())
+    assert (proof.tried, proof.failure) == ("", "")
+    assert proof.obstacle.startswith("the import, because `numpy` is missing")
+
+
 def test_an_authors_own_tools_stay_green(project, unproved):
     """Linters and type checkers without settings report nothing in what idlc writes."""
     fields = "std_msgs/Header header\nfloat32[] ranges\nuint8[3] colour\n"
@@ -549,7 +558,10 @@ def test_an_authors_own_tools_stay_green(project, unproved):
         os.chdir(folder)
         write_all({**files, ("interfaces/" * (name == "library") + "msg/A.msg"): fields})
         assert main(["init", "--yes"]) == 0
-        own = ("--exclude", "setup.py", "--exclude", "talker.py")
+        theirs = ("setup.py", "talker.py") if name == "ament" else ()
+        own = [word for path in theirs for word in ("--exclude", path)]
+        (copy,) = folder.rglob("_idlc/arrays.py")
+        assert "# pyright: reportMissingImports=false\n" in copy.read_text(encoding="utf-8")
         for words in (
             ("ruff", "check", "--isolated", "--no-cache", ".", *own),
             ("ruff", "format", "--isolated", "--no-cache", "--check", ".", *own),
@@ -559,7 +571,7 @@ def test_an_authors_own_tools_stay_green(project, unproved):
                 "--no-site-packages",
                 "--strict",
                 "--exclude",
-                "(setup|talker|test_flake8).py$",
+                f"({'|'.join((*theirs, 'test_flake8.py'))})$",
                 ".",
             ),
         ):
@@ -662,13 +674,13 @@ def test_a_service_gets_the_file_of_the_documents(service, after, path, project,
 def test_a_service_gets_the_idlc_that_it_runs(project, capsys):
     """A workflow needs idlc in the repository; pre-commit needs a fixed commit of a clone."""
     (block,) = re.findall(r"(?ms)^```sh\n(python3 -I.*?)^```$", (DOCS / "ci.md").read_text())
-    wheel, action, added = block.splitlines()
+    wheel, action, ignored, added = block.splitlines()
     git("init", "-q")
     git("init", "-q", "../idlc")
     git("commit", "-q", "--allow-empty", "-m", "one", cwd="../idlc")
     write_all(SAMPLES["ament_cmake"].files)
     expected = {
-        "github": [wheel, action, added],
+        "github": [wheel, action, ignored, added],
         "gitlab": [wheel, added.removesuffix(" tools/idlc")],
         "pre-commit": [],
     }

@@ -56,10 +56,10 @@ def names_in(packages: Iterable[str], found: Interfaces) -> list[str]:
     ]
 
 
-def generate(files: Path, out: Path, *options: str) -> None:
+def generate(files: Path, out: Path, *options: str, cwd: Path | None = None) -> None:
     """Let idlc compile a folder of interface files."""
     command = [sys.executable, "-m", "idlc", "gen", files, "-o", out, *options]
     done = subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, check=False
+        [str(word) for word in command], cwd=cwd, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr

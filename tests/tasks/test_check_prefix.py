@@ -1,4 +1,4 @@
-"""`idlc check --prefix`: what stops recorders is found, whatever lies in the files."""
+"""`idlc check --ament`: what stops recorders is found, whatever lies in the files."""
 
 import random
 import re
@@ -43,7 +43,7 @@ def said(capsys):
     """Return a function that checks a folder: its status, and what is wrong with each library."""
 
     def said(folder="prefix"):
-        status = main(["check", "--prefix", folder])
+        status = main(["check", "--ament", folder])
         lines = capsys.readouterr().out
         found = re.findall(r"\nerror\[IDL632\]: `(\w+\.so)` (.*), so C\+\+ tools", f"\n{lines}")
         return status, found
@@ -87,7 +87,7 @@ def test_the_index_is_compared_with_what_is_installed(here, capsys):
         (lambda: (index / "rosidl_interfaces/only").rename(index / "packages/nodes"), ""),
     ):
         change()
-        assert main(["check", "--prefix", "prefix"]) == 1
+        assert main(["check", "--ament", "prefix"]) == 1
         printed = capsys.readouterr().out
         assert "error[IDL633]" in printed
         assert expected in printed
@@ -203,7 +203,7 @@ def test_a_prefix_without_interfaces_is_not_a_success(here, capsys):
     bare.mkdir(parents=True)
     (bare / "bare").touch()
     for folder in ("install", "install/bare"):
-        assert main(["check", "--prefix", folder]) != 0
+        assert main(["check", "--ament", folder]) != 0
         assert f"no package with interfaces is registered in `{folder}`" in capsys.readouterr().out
     shutil.copytree(here, here.parent / "install/arm")
-    assert main(["check", "--prefix", "install"]) == 0
+    assert main(["check", "--ament", "install"]) == 0

@@ -90,7 +90,7 @@ def test_a_note_says_what_hides_an_installed_package(recorded, tmp_path, capsys)
 
 def test_topics_narrow_it_down(recorded, tmp_path):
     out = tmp_path / "out"
-    words = ["gen", str(recorded[1]["mcap"]), "-o", str(out), "--topic", "/joints"]
+    words = ["gen", str(recorded[1]["mcap"]), "-o", str(out), "/joints"]
     assert main(words) == 0
     assert sorted(path.name for path in out.iterdir() if path.is_dir()) == [
         "builtin_interfaces",
@@ -156,7 +156,7 @@ def test_only_what_a_change_concerns_is_written_again(tmp_path, capsys):
 
 def test_one_package_is_out_itself(tmp_path):
     path = recorded_text.write(tmp_path / "a.mcap", OWN.format("float64", "int32"))
-    assert main(["gen", str(path), "-o", str(tmp_path / "out"), "--topic", "/alone"]) == 0
+    assert main(["gen", str(path), "-o", str(tmp_path / "out"), "/alone"]) == 0
     assert (tmp_path / "out/msg/_alone.py").exists()
 
 
@@ -174,8 +174,8 @@ def test_a_recording_goes_with_other_inputs(tmp_path, monkeypatch):
 
 def test_topics_are_those_of_recordings(tmp_path, capsys):
     (tmp_path / "A.msg").write_text("int8 a\n", encoding="utf-8")
-    assert main(["gen", str(tmp_path), "-o", str(tmp_path / "out"), "--topic", "/x"]) == 2
-    assert "--topic needs a recording" in capsys.readouterr().err
+    assert main(["gen", str(tmp_path), "-o", str(tmp_path / "out"), "/x"]) == 2
+    assert "no such file or folder: `/x`" in capsys.readouterr().err
     assert main(["show", "std_msgs/msg/Header", "/x"]) == 2
     assert "is not a recording" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""`idlc columns --lerobot`, compared with what LeRobot wrote, and with the aligned table."""
+"""`idlc columns --format lerobot`, compared with what LeRobot wrote, and with the aligned table."""
 
 import io
 import json
@@ -91,7 +91,7 @@ def simple(count=6, **changes):
 
 
 def wrote(*words, grid="10Hz", out="ds"):
-    return main(["columns", *words, "--grid", grid, "--lerobot", out]) == 0
+    return main(["columns", *words, "--grid", grid, "--format", "lerobot", "-o", out]) == 0
 
 
 def pictures_of(path):
@@ -219,9 +219,9 @@ def test_messages_of_a_topic_begin_and_end_episodes(here, capfd):
 
 
 WRONG = {
-    "a clock that is a topic": ({}, ["--grid", "/cmd"], "--lerobot needs a period"),
+    "a clock that is a topic": ({}, ["--grid", "/cmd"], "--format lerobot needs a period"),
     "part of a frame": ({}, ["--grid", "30ms"], "a whole number of frames per second, not 100/3"),
-    "another file": ({}, ["-o", "x.parquet"], "--lerobot has no -o, --format, --force"),
+    "another output": ({}, ["--force"], "--format lerobot needs a new folder"),
     "no such column": ({}, ["--feature", "action=/cm"], "did you mean `/cmd`?"),
     "no such field": ({}, ["/cmd:linear.q"], "has no field 'linear.q'"),
     "no name": ({}, ["--feature", "/cmd"], "write `action=/cmd_vel`"),
@@ -341,7 +341,7 @@ def test_a_process_that_is_killed_leaves_no_data_set(here):
     found = [recorded(tick, "/camera", picture(pixels)) for tick in range(4)]
     found += [recorded(10_000, "/camera", picture(pixels))]
     made.by_mcap(here / "rec.mcap", found)
-    words = ["columns", "rec.mcap", "--grid", "10Hz", "--lerobot", "ds"]
+    words = ["columns", "rec.mcap", "--grid", "10Hz", "--format", "lerobot", "-o", "ds"]
     with subprocess.Popen([sys.executable, "-m", "idlc", *words]) as process:
         wait_for(lambda: [*here.glob(".ds.*/videos/*/*/*")], "a video", limit=PROGRAM)
         process.kill()
@@ -364,10 +364,11 @@ def test_of_a_damaged_recording_is_written_what_can_be_read(here, capfd):
 def test_hostile_recordings_end_in_a_data_set_or_an_error(here, capfd):
     made.by_mcap(here / "rec.mcap", simple(4), chunk_size=3000)
     whole = Path("rec.mcap").read_bytes()
-    rng = random.Random(7)
+    rng, words = random.Random(7), ["columns", "rec.mcap", "--grid", "10Hz"]
+    words += ["--format", "lerobot", "-o"]
     for number in range(rounds(40)):
         Path("rec.mcap").write_bytes(mcap_mutations.mutated(whole, rng))
-        main(["columns", "rec.mcap", "--grid", "10Hz", "--lerobot", f"ds{number}"])
+        main([*words, f"ds{number}"])
         assert "IDL901" not in capfd.readouterr().err
     assert not [*here.glob(".ds*")]
 

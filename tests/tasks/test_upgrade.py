@@ -114,7 +114,7 @@ def test_definitions_that_were_not_recorded_come_from_elsewhere(old, source, tmp
     assert "hint: give the publisher's version with `--from PATH`" in shown.err
     (copied,) = messages_of(tmp_path / "unchanged" / "a.mcap", old.Drive)
     assert copied == old.Drive(speed=7)
-    assert main(["upgrade", "a.mcap", "--dry-run"]) == 1
+    assert main(["upgrade", "a.mcap", "--diff"]) == 1
     assert "no types changed" not in capsys.readouterr().out
     assert main([*words, "out", "--from", source]) == 0
     (made,) = messages_of(tmp_path / "out" / "a.mcap", idlc.load("src/drive_msgs").Drive)
@@ -149,9 +149,7 @@ def test_comments_change_the_definition_only(old, tmp_path, capsys):
 
 def test_a_dry_run_shows_the_fate_of_each_field(old, tmp_path, capsys):
     write_package(tmp_path / "new", WIDER)
-    assert (
-        main(["upgrade", "a.mcap", "--to", "new/drive_msgs", "--dry-run", "--format", "json"]) == 0
-    )
+    assert main(["upgrade", "a.mcap", "--to", "new/drive_msgs", "--diff", "--format", "json"]) == 0
     topic, summary = map(json.loads, capsys.readouterr().out.splitlines())
     assert topic["type"] == "topic"
     assert (topic["type_name"], topic["topic"], topic["fate"]) == (
@@ -189,7 +187,7 @@ def test_hints_lead_to_an_upgraded_recording(old, tmp_path, capsys):
     # of the new units nothing is left to convert
     capsys.readouterr()
     rules = ["--rules", "new/drive_msgs/upgrade"]
-    words = ["upgrade", "out/a.mcap", "--to", "new/drive_msgs", "--dry-run", *rules]
+    words = ["upgrade", "out/a.mcap", "--to", "new/drive_msgs", "--diff", *rules]
     assert main(words) == 0
     assert capsys.readouterr().out == "no types changed\n"
 
@@ -289,7 +287,7 @@ def test_only_named_rules_are_run(old, tmp_path, capsys):
     main(["check", "new/drive_msgs"])
     main(["breaking", "new/drive_msgs", "--against", "old/drive_msgs"])
     assert "drive.py converts recorded data" in capsys.readouterr().out
-    main(["upgrade", "a.mcap", "--to", "new/drive_msgs", "--dry-run", "--rules", str(folder)])
+    main(["upgrade", "a.mcap", "--to", "new/drive_msgs", "--diff", "--rules", str(folder)])
     assert not (tmp_path / "canary").exists()
     words = ["upgrade", "a.mcap", "--to", "new/drive_msgs", "-o", "out", "--rules", str(folder)]
     assert main(words) == 0
@@ -352,7 +350,7 @@ def test_wrong_calls_end_with_status_2(old, tmp_path, capsys):
     assert main(["upgrade", "nothing.mcap", "-o", "out"]) == 2
     assert main(["upgrade", "a.mcap", "--to", "distro:nope", "-o", "out"]) == 2
     assert main(["upgrade", "a.mcap", "--to", "nothing", "-o", "out"]) == 2
-    assert main(["upgrade", "a.mcap", "--topic", "/no", "--to", "new/drive_msgs", "-o", "o"]) == 2
+    assert main(["upgrade", "a.mcap", "/no", "--to", "new/drive_msgs", "-o", "o"]) == 2
     assert main(["upgrade", "a.mcap", "--rules", "no.py", "--to", "new/drive_msgs", "-o", "o"]) != 0
     assert main(["upgrade", "a.mcap", "--to", "new/drive_msgs", "-o", "."]) == 1
     assert "`./a.mcap` exists" in capsys.readouterr().err

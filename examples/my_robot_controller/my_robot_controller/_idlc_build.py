@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """Lets a build without idlc install classes only if they belong to today's interfaces."""
 # `idlc gen` copies this file beside classes. The build of their project runs it: a setup.py, or a

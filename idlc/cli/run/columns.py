@@ -18,7 +18,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.root import Root
 from idlc.project.words import expand, in_order, split_recordings
-from idlc.tasks.columns import ColumnsOptions, WrittenFile, columns
+from idlc.tasks.columns import STDOUT, ColumnsOptions, WrittenFile, columns
 
 if TYPE_CHECKING:
     from idlc.diagnostics.terminal import Progress
@@ -35,16 +35,17 @@ def run(
     how: tuple[str, ...],
     tolerance: tuple[str, ...],
     clock: tuple[str, ...],
-    lerobot: str | None,
+    no_datetimes: bool,
     features: tuple[str, ...],
     episodes: str | None,
     task: str | None,
     **arguments: Any,
 ) -> int:
     """Run the command and return the exit status."""
-    has_others = any([fields is not None, conditions, arguments["nested"], arguments["each"]])
-    data_set = (lerobot, features, episodes, task)
-    write = _write_of(grid, (how, tolerance, clock), data_set, has_others, arguments)
+    arguments["datetimes"] = not no_datetimes
+    others = [fields is not None, conditions, arguments["nested"], arguments["each"], no_datetimes]
+    data_set = (features, episodes, task)
+    write = _write_of(grid, (how, tolerance, clock), data_set, any(others), arguments)
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
     try:
@@ -77,18 +78,18 @@ def _write_of(
     arguments: dict[str, Any],
 ) -> Write:
     """Return what writes the files, or report options that do not belong together."""
-    is_data_set = data_set[0] is not None
+    is_data_set = arguments["style"] == "lerobot"
     if any(data_set) and not is_data_set:
-        raise click.UsageError("--feature, --episodes and --task need --lerobot")
+        raise click.UsageError("--feature, --episodes and --task need --format lerobot")
     if is_data_set and (grid is None or grid.startswith("/")):
-        raise click.UsageError("--lerobot needs a period, such as `--grid 30Hz`")
-    if is_data_set and (arguments["out"] != "-" or arguments["style"] or arguments["force"]):
-        raise click.UsageError("--lerobot has no -o, --format, --force")
+        raise click.UsageError("--format lerobot needs a period, such as `--grid 30Hz`")
+    if is_data_set and (arguments["out"] == STDOUT or arguments["force"]):
+        raise click.UsageError("--format lerobot needs a new folder: add -o DIR; omit --force")
     if grid is None:
         if any(ways):
             raise click.UsageError("--how, --tolerance and --clock need --grid")
         return columns
-    if has_others or not arguments["datetimes"]:
+    if has_others:
         hint = "select fields after a colon: `/imu:orientation`"
         raise click.UsageError(
             f"--grid has no --fields, --where, --each, --nested, --no-datetimes; {hint}"
@@ -100,7 +101,7 @@ def _write_of(
         from idlc.tasks.lerobot import LeRobot, write_data_set
 
         return partial(write_data_set, LeRobot(*data_set), clock, partial(_show_fit, False))
-    to_stdout = arguments["style"] == "text" or (arguments["out"] == "-" and sys.stdout.isatty())
+    to_stdout = arguments["style"] == "text" or (arguments["out"] == STDOUT and sys.stdout.isatty())
     return partial(columns, work=partial(write_aligned, clock, partial(_show_fit, to_stdout)))
 
 

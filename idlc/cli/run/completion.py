@@ -53,6 +53,13 @@ def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     return sorted(name for name in names if name.startswith(word))
 
 
+def topics_and_paths(
+    context: click.Context, parameter: click.Parameter, word: str
+) -> list[CompletionItem[str]]:
+    """Offer topics and, in the shell's own way, files."""
+    return [_item(word, "file"), *map(_item, topics(context, parameter, word))]
+
+
 #: Seconds that a shell waits for a robot.
 ROBOT_TIMEOUT = 1.0
 

@@ -19,7 +19,7 @@ from idlc.diagnostics.text import one_line
 from idlc.project.find import Stamp, list_files, snapshot, stamps
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope, settings_here
-from idlc.project.words import files, is_address, read_words
+from idlc.project.words import files, is_address, read_words, split_topics
 from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
 
 if TYPE_CHECKING:
@@ -135,7 +135,8 @@ def run(style: str, watch: bool, **arguments: Any) -> int:
     words = [arguments.pop(name) for name in ("package", "include", "exclude", "distro")]
     again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
     arguments["vendoring"] = arguments["vendoring"] or ""
-    typed = GenOptions(**arguments, scope=scope(settings, *words), again=again)
+    arguments["paths"], topics = split_topics(arguments["paths"], Root.here())
+    typed = GenOptions(**arguments, topics=topics, scope=scope(settings, *words), again=again)
     request = in_package(with_settings(typed, settings))
     _refuse_what_has_no_effect(request, package)
     if request.check and (watch or request.force):
@@ -158,10 +159,7 @@ def _refuse_what_has_no_effect(request: GenOptions, package: str | None) -> None
             message = f"this folder contains several packages; run `{' && '.join(commands)}`"
         raise click.UsageError(message)
     root = request.scope.root
-    judged = request.paths if package or request.topics else ()
-    meant = read_words(judged, root)
-    if request.topics and not meant["recording"]:
-        raise click.UsageError("--topic needs a recording")
+    meant = read_words(request.paths if package else (), root)
     if package and not meant["path"]:
         what = "a recording" if meant["recording"] else "an installed package"
         raise click.UsageError(f"--package applies to files, but {what} keeps its own package name")

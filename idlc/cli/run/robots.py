@@ -91,17 +91,17 @@ def echo(
         return
     output.notes(report, sys.stderr)
     report.notes.clear()
-    read: Callable[[bytes], dict[str, Any]] = partial(_read_all, kind)
-    if fields is not None:
-        try:
-            read = messages.fields_of(kind, [path.strip() for path in fields.split(",")])
-        except ValueError as error:
-            raise click.UsageError(str(error)) from None
 
     def complain(reason: str) -> None:
         sys.stderr.write(f"note: {one_line(reason)}\n")
         sys.stderr.flush()
 
+    read: Callable[[bytes], dict[str, Any]] = partial(_read_all, kind)
+    if fields is not None:
+        try:
+            read = messages.fields_of(kind, [path.strip() for path in fields.split(",")], complain)
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
     arrived = arriving(session, ends, read, count, report, complain, kind)
     with suppress(KeyboardInterrupt):
         for text in messages.texts(style, arrived, is_brief=sys.stdout.isatty()):

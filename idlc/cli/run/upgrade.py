@@ -16,8 +16,9 @@ from idlc.diagnostics.report import ReportedError
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
+from idlc.project.root import Root
 from idlc.project.settings import scope, settings_here
-from idlc.project.words import expand
+from idlc.project.words import expand, split_topics
 from idlc.tasks.upgrade.recordings import (
     TopicPlan,
     UpgradeOptions,
@@ -93,10 +94,11 @@ def run(
     settings, report = settings_here()
     if out is None and not arguments["dry_run"] and arguments["write_rules"] is None:
         raise click.UsageError("missing option '-o'; give a folder for the new recordings")
-    recordings = tuple(dict.fromkeys(path for word in paths for path in expand(word) or [word]))
+    words = dict.fromkeys(path for word in paths for path in expand(word) or [word])
+    recordings, topics = split_topics(tuple(words), Root.here())
     again = shlex.join(("idlc", "upgrade", *options.typed("write_rules", "dry_run", "style")))
     where = scope(settings, package, include, exclude, distro)
-    request = UpgradeOptions(recordings, where, out, again=again, **arguments)
+    request = UpgradeOptions(recordings, where, out, topics=topics, again=again, **arguments)
     result = UpgradeResult([], [], [], {}, {})
     with suppress(ReportedError):
         report.raise_errors()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence, Sized
+from collections.abc import Iterable, Sequence, Sized
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -104,10 +104,14 @@ class ListElement(NamedTuple):
 
     def warn(self, texts: list[str], count: int) -> None:
         """Warn that none of so many messages has the element, but others, with these names."""
+        where = f"any of {count:,} messages"
+        warnings.warn(MissingElementWarning(self.missing(texts, where)), stacklevel=2)
+
+    def missing(self, texts: Iterable[str], where: str) -> str:
+        """Return the sentence about messages that have these names instead."""
         known = sorted({text for text in texts if len(text) <= MOST_NAMES})
         hint = did_you_mean(self.name, known) or f"it has {', '.join(known) or 'none'}"
-        what = f"`{self.names}` has no `{self.name}` in any of {count:,} messages"
-        warnings.warn(MissingElementWarning(f"{what}: {hint}"), stacklevel=2)
+        return f"`{self.names}` has no `{self.name}` in {where}: {hint}"
 
 
 def _at(columns: Columns, path: str) -> Any:

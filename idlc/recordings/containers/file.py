@@ -63,7 +63,7 @@ def wrong_count(topic: str, counted: int, actual: int) -> str:
 def check_count(topic: str, counted: int, actual: int) -> None:
     """Raise RecordingError if the number of messages is not the counted one."""
     if counted != actual:
-        hint = worded("`idlc columns --no-index`", "Recording(path, index=False)")
+        hint = worded("`idlc columns --no-check`", "Recording(path, index=False)")
         hint += " ignores the counts in the file"
         raise RecordingError(wrong_count(topic, counted, actual), hint)
 

@@ -385,7 +385,7 @@ def _judge(
     """Report the fields that need a rule, the data that is lost, and rules that were not named."""
     folders = sorted({options.scope.root.shown(each.file.parent) for each in found})
     words = [options.again, *(f"--rules {shlex.quote(folder)}" for folder in folders)]
-    running = " ".join([*words, "--dry-run"] if options.out is None else words)
+    running = " ".join([*words, "--diff"] if options.out is None else words)
     every = Known((*rules.files, *found))
     useful: set[str] = set()
     for entry in plans:

@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """Fixed-size numeric arrays, held as `numpy.ndarray`. Imported only by modules with such fields."""
 

@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """Checks of values: of whole messages, of what codecs refuse, and at each assignment.
 

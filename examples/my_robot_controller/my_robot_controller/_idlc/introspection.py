@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """Types as ROS 2 asks about them: hash, description, source text, members, C structures.
 

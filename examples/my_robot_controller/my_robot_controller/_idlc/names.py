@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """The names of an interface in Python, names that are imported on first use, and errors.
 

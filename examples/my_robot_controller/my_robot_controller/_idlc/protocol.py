@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 # mypy: disable-error-code="import-not-found,import-untyped"
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false

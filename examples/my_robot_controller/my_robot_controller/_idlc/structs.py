@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """The introspection kind: rmw_cyclonedds_cpp and others that walk over C structures.
 

@@ -2,6 +2,7 @@
 # flake8: noqa
 # fmt: off
 # mypy: ignore-errors
+# pyright: reportMissingImports=false
 # ruff: noqa
 """Type support for rclpy, made from Python: what rclpy finds on a class's metaclass.
 
