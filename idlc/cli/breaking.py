@@ -62,15 +62,17 @@ def command(**arguments: Any) -> int:
     behaviour  the same code behaves differently
 
     With --against distro:NAME, idlc compares two versions of each standard interface that PATH
-    uses: the version in your distribution and the version in the distribution NAME. Without PATH,
-    it compares all standard interfaces.
+    uses: the version in your distribution and the version in the distribution NAME. If neither PATH
+    nor `paths` in pyproject.toml is given, it compares all standard interfaces.
 
-    With --against REC, idlc reports changes that prevent programs with your interfaces from reading
-    the recording. If PATH is a recording, too, idlc compares the recorded types with each other.
-    Without PATH, it compares every recorded type with the type on this machine.
+    With --against REC, a recording, idlc reports changes that prevent programs with your interfaces
+    from reading it. PATH can be a second recording: idlc then compares the types of the two. If
+    neither PATH nor `paths` is given, it compares each recorded type with the type that `idlc list`
+    finds.
 
-    With --against graph or ADDRESS, idlc reports each type that running nodes use in different
-    versions. It also compares these versions with your files and your installed packages.
+    With --against graph (the nodes that run now) or ADDRESS, idlc reports each type that these
+    nodes use in different versions. It also compares these versions with your files and your
+    installed packages.
     """  # noqa: D301  (click needs the character, not the escape)
     from idlc.cli.run.breaking import run
 

@@ -30,8 +30,8 @@ from idlc.cli import completion, options
     "prefix",
     metavar="PREFIX",
     type=click.Path(),
-    help="Instead of PATH, check the packages that are installed in the folder PREFIX: can C++ "
-    "tools load them?",
+    help="Do not check PATH, but only whether C++ tools such as ros2 bag can load the packages "
+    "that are installed in the folder PREFIX.",
 )
 @options.packages
 @options.distros
@@ -43,8 +43,8 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
     pyproject.toml, idlc checks the package that the file belongs to. Without PATH, idlc checks the
     `paths` in pyproject.toml. If `paths` is not set, idlc checks the working folder.
 
-    If you name several distributions, idlc reports each problem once, with the distributions that
-    it affects.
+    If you name several distributions with --distro, idlc reports each problem once, with the
+    distributions that it affects.
 
     The categories of rules are correctness, portability, style and package. `idlc explain` lists
     all rules.
@@ -79,12 +79,12 @@ def check_command(paths: tuple[str, ...], **arguments: Any) -> int:
 def fmt_command(**arguments: Any) -> int:
     """Normalize whitespace and keep deliberate alignment.
 
-    idlc keeps a wide gap that aligns names or comments in a column. It also keeps a wide gap that
-    all lines up to the next empty line have. If the lines above and below a line are aligned, idlc
-    aligns that line with them. Every other gap becomes one space, or two spaces before a comment.
-    idlc puts spaces on both sides of `=` or on neither side, and keeps at most two consecutive
-    empty lines. If idlc changes a file, it also removes trailing whitespace and adds a missing
-    final newline.
+    A gap of several spaces stays if it aligns names or comments in a column, or if every line of a
+    block has it. (Empty lines separate blocks.) If the lines above and below a line are aligned,
+    idlc aligns that line with them. Every other gap becomes one space, or two spaces before a
+    comment. A `=` with a space on one side gets one on the other side, too. idlc keeps at most two
+    consecutive empty lines. If one of these rules changes a file, idlc also removes trailing
+    whitespace and adds a missing final newline.
 
     Formatting never changes the meaning of a file. idlc skips files with syntax errors. PATH works
     as in `idlc check`.

@@ -22,8 +22,8 @@ from idlc.cli import completion, options
 @options.output_style(
     ("text", "json", "hash", "type-description", "ros2idl", "jsonschema", "mcap", "msg"),
     "Output format. `hash` is the type hash (RIHS01), `type-description` the JSON file that ROS 2 "
-    "installs, `ros2idl` an IDL file, `jsonschema` a JSON Schema, and `mcap` the schema of an MCAP "
-    "file. `msg` writes the recorded definitions as files (see --out).",
+    "installs, `ros2idl` an IDL file, `jsonschema` a JSON Schema, and `mcap` the text that an MCAP "
+    "file contains for this type. `msg` writes the recorded definitions as files (see --out).",
 )
 @click.option(
     "-o",
@@ -40,14 +40,16 @@ def command(**arguments: Any) -> None:
     TYPE is a name such as std_msgs/msg/Header, PATH is a file or folder, and REC is a recording.
 
     For a recording, idlc lists each topic with its type, message count and type hash, and shows
-    whether your local type matches. With TOPIC, it shows the recorded definitions of these topics.
+    whether the type that `idlc list` finds is the same. With TOPIC, it shows the recorded
+    definitions of these topics.
 
-    REC can also be the address of a robot, such as `dds` or tcp/robot:7447. idlc lists the robot's
+    REC can also be the address of a robot: `dds` (the nodes on this machine), dds/192.168.1.20 or,
+    with Zenoh, tcp/robot:7447. idlc lists the robot's
     topics, services and actions, and the nodes that use them. It also reports incompatible
     endpoints.
 
-    With --format hash, idlc prints the hash of each type that you name. For a service or action, it
-    also prints the hashes of its messages, such as the request.
+    With --format hash, idlc prints the hash of the type. For a service or action, it also prints
+    the hashes of its messages, such as the request.
     """
     from idlc.cli.run.show import run
 
