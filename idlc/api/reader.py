@@ -7,7 +7,7 @@ import sys
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from operator import attrgetter
 from typing import Any, TypeAlias, overload
 
@@ -18,8 +18,9 @@ from idlc.model.from_description import message_of
 from idlc.recordings.arguments import message_class
 from idlc.runtime.cdr import NATIVE
 from idlc.runtime.checked import validate_count, validate_element
-from idlc.runtime.codec import FAILURES, READINGS, deserialize, maker, text_of_view
+from idlc.runtime.codec import FAILURES, READINGS, VIEWING, deserialize, maker, text_of_view
 from idlc.runtime.names import DecodeError, ValidationError, owner_of, slot_name
+from idlc.runtime.sequences import element_type
 from idlc.runtime.typeinfo import FieldInfo, Structure, structure_of
 from idlc.wire.layout import Messages
 
@@ -143,7 +144,7 @@ class _Type:
             "_idlc": runtime,
             "reading": READINGS[text_of_view, True],
             "maker_of": lambda name: maker(self.structure.types[name].find_class()),
-            "dtype": _dtype,
+            "dtype": partial(element_type, reading=VIEWING),
             "words_of": _words_of,
             "pass_texts": _pass_texts,
             "DecodeError": self.error,
@@ -177,13 +178,6 @@ def _messages(structure: Structure) -> Iterator[tuple[ir.TypeName, ir.Message]]:
 
 
 # parts of readers
-
-
-def _dtype(order: str, name: str) -> Any:
-    import numpy as np
-
-    kind: Any = np.dtype(name)
-    return kind.newbyteorder(order)
 
 
 def _words_of(data: Buffer, limit: int, order: str) -> Any:

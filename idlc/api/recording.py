@@ -25,7 +25,6 @@ from idlc.recordings.containers.container import Container, Topic, open_pieces, 
 from idlc.recordings.containers.file import CDR, START, full_name, other_encoding, unread_reason
 from idlc.recordings.containers.messages import (
     ALWAYS,
-    END_OF_TIME,
     NO_TIME,
     Raw,
     TopicMessages,
@@ -36,7 +35,7 @@ from idlc.recordings.containers.messages import (
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.damage import Damage, DamageWarning
 from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
-from idlc.recordings.times import date_text, moment
+from idlc.recordings.times import END_OF_TIME, date_text, moment
 from idlc.runtime.codec import PAUSE
 from idlc.runtime.typeinfo import Structure, structure_of
 

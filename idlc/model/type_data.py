@@ -23,15 +23,20 @@ def content(model: link.Model) -> dict[str, Any]:
             full = describer.description(str(structure.name))
             for description in (full["type_description"], *full["referenced_type_descriptions"]):
                 descriptions[description["type_name"]] = description
-    sources = {
+    return {
+        "package": model.package,
+        "descriptions": dict(sorted(descriptions.items())),
+        "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
+        "sources": sources(model),
+    }
+
+
+def sources(model: link.Model) -> dict[str, str]:
+    """Return the files of a package's interfaces, by their names."""
+    texts = {
         # rosidl reads texts so, and no checkout of git's makes a difference then
         str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
         for interface in model.own
         if interface.source is not None
     }
-    return {
-        "package": model.package,
-        "descriptions": dict(sorted(descriptions.items())),
-        "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
-        "sources": dict(sorted(sources.items())),
-    }
+    return dict(sorted(texts.items()))

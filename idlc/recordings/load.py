@@ -19,7 +19,7 @@ from idlc.diagnostics.report import Report, ReportedError
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DISTROS, Distro, titles
 from idlc.model.python_names import class_
-from idlc.model.type_data import content
+from idlc.model.type_data import content, sources
 from idlc.project.library import resolve
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
@@ -176,8 +176,12 @@ class TopicType:
 
     @cached_property
     def structure(self) -> Structure:
-        """The type, field by field."""
-        return Types(content(self.models[self.name.package]))[str(self.name)]
+        """The type, field by field, with the texts of all types in it."""
+        texts: dict[str, str] = {}
+        for model in self.models.values():
+            texts |= sources(model)
+        own = content(self.models[self.name.package])
+        return Types({**own, "sources": texts})[str(self.name)]
 
     @cached_property
     def kind(self) -> Any:

@@ -12,6 +12,8 @@ from typing import Any
 from idlc.recordings.containers.source import RecordingError
 
 SECOND = 10**9
+#: Times of numpy and Arrow end here, in the year 2262.
+END_OF_TIME = 1 << 63
 #: A plain number below this counts seconds from the start of the recording, one above is a time of
 #: ROS, in seconds; from the second on, in nanoseconds.
 LEAST_TIME = 10**9

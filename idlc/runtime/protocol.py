@@ -18,7 +18,7 @@ from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, order_of, wide_text
 from .message import Message, OnDemand, Service, define, equal
 from .names import owner_of, public_name, wire_name
-from .sequences import ListOf, sequence_reader, sequence_writer
+from .sequences import ListOf, element_type, sequence_reader, sequence_writer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -386,8 +386,10 @@ def field_codecs(kind: type) -> codec.Codecs:
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
         def numbers(message: Any, field: Any, raw: Any) -> Any:
             if field.is_sequence:
-                reading_of = reading.of(type(message))
-                return sequence_reader(order, field.primitive.code, reading_of)(raw)
+                code, own = field.primitive.code, reading.of(type(message))
+                element = element_type(order, code, own)
+                count = len(raw) // field.primitive.size
+                return sequence_reader(order, code, own)(raw, element, count, 0)
             from .arrays import array_reader
 
             return array_reader(order, field.primitive.name, field.size, reading)(raw)

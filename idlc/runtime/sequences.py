@@ -40,6 +40,8 @@ SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "
 
 #: From so many numbers on, copying them takes longer than it takes not to.
 MANY = 1 << 16
+#: Below so many, copying them once more takes less time than a memoryview.
+FEW = 1 << 10
 #: What `array` itself takes as rosidl means it: the memory of bytes, the elements of others.
 _TAKEN = (list, tuple, array, bytes, bytearray)
 
@@ -233,31 +235,37 @@ def sequence_copier(order: str, code: str) -> Callable[[Any], Any]:
     return copy
 
 
-def view_reader(order: str, name: str) -> Callable[[Any], Any]:
-    """Return a function that makes a numpy array over a buffer, in whichever byte order that is."""
+def element_type(order: str, name: str, reading: Reading) -> Any:
+    """Return the numpy type of the elements of views; copies need none."""
+    if reading.copy:
+        return None
     import numpy as np
 
-    kind: Any = np.dtype(name)
-    dtype, frombuffer = kind.newbyteorder(order), np.frombuffer
-    return lambda raw: frombuffer(raw, dtype)  # half of what a keyword takes
+    dtype: Any = np.dtype(name)
+    return dtype.newbyteorder(order)
 
 
-def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], Any]:
-    """Return a function that turns a buffer in the wire's byte order into a field's value.
+def sequence_reader(order: str, code: str, reading: Reading) -> Callable[..., Any]:
+    """Return a function that makes a field's value of a buffer.
 
-    That is a new `array.array`, or a `numpy.ndarray` over the buffer itself.
+    It takes the buffer, the `element_type`, the number of elements and their position. The value
+    is a new `array.array`, shorter if the buffer is, or a `numpy.ndarray` over the buffer.
     """
     if not reading.copy:
-        return view_reader(order, code)
-    new = array(code).__copy__  # half of what `array(code)` takes
+        import numpy as np
 
-    def native(raw: Any) -> Any:
+        return np.frombuffer
+    empty = array(code)
+    new, size = empty.__copy__, empty.itemsize  # half of what `array(code)` takes
+
+    def native(data: Any, _element: Any, count: int, start: int) -> Any:
+        raw = data if count < FEW else memoryview(data)
         result = new()
-        result.frombytes(raw)
+        result.frombytes(raw[start : start + size * count])
         return result
 
-    def swapped(raw: Any) -> Any:
-        result = native(raw)
+    def swapped(*part: Any) -> Any:
+        result = native(*part)
         result.byteswap()
         return result
 

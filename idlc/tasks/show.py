@@ -151,8 +151,6 @@ class RecordingFacts(NamedTuple):
     damage: list[str]
 
 
-#: Times of numpy and Arrow end here, in the year 2262.
-END_OF_TIME = 1 << 63
 #: The values of profiles; Humble wrote numbers.
 PROFILE = re.compile(r"^[-\s]*(reliability|durability|history|depth):\s*(\w+)\s*$", re.MULTILINE)
 NUMBERS = {
@@ -211,6 +209,7 @@ def recording(
 ) -> tuple[RecordingFacts | None, list[TopicFacts]]:
     """Return the summary of a recording and its topics, sorted by name; nothing after an error."""
     from idlc.api.sources import read_source
+    from idlc.recordings.times import END_OF_TIME
     from idlc.recordings.types import (
         LocalTypes,
         RecordingSummary,

@@ -3,9 +3,12 @@
 import re
 import runpy
 import shutil
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 
 from idlc.cli.main import main
 from tests.support.paths import DOCS
@@ -16,7 +19,7 @@ BLOCKS = re.findall(
 )
 
 
-def test_programs_and_commands_print_what_the_page_shows(here, capfd):
+def test_programs_and_commands_print_what_the_page_shows(here, capfd, monkeypatch):
     for program, _, text in BLOCKS:
         if program:
             (here / program).write_text(text, encoding="utf-8")
@@ -40,3 +43,12 @@ def test_programs_and_commands_print_what_the_page_shows(here, capfd):
     with np.load("train.npz") as train:
         assert train["images"][20, 0, :, 0].argmax() == int(3 * 2.04)
     assert {path.name for path in here.glob("tables/*")} == {"monday.parquet", "manifest.json"}
+    lake = {}
+
+    def write_dataset(batches, path, schema):
+        lake[path] = pa.Table.from_batches(batches, schema)
+
+    monkeypatch.setitem(sys.modules, "lance", SimpleNamespace(write_dataset=write_dataset))
+    runpy.run_path("lake.py")
+    assert lake["train.lance"].num_rows == 50
+    assert not any("." in name for name in lake["train.lance"].column_names)

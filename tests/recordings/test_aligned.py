@@ -210,6 +210,25 @@ def test_a_topic_without_messages_has_no_values(how, tmp_path):
             assert sum(len(part.to_arrow()) for part in table.parts()) == count
 
 
+def test_a_stamp_that_a_recording_defines_in_its_own_way_is_no_clock(tmp_path):
+    parts = ["std_msgs/Header header", "=" * 80, "MSG: std_msgs/Header"]
+    parts += ["builtin_interfaces/Time stamp", "=" * 80, "MSG: builtin_interfaces/Time"]
+    text = "\n".join([*parts, "int32 sec", "uint32 ticks  # [us]"])
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = made.Writer(file)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("own_msgs/msg/Stamped", "ros2msg", text.encode())
+        channel = writer.register_channel("/a", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\1\0\0" + bytes(8), 1)
+        writer.finish()
+    with idlc.Recording(tmp_path / "a.mcap") as recording:
+        table = recording.aligned(["/a"], on="/a")
+        assert table.to_arrow()["/a.header.stamp.ticks"].to_pylist() == [0]
+        assert table.schema.field("/a.header.stamp.ticks").metadata == {b"ros2.unit": b"us"}
+        with pytest.raises(RecordingError, match=r"messages of /a have no header.stamp"):
+            recording.aligned(["/a"], on="/a", clock="header")
+
+
 def test_a_header_of_its_own_is_no_clock(tmp_path):
     found = [message for message in made.varied() if message.topic in ("/Bool", "/TFMessage")]
     with idlc.Recording(made.by_mcap(tmp_path / "a.mcap", found)) as recording:

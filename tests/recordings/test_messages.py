@@ -1,16 +1,19 @@
 """Messages are read as they were recorded, with the help of indexes and without."""
 
+import random
 import shutil
 import sqlite3
 from contextlib import closing
 from struct import pack, unpack_from
 
+import lz4.frame
 import pytest
 
 from idlc.recordings.containers import records as mcap
+from idlc.recordings.containers.compression import PIECE, decompress
 from idlc.recordings.containers.container import open_recording
 from idlc.recordings.containers.messages import Window, join_messages
-from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.containers.source import DamageError, RecordingError
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
 from tests.support import mcap_mutations
 from tests.support import recordings as made
@@ -261,6 +264,21 @@ def test_a_chunk_that_holds_another_size_is_refused(compression, declared, tmp_p
     with pytest.raises(RecordingError, match=r"declares [\d,]+ bytes and holds"):
         read(path, "/imu", strict=True)
     assert read(path, "/imu") == recorded("/imu")  # as the checksum proves
+
+
+@pytest.mark.parametrize("block_size", [lz4.frame.BLOCKSIZE_MAX64KB, lz4.frame.BLOCKSIZE_MAX4MB])
+@pytest.mark.parametrize("size", [0, 1, PIECE - 1, PIECE, PIECE + 1, 5 * PIECE, 9 << 19])
+def test_blocks_of_lz4_need_not_be_as_large_as_pieces(block_size, size):
+    data = random.Random(size).randbytes(1000) * (size // 1000 + 1)
+    frame = memoryview(lz4.frame.compress(data[:size], block_size=block_size))
+    target = memoryview(bytearray(size))
+    decompress(frame, "lz4", target)
+    assert target == data[:size]
+    with pytest.raises(DamageError, match=rf"declares {size + 1:,} bytes and holds {size:,}"):
+        decompress(frame, "lz4", memoryview(bytearray(size + 1)))
+    if size:
+        with pytest.raises(DamageError, match="holds more"):
+            decompress(frame, "lz4", target[1:])
 
 
 def test_a_chunk_that_cannot_be_decompressed_is_refused(tmp_path):

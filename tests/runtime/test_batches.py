@@ -20,6 +20,7 @@ FILES = {
     "msg/Joints.msg": "Header header\nstring[] name\nfloat64[] position\nbool[] moving\n",
     "msg/Marks.msg": "uint8 n\nPoint[] points\nOdd[3] odds\nHeader[<=4] headers\nEmpty empty\n",
     "msg/Wide.msg": "wstring text\n",
+    "msg/Blocks.msg": "string text\nfloat64[2] a\nuint8 n\nint16[3] b\nfloat64[4] c\nint16[1] d\n",
     "msg/Image.msg": "uint32 width\nuint8[] data\nfloat32[300] gains\nint16[] more\n",
 }
 
@@ -168,6 +169,20 @@ def test_a_copy_shares_nothing(msg):
     read = msg.Image.deserialize(raw)
     raw[:] = bytes(len(raw))
     assert list(read.data) == list(range(200))
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+@pytest.mark.parametrize("text", ["", "odd", "longer"])
+def test_arrays_that_are_read_together_share_no_number(msg, text, order):
+    made = msg.Blocks(text=text, a=[1, 2], n=3, b=[4, 5, 6], c=[7, 8, 9, 10], d=[11])
+    raw = made.serialize(byteorder=order)
+    assert msg.Blocks.deserialize(raw, copy=False) == made
+    for changed in "abcd":
+        read, expected = msg.Blocks.deserialize(raw), deepcopy(made)
+        getattr(read, changed)[:] = 0
+        setattr(expected, changed, np.zeros_like(getattr(made, changed)))
+        assert read == expected
+        assert getattr(read, changed).flags.aligned
 
 
 # strings that repeat from message to message

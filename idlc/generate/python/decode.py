@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias
 
+from msgspec.structs import replace
+
 from idlc.generate.python.lines import (
     CodeStatement,
     CompoundStatement,
@@ -35,12 +37,16 @@ UNENDED = (PlainStatement('raise ValueError("text without end")'),)
 
 
 class ReadRun(ValueRun):
-    """Values with what follows them, and the alignment and size of each."""
+    """Values with what follows them, and the alignment and size of each.
+
+    `arrays` has the arrays of numbers, by their type and their index among the values.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.sizes: list[tuple[int, int]] = []
         self.after: list[CodeStatement] = []
+        self.arrays: dict[str, dict[int, plan.NumberBlock]] = {}
 
     def skipped(self, cursor: Cursor) -> Cursor:
         """Return the position after the values, of which the first is at `cursor`."""
@@ -67,7 +73,7 @@ def slice_of(start: str, end: str = "end") -> str:
 
 
 def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
-    """Return whether a structure holds numeric buffers, which are read through a memoryview."""
+    """Return whether a structure holds numeric buffers, of which a memoryview saves a copy."""
     return any(
         isinstance(step, plan.NumbersStep) or (isinstance(step, plan.NumberBlock) and step.is_large)
         for step in plan.walk(steps)
@@ -82,38 +88,30 @@ def decode(
     `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
     packages.
     """
-    bulk = is_bulk(steps)
-    decoder = Decoder(tables, makers, foreign, "view" if bulk else "data")
+    decoder = Decoder(tables, makers, foreign, is_bulk(steps))
     decoder.line(f"{own}()", "message")
     for step in steps:
         decoder.step(step)
     decoder.flush(last=True)
     if decoder.unchecked:
         decoder.short_if(f"{decoder.position.text()} > limit")
-    first = []
-    if decoder.limited or bulk:
-        first.append(PlainStatement("len(data)", "limit"))
-    if bulk:
-        small = tables.define("small", "reading.small")
-        first.append(PlainStatement(f"data if limit < {small} else memoryview(data)", "view"))
+    first = (PlainStatement("len(data)", "limit"),) if decoder.limited else ()
     return (*first, *decoder.body, PlainStatement("return message"))
 
 
 class Decoder(Builder):
     """Emits statements that read; `run` is not yet emitted, `position` is before it.
 
-    `source` names the variable that buffers are slices of. `limited`: a check needs the buffer's
-    size. `unchecked`: no statement has noticed yet that a buffer was cut short. `worded`: the
-    sizes of strings are in `words` and their text in `chars`.
+    `bulk`: there are numeric buffers. `limited`: a check needs the buffer's size. `unchecked`: no
+    statement has noticed yet that a buffer was cut short. `worded`: the sizes of strings are in
+    `words` and their text in `chars`.
     """
 
-    def __init__(
-        self, tables: NamedExpressions, makers: Names, foreign: Names, source: str
-    ) -> None:
+    def __init__(self, tables: NamedExpressions, makers: Names, foreign: Names, bulk: bool) -> None:
         super().__init__(tables, Cursor("", 4, multiple_of(8)))
         self.makers = makers
         self.foreign = foreign
-        self.source = source
+        self.bulk = bulk
         self.run = ReadRun()
         self.limited = False
         self.unchecked = False
@@ -128,10 +126,12 @@ class Decoder(Builder):
         if run.sizes[0][0] == run.widest:
             self.align(run.widest)
         offset = self.position.text()
+        known = self.position.alignment.knows(run.widest)
+        self.make_arrays(run, self.position if known else None)
         if self.worded and run.fields == ["I"]:
             self.line(f"words[{self.position.text(4)} >> 2]", run.values[0])
             self.position = run.skipped(self.position)
-        elif self.position.alignment.knows(run.widest):
+        elif known:
             reader = self.reader(run, self.position.alignment.residue)
             self.body.append(run.assignment(call(reader, "data", offset)))
             self.position = run.skipped(self.position)
@@ -178,14 +178,14 @@ class Decoder(Builder):
             self.store_position("at")
         return self.position.text()
 
-    def buffer(self, count: str, align: int, size: int, source: str) -> str:
+    def buffer(self, count: str, align: int, size: int) -> str:
         """Return the slice of `count` elements, and move after it.
 
         It is shorter if the buffer is, which whatever is read next notices.
         """
         start = self.pass_elements(count, align, size)
         self.unchecked = True
-        return f"{source}{slice_of(start)}"
+        return f"data{slice_of(start)}"
 
     def pass_elements(self, count: str, align: int, size: int) -> str:
         """Move after `count` elements, and return the position of the first."""
@@ -217,7 +217,7 @@ class Decoder(Builder):
             case plan.StringStep(place, wide):
                 self.line(self.wide_text(place) if wide else self.text(place), place.text)
             case plan.Bytes(place, primitive, bound):
-                raw = self.buffer(self.count(bound, place.path), 1, 1, self.source)
+                raw = self.buffer(self.count(bound, place.path), 1, 1)
                 self.line(call(self.list_reader(primitive), raw), place.text)
             case plan.NumbersStep():
                 self.numbers(step)
@@ -236,9 +236,39 @@ class Decoder(Builder):
             run.add(step.code, step.unit, step.place.text, step.place.path)
         else:
             run.add(step.code, step.unit, step.place.local, step.place.path)
-            reader = self.block_reader(step)
-            run.after.append(PlainStatement(call(reader, step.place.local), step.place.text))
+            run.arrays.setdefault(step.primitive, {})[len(run.sizes)] = step
         run.sizes.append((step.unit, step.size))
+
+    def make_arrays(self, run: ReadRun, position: Cursor | None = None) -> None:
+        """Make arrays of the bytes of a run, those of one type as parts of one.
+
+        A slice of an array takes less time than an array. The Struct, which goes over their bytes,
+        checks that the buffer has them. Without its position, each is made of its own bytes.
+        """
+        for primitive, arrays in run.arrays.items():
+            if position is None or len(arrays) < 2 or primitive in plan.LIST_PRIMITIVES:
+                for step in arrays.values():
+                    made = call(self.block_reader(step), step.place.local)
+                    run.after.append(PlainStatement(made, step.place.text))
+                continue
+            cursor, starts = position, {}
+            for index, (align, size) in enumerate(run.sizes):
+                start = cursor.aligned(align)
+                if index in arrays:
+                    starts[index] = start
+                    run.fields[index] = f"{start.offset - cursor.offset + size}x"
+                cursor = start.skip(size)
+            first, last, unit = min(arrays), max(arrays), arrays[min(arrays)].unit
+            begin, end = starts[first], starts[last].skip(arrays[last].size)
+            whole = replace(arrays[first], count=(end.offset - begin.offset) // unit)
+            numbers = self.tables.local("numbers")
+            made = call(self.block_reader(whole), "data", begin.text())
+            run.after.append(PlainStatement(made, numbers))
+            for index, step in arrays.items():
+                run.values.remove(step.place.local)
+                at = (starts[index].offset - begin.offset) // unit
+                part = f"{numbers}[{at}:{at + step.count}]"
+                run.after.append(PlainStatement(part, step.place.text))
 
     def block_reader(self, step: plan.NumberBlock) -> str:
         """Return the function that turns bytes into a fixed-size array."""
@@ -284,28 +314,35 @@ class Decoder(Builder):
     def wide_text(self, place: plan.Slot) -> str:
         """Read the size of a wstring; return the expression that reads the wstring."""
         self.number("count", place.path)
-        raw = self.buffer("count", 4, 4, "data")
+        raw = self.buffer("count", 4, 4)
         return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
 
     def numbers(self, step: plan.NumbersStep) -> None:
         """Read a numeric sequence as one buffer."""
-        raw = self.buffer(self.count(step.bound, step.place.path), step.unit, step.unit, "view")
+        count = self.count(step.bound, step.place.path)
+        start = self.pass_elements(count, step.unit, step.unit)
+        self.unchecked = True
         name, reading = step.info.dtype, "reading"
         if foreign := self.foreign.get(step.place.type):  # the class that holds it
             name, reading = f"{name}_of_{snake_case(foreign)}", f"reading.of({foreign})"
-        function = call("sequence_reader", "order", f'"{step.info.code}"', reading)
-        reader = self.tables.function(f"sequence_of_{name}", function)
-        self.line(call(reader, raw), step.place.text)
+        arguments = ("order", f'"{step.info.code}"', reading)
+        reader = self.tables.function(f"sequence_of_{name}", call("sequence_reader", *arguments))
+        element = self.tables.function(name, call("element_type", *arguments))
+        self.line(call(reader, "data", element, count, start), step.place.text)
 
     def block(self, step: plan.NumberBlock) -> None:
         """Read a large array of fixed size as one buffer."""
         self.flush()
         self.align(step.unit)
-        start, end = self.position.text(), self.position.text(step.size)
-        self.short_if(f"{end} > limit")
-        self.position = self.position.skip(step.size)
-        reader = self.block_reader(step)
-        self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
+        start = self.position
+        self.position = start.skip(step.size)
+        self.short_if(f"{self.position.text()} > limit")
+        if step.primitive in plan.LIST_PRIMITIVES:
+            raw = f"data{slice_of(start.text(), self.position.text())}"
+            made = call(self.block_reader(step), raw)
+        else:
+            made = call(self.block_reader(step), "data", start.text())
+        self.line(made, step.place.text)
 
     def begin(self, step: plan.StringsStep | plan.StructuresStep) -> str:
         """Read the count, or return the size."""
@@ -352,7 +389,7 @@ class Decoder(Builder):
         worded = self.worded
         many = plan.is_many(step) and plan.is_text(step.body)
         # not within a loop: it goes over all that follows
-        if many and not worded and self.source == "data" and not self.looping:
+        if many and not (worded or self.bulk or self.looping):
             strings = self.tables.function("strings", "strings_reader(order, reading.text)")
             self.line(call(strings, "data", self.position.text()), "words, chars, to_str")
             self.worded = True
@@ -375,9 +412,10 @@ class Decoder(Builder):
                 entered += self.make_nested(part.place, part.type)
             elif isinstance(part, (plan.Number, plan.Dummy, plan.NumberBlock)):
                 self.fixed(part, run)
+        self.make_arrays(run)
         reader = self.tables.struct("read", step.item, run.fields, 4, "iter_unpack")
         values = self.tables.local(f"{step.item}_values") if run.values else "_"
-        rows = self.buffer(count, repeat.align, repeat.size, self.source)
+        rows = self.buffer(count, repeat.align, repeat.size)
         stored = [run.assignment(values)] if run.values else []
         body = (
             PlainStatement(f"{self.makers[step.type]}()", step.item),

@@ -133,10 +133,9 @@ _SLICED = (
         "if type(data) is not bytes:",
         (PlainStatement('memoryview(data).cast("B").toreadonly()', "data"),),
     ),
-    PlainStatement("data", "view"),
     PlainStatement("len(data)", "limit"),
 )
-_SLICES = re.compile(r"\b(data|view)\[|\b(words|frombuffer|limit)\b")
+_SLICES = re.compile(r"\bdata\[|\b(words|frombuffer|limit|sequence_of_\w+|array_of_\w+)\b")
 _WORDS = PlainStatement("words_of(data, limit, order)", "words")
 
 
@@ -222,7 +221,7 @@ class _FieldReader(Decoder):
     ) -> None:
         self.names = Locals()
         tables = NamedExpressions(self.names)
-        super().__init__(tables, _Makers(tables), {}, "view")
+        super().__init__(tables, _Makers(tables), {}, bulk=True)
         self.messages = messages
         self.nanoseconds = nanoseconds
         self.positions = positions
@@ -239,6 +238,7 @@ class _FieldReader(Decoder):
             super().flush(last=last)
             return
         self.headed, self.run, self.unchecked = True, type(run)(), False
+        self.make_arrays(run)
         start = self.position.aligned(run.sizes[0][0]).offset
         fields = ["H", f"{start - 2}x", *run.fields]
         reader = self.tables.struct("read", run.path, fields, 0, "unpack_from")

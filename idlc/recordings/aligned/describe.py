@@ -12,7 +12,7 @@ from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.enums import enums
 from idlc.model.lowering.lower import lower
-from idlc.recordings.columns.plan import INSTANTS
+from idlc.recordings.columns.plan import code_of_time
 from idlc.runtime.typeinfo import FieldInfo, Structure
 
 
@@ -28,7 +28,7 @@ def leaves(structure: Structure, prefix: str = "") -> Iterator[ColumnLeaf]:
     """Yield the columns of a type's flat table."""
     for field in structure.fields:
         nested = None if field.is_list else field.nested
-        if nested and nested.name not in INSTANTS:
+        if nested and not code_of_time(nested):
             yield from leaves(nested, f"{prefix}{field.name}.")
         else:
             yield ColumnLeaf(prefix + field.name, structure, field)

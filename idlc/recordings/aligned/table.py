@@ -214,7 +214,8 @@ class Aligned:
         return [_scan(*source) for source in self._sources]
 
     @cached_property
-    def _ticks(self) -> Any:
+    def ticks(self) -> Any:
+        """The times of the rows, in nanoseconds."""
         start, end = self._span
         if self._on is not None:
             known = (
@@ -236,7 +237,7 @@ class Aligned:
     @cached_property
     def _matches(self) -> list[Match]:
         """The messages of each topic that belong to the ticks."""
-        matches, ticks = [], self._ticks
+        matches, ticks = [], self.ticks
         for source, each in zip(self._sources, self._times, strict=True):
             track = source.track
             if source is not self._on:
@@ -248,14 +249,14 @@ class Aligned:
 
     def _blocks(self, size: int) -> Iterator[tuple[Any, list[Match]]]:
         """Yield ticks with what belongs to them: messages of about `size` bytes."""
-        cost = np.arange(len(self._ticks)) * max(1, size // ROWS)
+        cost = np.arange(len(self.ticks)) * max(1, size // ROWS)
         for each, times in zip(self._matches, self._times, strict=True):
             cost += np.cumsum(np.append(times.sizes[times.order], 0)[each.first])
         stops = [*(np.flatnonzero(np.diff(cost // size)) + 1).tolist(), len(cost)]
         for start, stop in zip([0, *stops], stops, strict=False):
             if start < stop:
                 rows = slice(start, stop)
-                yield self._ticks[rows], [each.part(rows) for each in self._matches]
+                yield self.ticks[rows], [each.part(rows) for each in self._matches]
 
     def _tables(self) -> Iterator[pa.Table]:
         for ticks, matches in self._blocks(GROUP):
@@ -284,16 +285,11 @@ class Aligned:
         pairs = zip(self._sources, self._matches, strict=True)
         return {source.track.topic: each.first >= 0 for source, each in pairs}
 
-    @property
-    def ticks(self) -> Any:
-        """The times of the rows, in nanoseconds."""
-        return self._ticks
-
     def rows(self, first: int, last: int) -> Aligned:
         """Return some rows of the table, for which no times are read again."""
         result, rows = copy(self), slice(first, last)
         vars(result)["_matches"] = [each.part(rows) for each in self._matches]
-        vars(result)["_ticks"] = self._ticks[rows]
+        vars(result)["ticks"] = self.ticks[rows]
         return result
 
     def summary(self) -> list[ClockFit]:
@@ -302,7 +298,7 @@ class Aligned:
         return [_summary(source.track.topic, times, each) for source, times, each in triples]
 
     def __len__(self) -> int:
-        return len(self._ticks)
+        return len(self.ticks)
 
     def to_reader(self) -> pa.RecordBatchReader:
         """Return the table piece by piece, without the whole table in memory."""

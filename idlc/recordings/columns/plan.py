@@ -143,15 +143,15 @@ Wanted = dict[str, Any] | None
 NOTHING: dict[str, Any] = {}
 
 #: Times that can become numpy's: by their type, what numpy calls the result.
-INSTANTS = {"builtin_interfaces/msg/Time": "M8[ns]", "builtin_interfaces/msg/Duration": "m8[ns]"}
+_INSTANTS = {"builtin_interfaces/msg/Time": "M8[ns]", "builtin_interfaces/msg/Duration": "m8[ns]"}
 #: Their fields, with type ids: a recording may define something else by these names.
 _SECONDS = [("sec", 6), ("nanosec", 7)]
 
 
-def _code_of_time(structure: Structure) -> str | None:
+def code_of_time(structure: Structure) -> str | None:
     """Return numpy's code of a time or duration, `None` for other types."""
     fields = [(field.name, field.type_id) for field in structure.fields]
-    return INSTANTS.get(structure.name) if fields == _SECONDS else None
+    return _INSTANTS.get(structure.name) if fields == _SECONDS else None
 
 
 @lru_cache(maxsize=64)
@@ -224,7 +224,7 @@ class _Builder:
             node = self.field(field, inner)
             if inner != NOTHING:
                 nodes[field.name] = node
-            code = _code_of_time(field.nested) if inner is None and field.nested else None
+            code = code_of_time(field.nested) if inner is None and field.nested else None
             if code:
                 times[field.name] = code
         return Struct(nodes, times)

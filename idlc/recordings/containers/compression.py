@@ -12,8 +12,9 @@ from typing import Any
 
 from idlc.recordings.containers.source import DamageError, RecordingError
 
-#: lz4 returns new bytes, so many at a time.
-PIECE = 1 << 22
+#: lz4 returns new bytes, so many at a time: the system would give and take back memory for more,
+#: which takes longer than decompressing.
+PIECE = 1 << 16
 #: A chunk may not be larger, whatever it says: no writer makes chunks that come near.
 MOST_IN_A_CHUNK = 1 << 29
 #: How many times larger than the file all that is compressed in it may be, and how much in any

@@ -46,7 +46,7 @@ from idlc.recordings.damage import DamageList
 if TYPE_CHECKING:
     from idlc.recordings.containers.messages import TopicMessages, Window
 
-END_OF_TIME = (1 << 64) - 1
+LATEST = (1 << 64) - 1
 #: The start of a message: its channel and time, with its sequence number between them.
 CHANNEL_AND_TIME = Struct("<HIQ")
 #: An entry of an index of messages: their times, and where in the chunk they begin.
@@ -311,7 +311,7 @@ class _Walk:
         """Make one stretch of the messages outside of chunks until here."""
         if self.loose:
             start, end = self.loose
-            self.facts.chunks.append(Chunk(start, end - start, 0, END_OF_TIME, None, None))
+            self.facts.chunks.append(Chunk(start, end - start, 0, LATEST, None, None))
             self.loose = None
 
     def end_of_chunk(self) -> None:
@@ -326,7 +326,7 @@ class _Walk:
             self.damage.add(error.message, at, at + size, messages=sum(named.values()) or None)
             return
         counts: dict[int, int] = {}
-        first, last = END_OF_TIME, 0
+        first, last = LATEST, 0
         try:
             try:
                 content = _content(self.source, head, self.room)

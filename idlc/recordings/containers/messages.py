@@ -8,9 +8,9 @@ from typing import Any, NamedTuple, TypeAlias
 import msgspec
 import numpy as np
 
-#: Times of numpy and Arrow end here, in the year 2262.
-END_OF_TIME = 1 << 63
-#: Stands for a later time; it is NaT, numpy's null.
+from idlc.recordings.times import END_OF_TIME
+
+#: Stands for a time from END_OF_TIME on; it is NaT, numpy's null.
 NO_TIME = -END_OF_TIME
 
 #: From this mean size on, messages are not copied to be one buffer.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from .cdr import NATIVE
-from .sequences import NUMBERS, NumberField, view_reader
+from .sequences import FEW, NUMBERS, NumberField, element_type
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -128,17 +128,18 @@ def buffer_writer(order: str, name: str, size: int) -> Callable[[Any], Any]:
 
 def array_reader(
     order: str, name: str, size: int, reading: Reading
-) -> Callable[[Any], Any]:
-    """Return a function that turns bytes of byte order `order` into a field's value."""
+) -> Callable[..., Any]:
+    """Return a function that makes a field's value of a buffer, from a position on."""
+    dtype, wire = np.dtype(name), element_type(order, name, reading)
+    ndarray, frombuffer, length = np.ndarray, np.frombuffer, size * dtype.itemsize
     if not reading.copy:
-        return view_reader(order, name)
-    dtype = np.dtype(name)
-    ndarray = np.ndarray
+        return lambda data, start=0: frombuffer(data, wire, size, start)
 
-    def native(raw: Any) -> Any:
-        return ndarray(size, dtype, bytearray(raw))
+    def native(data: Any, start: int = 0) -> Any:
+        raw = data if size < FEW else memoryview(data)
+        return ndarray(size, dtype, bytearray(raw[start : start + length]))
 
-    def swapped(raw: Any) -> Any:
-        return ndarray(size, dtype, bytearray(raw)).byteswap()
+    def swapped(data: Any, start: int = 0) -> Any:
+        return native(data, start).byteswap()
 
     return native if order == NATIVE or dtype.itemsize == 1 else swapped

@@ -54,8 +54,6 @@ class Reading:
     def __init__(self, text: Text, copy: bool) -> None:
         self.text = text
         self.copy = copy
-        #: Up to this size of a message, slices of bytes are faster than those of a view.
-        self.small = 8192 if copy else 0
 
     def of(self, kind: type) -> Reading:
         """Return the reading for sequences of a class of another package.

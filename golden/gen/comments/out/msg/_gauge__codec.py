@@ -33,9 +33,9 @@ def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_count = _idlc.layout(order, "I").unpack_from
     read_notes = _idlc.texts_reader(order, text)
     sequence_of_int16 = _idlc.sequence_reader(order, "h", reading)
+    int16 = _idlc.element_type(order, "h", reading)
     array_of_float64_9 = _arrays.array_reader(order, "float64", 9, reading)
     read_covariance = _idlc.layout(order, "9dc", start=4).unpack_from
-    small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         label = message._label.encode()
@@ -70,8 +70,6 @@ def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         return raw
 
     def decode(data: Any) -> Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
         message = new_gauge()
         (
             message._rate,
@@ -90,7 +88,7 @@ def gauge_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         at = end + 3 & -4
         (count,) = read_count(data, at)
         end = at + 4 + 2 * count
-        message._samples = sequence_of_int16(view[at + 4 : end])
+        message._samples = sequence_of_int16(data, int16, count, at + 4)
         at = (end + 3 & -8) + 4
         (
             covariance,

@@ -28,8 +28,8 @@ def drive_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_point = _idlc.maker(Point)
     read_mode = _idlc.layout(order, "BBI", start=4).unpack_from
     sequence_of_uint8 = _idlc.sequence_reader(order, "B", reading)
+    uint8 = _idlc.element_type(order, "B", reading)
     read_mode_error_at = _idlc.phases(order, "Biddd")
-    small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         plan = message._plan
@@ -60,8 +60,6 @@ def drive_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         return raw
 
     def decode(data: Any) -> Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
         message = new_drive()
         (
             message._mode,
@@ -69,7 +67,7 @@ def drive_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
             count,
         ) = read_mode(data, 4)
         end = 12 + count
-        message._plan = sequence_of_uint8(view[12:end])
+        message._plan = sequence_of_uint8(data, uint8, count, 12)
         point = new_point()
         message._point = point
         (

@@ -40,6 +40,7 @@ def old_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_point = _idlc.maker(Point)
     read_speed = _idlc.layout(order, "ddI", start=4).unpack_from
     sequence_of_float32 = _idlc.sequence_reader(order, "f", reading)
+    float32 = _idlc.element_type(order, "f", reading)
     array_of_float64_3 = _arrays.array_reader(order, "float64", 3, reading)
     read_three = _idlc.layout(order, "3dI", start=4).unpack_from
     text = reading.text
@@ -48,7 +49,6 @@ def old_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_points_item = _idlc.layout(order, "ddd", start=4).iter_unpack
     read_count = _idlc.layout(order, "I").unpack_from
     read_validate_at = _idlc.phases(order, "?ddd")
-    small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         speeds = message._speeds
@@ -105,8 +105,6 @@ def old_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         return raw
 
     def decode(data: Any) -> Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
         message = new_old()
         (
             message._speed,
@@ -114,7 +112,7 @@ def old_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
             count,
         ) = read_speed(data, 4)
         end = 24 + 4 * count
-        message._speeds = sequence_of_float32(view[24:end])
+        message._speeds = sequence_of_float32(data, float32, count, 24)
         at = (end + 3 & -8) + 4
         (
             three,
@@ -133,7 +131,7 @@ def old_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         points: list[Any] = []
         message._points = points
         end = at + 24 + 24 * 2
-        for points_item_values in read_points_item(view[at + 24 : end]):
+        for points_item_values in read_points_item(data[at + 24 : end]):
             points_item = new_point()
             points.append(points_item)
             (

@@ -69,7 +69,9 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
     read_nothing_at = _idlc.phases(order, "xI")
     read_nothings_item = _idlc.layout(order, "x", start=4).iter_unpack
     sequence_of_float64 = _idlc.sequence_reader(order, "d", reading)
+    float64 = _idlc.element_type(order, "d", reading)
     sequence_of_int16 = _idlc.sequence_reader(order, "h", reading)
+    int16 = _idlc.element_type(order, "h", reading)
     list_of_flags = _idlc.read_flags
     list_of_octets = _idlc.read_octets
     read_octets_at = _idlc.phases(order, "2BI")
@@ -78,7 +80,6 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
     read_stamps_item = _idlc.layout(order, "iI", start=4).iter_unpack
     array_of_float32_4 = _arrays.array_reader(order, "float32", 4, reading)
     read_weights_at = _idlc.phases(order, "4fq")
-    small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         inner = message._inner
@@ -206,7 +207,6 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
 
     def decode(data: Any) -> Any:
         limit = len(data)
-        view = data if limit < small else memoryview(data)
         message = new_everything()
         inner = new_inner()
         message._inner = inner
@@ -284,7 +284,7 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
         nothings: list[Any] = []
         message._nothings = nothings
         end = at + count
-        for _ in read_nothings_item(view[at:end]):
+        for _ in read_nothings_item(data[at:end]):
             nothings_item = new_nothing()
             nothings.append(nothings_item)
         at = end + 3 & -4
@@ -293,17 +293,17 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        message._doubles = sequence_of_float64(view[at:end])
+        message._doubles = sequence_of_float64(data, float64, count, at)
         (count,) = read_count(data, end)
         if count > 3:
             raise ValueError("too many elements")
         at = end + 4
         end = at + 2 * count
-        message._shorts = sequence_of_int16(view[at:end])
+        message._shorts = sequence_of_int16(data, int16, count, at)
         at = end + 3 & -4
         (count,) = read_count(data, at)
         end = at + 4 + count
-        message._flags = list_of_flags(view[at + 4 : end])
+        message._flags = list_of_flags(data[at + 4 : end])
         struct = read_octets_at[end & 7]
         (
             octets,
@@ -319,7 +319,7 @@ def everything_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Cod
         message._stamps = stamps
         at = end + 4
         end = at + 8 * count
-        for stamps_item_values in read_stamps_item(view[at:end]):
+        for stamps_item_values in read_stamps_item(data[at:end]):
             stamps_item = new_time()
             stamps.append(stamps_item)
             (

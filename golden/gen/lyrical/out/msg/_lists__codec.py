@@ -55,8 +55,8 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     array_of_float32_3 = _arrays.array_reader(order, "float32", 3, reading)
     read_position = _idlc.layout(order, "3fI").unpack_from
     sequence_of_uint8 = _idlc.sequence_reader(order, "B", reading)
+    uint8 = _idlc.element_type(order, "B", reading)
     read_texts_in_a_long_field_name = _idlc.texts_reader(order, text)
-    small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         names = write_names(message._names)
@@ -129,7 +129,6 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     def decode(data: Any) -> Any:
         limit = len(data)
-        view = data if limit < small else memoryview(data)
         message = new_lists()
         (count,) = read_count(data, 4)
         message._names, end = read_names(data, 8, count)
@@ -176,7 +175,7 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         if count > 4:
             raise ValueError("too many elements")
         end = at + 4 + count
-        message._flags = list_of_flags(view[at + 4 : end])
+        message._flags = list_of_flags(data[at + 4 : end])
         (raw_,) = read_raw(data, end)
         message._raw = list_of_octets(raw_)
         at = end + 5 & -4
@@ -192,7 +191,7 @@ def lists_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         ) = read_position(data, at)
         message._position = array_of_float32_3(position)
         end = at + 16 + count
-        message._data = sequence_of_uint8(view[at + 16 : end])
+        message._data = sequence_of_uint8(data, uint8, count, at + 16)
         at = end + 3 & -4
         (count,) = read_count(data, at)
         message._texts_in_a_long_field_name, end = read_texts_in_a_long_field_name(data, at + 4, count)

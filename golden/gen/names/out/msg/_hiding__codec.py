@@ -28,11 +28,11 @@ def hiding_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_point = _idlc.maker(Point, 0x4f9f45f5)
     read_validate_x = _idlc.layout(order, "ddBI", start=4).unpack_from
     sequence_of_float32 = _idlc.sequence_reader(order, "f", reading)
+    float32 = _idlc.element_type(order, "f", reading)
     array_of_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
     read_from_dict = _idlc.layout(order, "3iI").unpack_from
     text = reading.text
     read_to_dict = _idlc.texts_reader(order, text)
-    small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         validate = message._validate
@@ -59,8 +59,6 @@ def hiding_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
         return raw
 
     def decode(data: Any) -> Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
         message = new_hiding()
         validate = new_point()
         message._validate = validate
@@ -71,7 +69,7 @@ def hiding_codec(kind: Any, order: str, reading: _idlc.Reading) -> _idlc.Codec:
             count,
         ) = read_validate_x(data, 4)
         end = 28 + 4 * count
-        message._deserialize = sequence_of_float32(view[28:end])
+        message._deserialize = sequence_of_float32(data, float32, count, 28)
         (
             from_dict,
             count,
