@@ -88,27 +88,39 @@ class Connection:
                 self._take_turn(_TICK)
 
     def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
-        """Take a turn of the thread on this one, unless it has one; return whether it was taken.
+        """Take a turn in the place of the thread; return False if another caller has one.
 
         It ends at the first packet, at `wake`, and at once unless `is_idle()`. The thread waits a
-        little for the next turn of another one.
+        little for the next call.
         """
-        if not self._is_open or not self._turn.acquire(blocking=False):
-            self._lent_until = max(self._lent_until, time.monotonic() + _LEASE)
+        if not (self._turn.acquire(blocking=False) or self._take_over()):
             return False
         try:
             self._lent_until = inf
-            self._take_turn(timeout, is_idle)
+            if self._is_open:
+                self._take_turn(timeout, is_idle)
+            return self._is_open
         finally:
             self._lent_until = time.monotonic() + _LEASE
             self._turn.release()
-        return True
+
+    def _take_over(self) -> bool:
+        """End the turn of the thread, and take it; return False if it is not of the thread."""
+        if self._lent_until == inf:
+            return False
+        self._lent_until = time.monotonic() + _LEASE
+        self._nudge()
+        return self._turn.acquire(timeout=_LEASE)
+
+    def _nudge(self) -> None:
+        """End the wait for a packet by an empty one."""
+        with suppress(OSError):
+            self._send(b"", self._own_address)
 
     def wake(self) -> None:
         """End the turn that waits for a packet; for any thread."""
         if self._waits:
-            with suppress(OSError):
-                self._send(b"", self._own_address)
+            self._nudge()
 
     def _take_turn(self, timeout: float, is_idle: Callable[[], bool] | None = None) -> None:
         """Wait for a packet, receive it, and do what is due."""
