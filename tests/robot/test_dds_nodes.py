@@ -109,7 +109,7 @@ def test_an_executor_receives_while_it_waits(pair):
     append = queue.append
     queue.append = lambda *item: threads.append(threading.get_ident()) or append(*item)
     for number in range(20):
-        publisher.publish(String(data=str(number)))
+        threading.Timer(0.02, publisher.publish, [String(data=str(number))]).start()
         while len(came) == number:
             executor.spin_once(timeout_sec=LONG)
     # the thread of DDS takes a turn if this one pauses

@@ -26,7 +26,7 @@ _TICK = 0.05
 _LOOK = 3.0
 #: Seconds in which another thread that took a turn takes the next one.
 _LEASE = 0.01
-_MOST_PACKET = 65_536
+_MOST_PACKET, _LARGE = 65_536, 16_384
 
 
 class Connection:
@@ -46,6 +46,9 @@ class Connection:
         self._own_address = "127.0.0.1", port
         #: Who takes a turn, whether it waits for a packet, and until when the thread takes none.
         self._turn, self._waits, self._lent_until = threading.RLock(), False, 0.0
+        #: Until when only the thread receives, as large packets came: with one heap instead of two,
+        #: the C library returns their memory to the system after each message.
+        self._large_until = 0.0
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
         others = [each for each in address.searched(place) if each != ("127.0.0.1", port)]
         #: When the endpoints of others changed last.
@@ -88,27 +91,40 @@ class Connection:
                 self._take_turn(_TICK)
 
     def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:
-        """Take a turn of the thread on this one, unless it has one; return whether it was taken.
+        """Take turns in the place of the thread, while `is_idle()`; return False if others do.
 
-        It ends at the first packet, at `wake`, and at once unless `is_idle()`. The thread waits a
-        little for the next turn of another one.
+        The thread waits a little for the next call.
         """
-        if not self._is_open or not self._turn.acquire(blocking=False):
-            self._lent_until = max(self._lent_until, time.monotonic() + _LEASE)
+        if time.monotonic() < self._large_until:
+            return False
+        if not (self._turn.acquire(blocking=False) or self._take_over()):
             return False
         try:
-            self._lent_until = inf
-            self._take_turn(timeout, is_idle)
+            self._lent_until, end = inf, time.monotonic() + timeout
+            while self._is_open and is_idle() and (left := end - time.monotonic()) > 0:
+                self._take_turn(left, is_idle)
+            return self._is_open
         finally:
             self._lent_until = time.monotonic() + _LEASE
             self._turn.release()
-        return True
+
+    def _take_over(self) -> bool:
+        """End the turn of the thread, and take it; return False if it is not of the thread."""
+        if self._lent_until == inf:
+            return False
+        self._lent_until = time.monotonic() + _LEASE
+        self._nudge()
+        return self._turn.acquire(timeout=_LEASE)
+
+    def _nudge(self) -> None:
+        """End the wait for a packet by an empty one."""
+        with suppress(OSError):
+            self._send(b"", self._own_address)
 
     def wake(self) -> None:
         """End the turn that waits for a packet; for any thread."""
         if self._waits:
-            with suppress(OSError):
-                self._send(b"", self._own_address)
+            self._nudge()
 
     def _take_turn(self, timeout: float, is_idle: Callable[[], bool] | None = None) -> None:
         """Wait for a packet, receive it, and do what is due."""
@@ -137,6 +153,8 @@ class Connection:
             packet, source = each.recvfrom(_MOST_PACKET)
         except OSError:  # nothing is there, or on Windows: an earlier packet reached nobody
             return
+        if len(packet) > _LARGE:
+            self._large_until = time.monotonic() + 1
         if packet:
             self.send(self.participant.receive(packet, source[:2], time.monotonic()))
 

@@ -379,8 +379,8 @@ class Executor(AbstractContextManager["Executor"]):
     def _next(self, wait: float) -> Callable[[], bool]:
         """Return work from the queue; raise Empty if there is none for so many seconds or less."""
         is_idle = self._queue.empty
-        if is_idle() and self.transport is not None and self.transport.pump(wait, is_idle):
-            wait = 0.0
+        if wait and self.transport is not None and is_idle():
+            wait = 0.0 if self.transport.pump(wait, is_idle) else wait
         return self._queue.get(block=wait > 0, timeout=wait)
 
 
