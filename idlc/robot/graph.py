@@ -1,4 +1,4 @@
-"""The graph of a domain: its nodes and endpoints, from liveliness tokens."""
+"""The graph of a domain: its nodes and endpoints, as a transport shows them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import islice
 from threading import Condition
 from typing import Any, TypeVar
 
-from idlc.robot.keys import Entity, EntityKind, parse_token
+from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.transport import Transport
 
 #: The memory of a graph's entities, about so much for each and for each character of its token.
@@ -32,12 +32,11 @@ class Graph:
     """The entities of a domain, with those of the own session.
 
     An endpoint can appear before its node and outlive it. Methods can be called on any thread.
-    `ignored` counts malformed tokens and tokens beyond the limit. Entities are missing if
-    `is_full`, because there were too many, or `is_incomplete`, because some arrived too late.
+    Entities are missing if `is_full`, because there were too many, or `is_incomplete`, because
+    some arrived too late.
     """
 
     def __init__(self, transport: Transport, domain: int, limit: int = MOST_BYTES) -> None:
-        self.ignored = 0
         self.is_full = False
         self._limit = limit
         self._bytes = 0
@@ -66,11 +65,11 @@ class Graph:
         self._expected.clear()
 
     def _ask(self, transport: Transport, domain: int) -> set[str]:
-        """Return the valid tokens that exist, so many as have room."""
+        """Return the tokens of the entities that exist, so many as have room."""
         tokens: set[str] = set()
-        valid = filter(parse_token, transport.tokens(domain, _TIMEOUT))
+        entities = islice(transport.entities(domain, _TIMEOUT), self._limit // ENTITY_BYTES)
         try:
-            tokens.update(islice(valid, self._limit // ENTITY_BYTES))
+            tokens.update(entity.token for entity in entities)
         except TimeoutError:
             tokens.add(_UNKNOWN)
         return tokens
@@ -111,17 +110,15 @@ class Graph:
         with self._changed:
             return self._changed.wait_for(lambda: condition(self), timeout)
 
-    def _update(self, token: str, appears: bool) -> None:
-        """Add a token if it is new and valid, and has room, or remove it."""
+    def _update(self, entity: Entity, appears: bool) -> None:
+        """Add an entity if it is new and has room, or remove it."""
+        token = entity.token
         size = ENTITY_BYTES + CHARACTER_BYTES * len(token)
         with self._changed:
-            entity = self._entities.get(token)
-            if appears == (entity is not None):
+            if appears == (token in self._entities):
                 return
-            entity = entity or parse_token(token)
-            if entity is None or (appears and self._bytes + size > self._limit):
-                self.is_full |= entity is not None
-                self.ignored += 1
+            if appears and self._bytes + size > self._limit:
+                self.is_full = True
                 return
             same = self._named.setdefault((entity.kind, entity.name), {})
             if appears:

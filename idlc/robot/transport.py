@@ -70,7 +70,7 @@ class Request(Protocol):
 
 
 class Transport(Protocol):
-    """A connection to other programs; tokens contain its `id`.
+    """A connection to other programs; the `session` of its own entities is its `id`.
 
     If `connects_all` is true, ends with QoS that does not fit are connected, too.
     """
@@ -107,11 +107,11 @@ class Transport(Protocol):
     def announce(self, entity: Entity) -> Closeable:
         """Show a node or an endpoint to all sessions while the declaration lasts."""
 
-    def watch(self, domain: int, callback: Callable[[str, bool], None]) -> Closeable:
-        """Call `callback` with each token of a domain, now and later: True appears, False goes."""
+    def watch(self, domain: int, callback: Callable[[Entity, bool], None]) -> Closeable:
+        """Call `callback` with each entity of a domain, now and later: True appears, False goes."""
 
-    def tokens(self, domain: int | None, timeout: float) -> Iterable[str]:
-        """Yield the tokens of a domain that exist now; `None`: of all that can be seen.
+    def entities(self, domain: int | None, timeout: float) -> Iterable[Entity]:
+        """Yield the entities of a domain that exist now; `None`: of all that can be seen.
 
         Raises TimeoutError after `timeout` seconds if answers may be missing.
         """

@@ -12,7 +12,7 @@ import zenoh
 from zenoh import CongestionControl, Reliability, ext
 
 from idlc.project.atomic import without_ctrl_c
-from idlc.robot.keys import Entity, all_tokens
+from idlc.robot.keys import Entity, all_tokens, parse_token
 from idlc.robot.qos import HistoryPolicy, ReliabilityPolicy
 from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
@@ -121,17 +121,18 @@ class ZenohTransport:
         return _Declared(self._declared, self._liveliness.declare_token(entity.token))
 
     @without_ctrl_c()
-    def watch(self, domain: int, callback: Callable[[str, bool], None]) -> Closeable:
+    def watch(self, domain: int, callback: Callable[[Entity, bool], None]) -> Closeable:
         """Subscribe to liveliness tokens, with those that exist."""
 
         def receive(sample: zenoh.Sample) -> None:
-            callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+            if entity := parse_token(str(sample.key_expr)):
+                callback(entity, sample.kind == zenoh.SampleKind.PUT)
 
         pattern = all_tokens(domain)
         subscriber = self._liveliness.declare_subscriber(pattern, _direct(receive), history=True)
         return _Declared(self._declared, subscriber)
 
-    def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:
+    def entities(self, domain: int | None, timeout: float) -> Iterator[Entity]:
         """Query the liveliness tokens that exist."""
         # The session answers from its own memory before `get` returns, so nothing may block there
         replies: SimpleQueue[Any] = SimpleQueue()
@@ -146,7 +147,8 @@ class ZenohTransport:
         while (reply := replies.get()) is not None:
             if reply.ok is None:
                 raise TimeoutError
-            yield str(reply.ok.key_expr)
+            if entity := parse_token(str(reply.ok.key_expr)):
+                yield entity
 
     def pump(self, timeout: float, is_idle: Callable[[], bool]) -> bool:  # noqa: ARG002
         """Return False, as Zenoh's own threads receive."""

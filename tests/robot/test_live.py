@@ -132,7 +132,7 @@ def test_a_slow_robot_is_noted(robot, address, capsys, monkeypatch):
         yield
 
     for name in ("zenoh_transport.ZenohTransport", "dds.transport.DdsTransport"):
-        monkeypatch.setattr(f"idlc.robot.{name}.tokens", too_late)
+        monkeypatch.setattr(f"idlc.robot.{name}.entities", too_late)
     assert main(["show", address]) == 0
     assert "the robot answers too slowly; endpoints may be missing" in capsys.readouterr().err
 

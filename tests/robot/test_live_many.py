@@ -11,7 +11,7 @@ from click.shell_completion import ShellComplete
 
 from idlc.cli.app import app
 from idlc.cli.main import main
-from idlc.robot.keys import Entity, EntityKind
+from idlc.robot.keys import Entity, EntityKind, parse_token
 from idlc.robot.live import connect
 from idlc.robot.qos import QoSProfile
 from idlc.robot.session import Session
@@ -37,12 +37,12 @@ class Tokens:
     def gid(self, entity):
         return entity.gid
 
-    def tokens(self, _domain, _timeout):
-        return self._tokens
+    def entities(self, _domain, _timeout):
+        return map(parse_token, self._tokens)
 
     def watch(self, _domain, callback):
         for token in self._tokens:
-            callback(token, True)
+            callback(parse_token(token), True)
         return self
 
     def call(self, _entity, _payload, _attachment, callback, *, timeout):

@@ -96,7 +96,7 @@ def test_tokens_and_bytes_are_those_of_rclpy(router, types):
         ActionServer(node, types.action.Countdown, "count", lambda _: None)
         ActionClient(node, types.action.Countdown, "other")
         while tokens != {*TOKENS}:
-            tokens = {*other.transport.tokens(0, LONG)}
+            tokens = {each.token for each in other.transport.entities(0, LONG)}
             assert tokens <= {*TOKENS}
 
         message = types.msg.Drive(speed=1.0, who="golden", ranges=[1.0, 2.0])

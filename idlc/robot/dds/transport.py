@@ -60,8 +60,8 @@ class DdsTransport:
         self.place = place
         self._own: dict[str, Entity] = {}
         self._remote = RemoteNodes(place.domain)
-        self._watchers: list[Callable[[str, bool], None]] = []
-        self._shown: dict[str, None] = {}
+        self._watchers: list[Callable[[Entity, bool], None]] = []
+        self._shown: dict[str, Entity] = {}
         self._refreshed = self._refresh_at = 0.0
         self._is_stale = True
         #: Whether the others have to be told about the own nodes, and when that is due.
@@ -182,23 +182,23 @@ class DdsTransport:
     def _learn(self, received: Data) -> None:
         self._is_stale |= self._remote.learn(received)
 
-    def _entities(self) -> dict[str, None]:
-        """Return the tokens of all nodes and endpoints."""
+    def _all(self) -> dict[str, Entity]:
+        """Return all nodes and endpoints, by their tokens."""
         participant = self._connection.participant
         hashes = {(own.name, own.type): own.hash for own in self._own.values()}
         remote = self._remote.entities([*participant.peers], participant.remote_endpoints(), hashes)
-        return dict.fromkeys((*self._own, *(entity.token for entity in remote)))
+        return self._own | {entity.token: entity for entity in remote}
 
     def _refresh(self) -> None:
         """Tell the watchers what changed in the graph."""
         self._refreshed, self._is_stale = time.monotonic(), False
-        shown, self._shown = self._shown, self._entities()
+        shown, self._shown = self._shown, self._all()
         for watcher in self._watchers:
             for token in shown.keys() - self._shown.keys():
-                watcher(token, False)
-            for token in self._shown:
+                watcher(shown[token], False)
+            for token, entity in self._shown.items():
                 if token not in shown:
-                    watcher(token, True)
+                    watcher(entity, True)
         # a graph that takes long, as somebody makes it large, takes a part of the time
         now = time.monotonic()
         self._refresh_at = now + 4 * (now - self._refreshed)
@@ -206,18 +206,18 @@ class DdsTransport:
     def watch(
         self,
         domain: int,  # noqa: ARG002 - a participant knows one domain
-        callback: Callable[[str, bool], None],
+        callback: Callable[[Entity, bool], None],
     ) -> Closeable:
-        """Call back with tokens."""
+        """Call back with the entities of the graph."""
         with self._connection.lock:
             self._refresh()
             self._watchers.append(callback)
-            for token in self._shown:
-                callback(token, True)
+            for entity in self._shown.values():
+                callback(entity, True)
         return _closing(self._watchers.remove, callback)
 
-    def tokens(self, domain: int | None, timeout: float) -> Iterator[str]:  # noqa: ARG002
-        """Yield the tokens that exist, as soon as the others have told all of theirs."""
+    def entities(self, domain: int | None, timeout: float) -> Iterator[Entity]:  # noqa: ARG002
+        """Yield the entities that exist, as soon as the others have told all of theirs."""
         end, is_told, is_over = time.monotonic() + timeout, False, False
         while not is_over and time.monotonic() < end:
             time.sleep(0.02)
@@ -230,7 +230,7 @@ class DdsTransport:
             quiet = time.monotonic() - max(self._started, self._connection.changed_at)
             is_over = quiet > patience
         with self._connection.lock:
-            yield from self._entities()
+            yield from self._all().values()
         if not is_told:
             raise TimeoutError
 

@@ -18,7 +18,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import did_you_mean, one_line
 from idlc.robot.errors import RobotError
-from idlc.robot.keys import Entity, EntityKind, pack_attachment, parse_token
+from idlc.robot.keys import Entity, EntityKind, pack_attachment
 from idlc.robot.live.graph import Communication as Noun
 from idlc.robot.names import action_part
 from idlc.robot.qos import QoSProfile
@@ -34,7 +34,7 @@ MOST_OPEN = 8
 #: Seconds after which a request without a reply counts as dropped.
 DROPPED = 1.5
 #: Tokens of other domains that idlc looks at.
-MOST_TOKENS = 100_000
+MOST_ENTITIES = 100_000
 TOPICS = (EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)
 #: Bytes of samples that wait to be read; more are lost.
 MOST_WAITING = 64 << 20
@@ -69,8 +69,7 @@ def where_nodes_are(session: Session) -> str:
     """Return a sentence about a domain without nodes, and about those that have nodes."""
     others: Counter[int] = Counter()
     with suppress(TimeoutError):
-        tokens = islice(session.transport.tokens(None, APPEARING), MOST_TOKENS)
-        ends = (end for token in tokens if (end := parse_token(token)))
+        ends = islice(session.transport.entities(None, APPEARING), MOST_ENTITIES)
         others.update(end.domain for end in ends if end.kind is EntityKind.NODE)
     del others[session.domain]
     has = [f"; domain {own} has {counted(number, 'node')}" for own, number in others.most_common(5)]
