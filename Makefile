@@ -10,7 +10,7 @@
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
 #   LOCKED=yes          install what maintenance/requirements/ names and no other, as CI does on Linux x86-64
-#   JOBS=6              how many tests run at a time; `make quick` runs one for each core
+#   JOBS=6              how many tests run at a time; `make quick` runs two more than there are cores
 #   TIER=quick          which tests `make test`, test-all and test-lowest run (quick or test)
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2              where `make fuzz` searches, and which mistakes `make mutants` makes
@@ -23,8 +23,8 @@ BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/de
 EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
-# Few of the quick tests wait: a process for each core is enough.
-JOBS ?= $(if $(filter quick,$(MAKECMDGOALS)),$(shell getconf _NPROCESSORS_ONLN),6)
+# Few of the quick tests wait, and each process collects all tests first.
+JOBS ?= $(if $(filter quick,$(MAKECMDGOALS)),$(shell expr 2 + $$(getconf _NPROCESSORS_ONLN)),6)
 TIER ?= test
 ARGS ?=
 FUZZ ?= 30

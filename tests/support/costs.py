@@ -24,7 +24,7 @@ from tests.support.paths import ROOT
 TABLE = ROOT / "tests/costs.tsv"
 #: CPU-seconds up to which a test is quick, and up to which it is not long.
 QUICK = 0.1
-LONG = 0.5
+LONG = 0.4
 TIERS = ("quick", "test", "long")
 #: The names of all tests of a run, before any is left out.
 COLLECTED = pytest.StashKey[set[str]]()
