@@ -282,6 +282,17 @@ def test_nodes_are_read_as_they_were_written_and_cut_off_ones_are_refused():
         graph.parse_info(payload[:20] + b"\xff\xff\xff\xff" + payload[24:])
 
 
+@pytest.mark.parametrize(("size", "is_read"), [(511, True), (512, False), (1_000_000, False)])
+def test_long_names_of_nodes_are_refused(size, is_read):
+    """They are keys of caches, which hold 16,384 of them; a zero ends each."""
+    payload = graph.format_info(b"p" * 12, [NODES[0]._replace(name="n" * size)])
+    if is_read:
+        assert graph.parse_info(payload)[1][0].name == "n" * size
+    else:
+        with pytest.raises(wire.WireError):
+            graph.parse_info(payload)
+
+
 def test_the_ids_of_humble_have_24_bytes():
     def gid(letter):
         return letter * 16 + bytes(8)

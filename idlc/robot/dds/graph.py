@@ -19,10 +19,11 @@ from idlc.robot.keys import Entity, EntityKind
 from idlc.robot.names import is_absolute, is_namespace, is_node_name, ros_type
 from idlc.robot.nodes.interfaces import standard
 
-#: The topic about nodes, its type, and the most bytes of one message of it.
+#: The topic about nodes, its type, and the most bytes of one message of it and of a name in it:
+#: names are keys of caches.
 INFO_TOPIC = "ros_discovery_info"
 INFO_TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
-_MOST = 2**20
+_MOST, _MOST_NAME = 2**20, 512
 #: The last byte of the id of a writer and of a reader.
 WRITER, READER = b"\x03", b"\x04"
 #: The ends of the names and types of a service's topics.
@@ -71,7 +72,7 @@ class NodeInfo(NamedTuple):
 
 
 class _Cursor:
-    """Reads CDR; raises WireError where it ends early."""
+    """Reads CDR; raises WireError where it ends early or a name is too long."""
 
     def __init__(self, payload: bytes) -> None:
         self.order = "<" if payload[1:2] == b"\x01" else ">"
@@ -93,7 +94,10 @@ class _Cursor:
 
     def text(self) -> str:
         """Return a string, which need not be a valid name."""
-        return self.take(self.count()).rstrip(b"\0").decode("ascii", "replace")
+        size = self.count()
+        if size > _MOST_NAME:
+            raise WireError("a long name")
+        return self.take(size).rstrip(b"\0").decode("ascii", "replace")
 
     def gids(self, size: int) -> tuple[bytes, ...]:
         """Return GUIDs."""
