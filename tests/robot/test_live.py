@@ -237,14 +237,15 @@ def test_a_recording_is_read_by_idlc_and_mcap(robot, address, capsys, monkeypatc
         return sum(recorder._writer.counts.values()) == 3
 
     run, handler = Recorder.run, signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(
-        Recorder,
-        "run",
-        lambda self, is_over: run(self, lambda: is_over() or written(self)),
-    )
-    assert main(["record", address, "-o", "a.mcap", "/drive", "--duration", "60"]) == 0
-    # it ends in time, whether or not a message has come
-    assert main(["record", address, "-o", "b.mcap", "/drive", "--duration", "0.01"]) in (0, 1)
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            Recorder,
+            "run",
+            lambda self, is_over: run(self, lambda: is_over() or written(self)),
+        )
+        assert main(["record", address, "-o", "a.mcap", "/drive", "--duration", "60"]) == 0
+    # it ends in time, and long after the first message even on a busy machine
+    assert main(["record", address, "-o", "b.mcap", "/drive", "--duration", "2"]) == 0
     assert Path("b.mcap").stat().st_size > 0
     assert signal.getsignal(signal.SIGTERM) == handler
     with Recording("a.mcap") as recording:

@@ -72,6 +72,17 @@ def test_nodes_and_endpoints_appear_in_the_other_graph_and_go(sessions):
     assert right.graph.wait_for(lambda graph: not graph.entities(), LONG)
 
 
+def test_malformed_tokens_are_in_no_graph(sessions):
+    left, right = sessions
+    for rest in ("x", "x/y/MP", "f1/0/0/NN/%/%/no node"):
+        left.transport._liveliness.declare_token(f"@ros2_lv/{left.domain}/{rest}")
+    last = entity(left)
+    left.transport.announce(last)
+    assert right.graph.wait_for(lambda graph: graph.entities() == (last,), LONG)
+    # for a moment, Zenoh answers with nothing
+    wait_for(lambda: [*right.transport.entities(right.domain, LONG)] == [last])
+
+
 def test_a_session_that_knows_many_tokens_answers_its_own_question(sessions):
     left, right = sessions
     for _ in range(600):
