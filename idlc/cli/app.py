@@ -202,7 +202,7 @@ Example:
   echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
   idlc gen demo -o out/demo
 
-To complete words with the Tab key in bash, zsh or fish, run the first, second or third line:
+To complete words with the Tab key, run the line for your shell:
 
 \b
   eval "$(_IDLC_COMPLETE=bash_source idlc)"

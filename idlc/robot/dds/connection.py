@@ -1,7 +1,7 @@
 """A participant on sockets: one thread receives, sends what is due, and calls back.
 
-An executor that waits takes its turns, as to hand each message to another thread takes longer than
-to receive it.
+An executor that waits receives in its place: handing each message to another thread takes longer
+than receiving it.
 """
 
 from __future__ import annotations

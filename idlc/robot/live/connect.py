@@ -33,7 +33,7 @@ TICK = 0.5
 MOST_OPEN = 8
 #: Seconds after which a request without a reply counts as dropped.
 DROPPED = 1.5
-#: Tokens of other domains that idlc looks at.
+#: Entities of other domains that idlc looks at.
 MOST_ENTITIES = 100_000
 TOPICS = (EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)
 #: Bytes of samples that wait to be read; more are lost.

@@ -110,7 +110,7 @@ async def call(callback: Callable[..., Any], *args: Any) -> Any:
 class CallbackGroup:
     """Decides which callbacks may run while a coroutine of the group waits.
 
-    Groups of one's own can override `beginning_execution` and `ending_execution`.
+    Subclasses can override `beginning_execution` and `ending_execution`.
     """
 
     #: Functions to call at the end of the callback that runs; `None` if others need not wait.
@@ -136,7 +136,7 @@ class CallbackGroup:
         for resume in waiting or ():
             resume()
 
-    def beginning_execution(self, entity: Any) -> bool:  # noqa: ARG002 - for groups of one's own
+    def beginning_execution(self, entity: Any) -> bool:  # noqa: ARG002 - for subclasses
         """Return whether a callback may run now; else it is tried again after the next one."""
         return True
 
@@ -204,7 +204,7 @@ class Ready:
 
 
 class Task(Future[Any]):
-    """A callback that an executor of one's own runs by a call, on any thread."""
+    """A callback that a subclass of Executor runs by a call, on any thread."""
 
     def __init__(self, executor: Executor, callback: Callback, end: Callback) -> None:
         super().__init__(executor=executor)
@@ -344,7 +344,7 @@ class Executor(AbstractContextManager["Executor"]):
     def wait_for_ready_callbacks(self, timeout_sec: Limit = None) -> tuple[Task, Ready, Any]:
         """Wait for a callback; return a task that runs it, its entity, and its node.
 
-        The `spin_once` of an executor of one's own calls it. Raises TimeoutException,
+        The `spin_once` of a subclass calls it. Raises TimeoutException,
         ShutdownException, and ExternalShutdownException.
         """
         end, self._found = _end(timeout_sec), []
