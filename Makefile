@@ -232,4 +232,6 @@ else
 	    echo 'to run the tests that need no ROS.' >&2; \
 	    exit 1; }
 endif
+	@# compile what tests import once, before several processes do it at the same time
+	@.venv/$*/bin/python -m pytest --collect-only --quiet >/dev/null 2>&1 || true
 	@touch $@

@@ -54,3 +54,16 @@ def test_a_test_is_in_its_tiers(marks, seconds, tiers, request, monkeypatch):
         item.add_marker(mark)
     monkeypatch.setattr(costs, "committed", lambda: costs.Costs({item.nodeid: seconds}))
     assert costs.tiers(item) == tiers
+
+
+def test_costly_tests_have_their_turns_and_others_always_run(monkeypatch):
+    files = ["tests/a.py", "tests/b.py", "tests/c.py", "tests/d.py"]
+    seconds = {f"{file}::test_{number}": 1.5 for file in files for number in range(2)}
+    monkeypatch.setattr(costs, "committed", lambda: costs.Costs({**seconds, "a.py::cheap": 1.0}))
+    turns = [{test for test in seconds if costs.is_due(test, turn)} for turn in range(9)]
+    assert turns[:3] == turns[3:6] == turns[6:]
+    assert set().union(*turns) == set(seconds)
+    assert sum(map(len, turns[:3])) == len(seconds), "each in one turn of three"
+    assert all(costs.is_due("a.py::cheap", turn) for turn in range(3))
+    for turn in turns[:3]:
+        assert {test.replace("test_0", "test_1") for test in turn} <= turn, "whole files"

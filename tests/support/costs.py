@@ -16,6 +16,7 @@ from functools import cache
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
+from zlib import crc32
 
 import pytest
 
@@ -26,6 +27,9 @@ TABLE = ROOT / "tests/costs.tsv"
 QUICK = 0.1
 LONG = 0.4
 TIERS = ("quick", "test", "long")
+#: CPU-seconds above which a test is costly. With `--turn`, it runs in one of so many turns.
+COSTLY = 1.0
+TURNS = 3
 #: The names of all tests of a run, before any is left out.
 COLLECTED = pytest.StashKey[set[str]]()
 HEADER = f"""\
@@ -79,6 +83,12 @@ def tiers(item: pytest.Item) -> set[str]:
     if item.get_closest_marker("rounds"):
         return {tier, "test", "long"}
     return {tier, "test"}
+
+
+def is_due(test: str, turn: int) -> bool:
+    """Return whether a test runs in a turn. Costly tests of one file share fixtures, and turns."""
+    file = test.partition("::")[0]
+    return committed().of(test) <= COSTLY or (crc32(file.encode()) + turn) % TURNS == 0
 
 
 class Meter:
