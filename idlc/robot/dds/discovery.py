@@ -303,6 +303,18 @@ def format_participant(prefix: bytes, addresses: Iterable[Address]) -> bytes:
     return formats.LIST + formats.parameter_list(parameters())
 
 
+def _pair(end: EndpointData) -> str:
+    """Return what names both ends of a service or client.
+
+    By this name, a server of rmw_cyclonedds waits for the reader of its reply.
+    """
+    half = end.topic[:3]
+    if half not in ("rq/", "rr/"):
+        return ""
+    is_client = end.is_writer is (half == "rq/")
+    return f"{'clientid' if is_client else 'serviceid'}={end.guid[:-1].hex()};"
+
+
 def format_endpoint(end: EndpointData) -> bytes:
     """Return the announcement of an own endpoint."""
     qos = end.qos
@@ -324,8 +336,8 @@ def format_endpoint(end: EndpointData) -> bytes:
             yield _LIFESPAN, _span(qos.lifespan)
         yield _VERSION, b"\x02\x03"
         yield _VENDOR, wire.VENDOR
-        if end.hash:
-            yield _USER_DATA, _octets(f"typehash={end.hash};".encode())
+        if user := _pair(end) + (f"typehash={end.hash};" if end.hash else ""):
+            yield _USER_DATA, _octets(user.encode())
 
     return formats.LIST + formats.parameter_list(parameters())
 

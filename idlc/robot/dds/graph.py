@@ -23,6 +23,8 @@ from idlc.robot.nodes.interfaces import standard
 #: names are keys of caches.
 INFO_TOPIC = "ros_discovery_info"
 INFO_TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+#: The hash of this type since Iron; without one, nodes of rmw_cyclonedds print a warning.
+INFO_HASH = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
 _MOST, _MOST_NAME = 2**20, 512
 #: The last byte of the id of a writer and of a reader.
 WRITER, READER = b"\x03", b"\x04"

@@ -70,9 +70,9 @@ class DdsTransport:
         self._services = Services(self._connection)
         self._started = time.monotonic()
         self.id = self._connection.prefix.hex()
+        about = graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS, graph.INFO_HASH
         writer, reader = (
-            EndpointData(self._guid(_INFO_ID, kind), graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS)
-            for kind in (WRITER, READER)
+            EndpointData(self._guid(_INFO_ID, kind), *about) for kind in (WRITER, READER)
         )
         with self._connection.acting() as participant:
             self._info = participant.add_writer(writer)

@@ -27,6 +27,9 @@ class RemoteReader(Remote):
         self.count = -1
         #: True after it has said which number it wants, as it then has a heartbeat.
         self.is_told = False
+        #: True while samples wait for its answer to a heartbeat: a volatile reader of Cyclone DDS
+        #: skips all samples that the first heartbeat after its match tells of.
+        self.waits = False
 
 
 class HistorySample(NamedTuple):
@@ -78,6 +81,7 @@ class Writer:
         size = self._shared.fragment(address[0])
         reader = self.readers[guid] = RemoteReader(guid, address, reliable, size, first)
         if reliable:
+            reader.waits = is_cyclone(guid) and not is_late
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
         elif is_late:  # such a reader never asks
@@ -114,6 +118,8 @@ class Writer:
                 break
             self._bytes -= len(self.history.popitem(last=False)[1].payload)
         for reader in self.readers.values():
+            if reader.waits:
+                continue
             if reader.reliable:
                 self._send(reader, self.last, self._heartbeat(reader))
                 self._expect()
@@ -167,7 +173,8 @@ class Writer:
     def _heartbeat(self, reader: RemoteReader) -> bytes:
         self._count += 1
         first = max(next(iter(self.history), self.last + 1), reader.start)
-        return formats.format_heartbeat(reader.id, self.id, first, self.last, self._count)
+        first, last = (reader.start, reader.start - 1) if reader.waits else (first, self.last)
+        return formats.format_heartbeat(reader.id, self.id, first, last, self._count)
 
     def receive(self, guid: bytes, part: wire.AckNack | wire.NackFragment) -> None:
         """Send again what a reader asks for."""
@@ -186,7 +193,11 @@ class Writer:
         self._expire()
         reader.count = part.beat
         reader.base = max(reader.base, part.base)
-        reader.is_told |= part.base > 0
+        # Cyclone DDS counts its answers from 1, and its question after the match is 0
+        if reader.waits and part.beat and part.base >= reader.start:
+            reader.waits = False
+            part = part._replace(missing=tuple(n for n in self.history if n >= part.base))
+        reader.is_told |= part.base > 0 and not reader.waits
         gone = []
         for number in part.missing:
             sample = self.history.get(number) if number >= reader.start else None
@@ -196,7 +207,7 @@ class Writer:
                 self._send(reader, number)
         if gone and self._shared.may_draw(reader.prefix, 0):
             self._shared.send(reader, formats.format_gap(reader.id, self.id, gone))
-        is_asking = part.missing or part.base == 0
+        is_asking = part.missing or part.base == 0 or reader.waits
         if is_asking and self._shared.may_draw(reader.prefix, 0):
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
