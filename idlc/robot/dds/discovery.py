@@ -51,7 +51,7 @@ _MOST_TEXT = 1024
 _UDP4 = 1
 #: The address that a peer announces is only used if its packets come from it.
 _MULTICAST = range(224, 240)
-_HASH = re.compile(rb"(?:^|;)typehash=(RIHS\d{2}_[0-9a-f]{1,128});")
+_HASH = rb"(?:^|;)%s=(RIHS\d{2}_[0-9a-f]{1,128});"
 _ENDED = struct.pack(">I", 3)
 
 
@@ -65,13 +65,17 @@ class ParticipantData(NamedTuple):
 
 
 class EndpointData(NamedTuple):
-    """A writer or a reader as its participant announces it; `port` is 0 if it has no own one."""
+    """A writer or a reader as its participant announces it; `port` is 0 if it has no own one.
+
+    `hash` is that of the message, and `service` that of the service which Lyrical announces, too.
+    """
 
     guid: bytes
     topic: str
     type: str
     qos: QoSProfile
     hash: str = ""
+    service: str = ""
     port: int = 0
 
     @property
@@ -195,15 +199,15 @@ def parse_endpoint(payload: bytes) -> EndpointData:
     if guid is None:
         raise wire.WireError("no name")
     guid = guid[: wire.GUID]
-    user = _first(parameters, _USER_DATA, 4) or b""
-    match = _HASH.search(user[4 : 4 + _MOST_TEXT])
+    user = (_first(parameters, _USER_DATA, 4) or b"")[4 : 4 + _MOST_TEXT]
+    hashes = (re.search(_HASH % name, user) for name in (b"typehash", b"sertypehash"))
     is_writer = guid[-1] & 0x0F in (2, 3)
     return EndpointData(
         guid,
         _text(parameters, _TOPIC, order),
         _text(parameters, _TYPE, order),
         _profile(parameters, order, is_writer),
-        match[1].decode() if match else "",
+        *(match[1].decode() if match else "" for match in hashes),
         _port(parameters, _ENDPOINT_ADDRESS, order),
     )
 
@@ -303,16 +307,18 @@ def format_participant(prefix: bytes, addresses: Iterable[Address]) -> bytes:
     return formats.LIST + formats.parameter_list(parameters())
 
 
-def _pair(end: EndpointData) -> str:
-    """Return what names both ends of a service or client.
+def _user_data(end: EndpointData) -> str:
+    """Return the hash of a topic or service, and what names both ends of a service or client.
 
     By this name, a server of rmw_cyclonedds waits for the reader of its reply.
     """
     half = end.topic[:3]
-    if half not in ("rq/", "rr/"):
-        return ""
-    is_client = end.is_writer is (half == "rq/")
-    return f"{'clientid' if is_client else 'serviceid'}={end.guid[:-1].hex()};"
+    hashes = {"typehash": end.hash, "sertypehash": end.service}
+    words = [f"{name}={each};" for name, each in hashes.items() if each]
+    if half in ("rq/", "rr/"):
+        role = "clientid" if end.is_writer is (half == "rq/") else "serviceid"
+        words.append(f"{role}={end.guid[:-1].hex()};")
+    return "".join(words)
 
 
 def format_endpoint(end: EndpointData) -> bytes:
@@ -336,7 +342,7 @@ def format_endpoint(end: EndpointData) -> bytes:
             yield _LIFESPAN, _span(qos.lifespan)
         yield _VERSION, b"\x02\x03"
         yield _VENDOR, wire.VENDOR
-        if user := _pair(end) + (f"typehash={end.hash};" if end.hash else ""):
+        if user := _user_data(end):
             yield _USER_DATA, _octets(user.encode())
 
     return formats.LIST + formats.parameter_list(parameters())

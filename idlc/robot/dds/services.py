@@ -128,7 +128,7 @@ class Services:
             topic, type_ = (f"{half}{entity.name}", dds_type(entity.type))
             guid = guid_of(self._connection.prefix, entity.id + 1, READER if is_reader else WRITER)
             names = topic + HALVES[half][0], type_ + HALVES[half][1]
-            ends[is_reader] = EndpointData(guid, *names, qos, entity.hash)
+            ends[is_reader] = EndpointData(guid, *names, qos, service=entity.hash)
         with self._connection.acting() as participant:
             writer = participant.add_writer(ends[False])
             return Pair(participant.add_reader(ends[True], deliver), writer)
