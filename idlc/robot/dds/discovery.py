@@ -324,7 +324,7 @@ def _user_data(end: EndpointData) -> str:
 def format_endpoint(end: EndpointData) -> bytes:
     """Return the announcement of an own endpoint."""
     qos = end.qos
-    reliability = 1 if qos.reliability is ReliabilityPolicy.BEST_EFFORT else 2
+    reliability = 2 if qos.is_reliable else 1
     liveliness = 2 if qos.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC else 0
 
     def parameters() -> Iterator[tuple[int, bytes]]:

@@ -124,10 +124,10 @@ class Services:
         qos = msgspec.structs.replace(entity.qos, depth=max(entity.qos.depth, _DEPTH))
         is_service = entity.kind is EntityKind.SERVICE
         ends = {}
-        for half, is_reader in (("rq", is_service), ("rr", not is_service)):
-            topic, type_ = (f"{half}{entity.name}", dds_type(entity.type))
+        for half, (topic, type_) in HALVES.items():
+            is_reader = is_service is (half == "rq")
             guid = guid_of(self._connection.prefix, entity.id + 1, READER if is_reader else WRITER)
-            names = topic + HALVES[half][0], type_ + HALVES[half][1]
+            names = f"{half}{entity.name}{topic}", dds_type(entity.type) + type_
             ends[is_reader] = EndpointData(guid, *names, qos, service=entity.hash)
         with self._connection.acting() as participant:
             writer = participant.add_writer(ends[False])

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import NamedTuple
 
 from idlc.robot.dds import graph
-from idlc.robot.dds.address import Place
+from idlc.robot.dds.address import Place, silence
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
@@ -239,7 +239,7 @@ class DdsTransport:
         participant = self._connection.participant
         notes = [*self.place.notes]
         if not participant.peers:
-            notes.append(self.place.silence)
+            notes.append(silence(self.place))
         if participant.without_udp:
             notes.append("some participants offer no UDP over IPv4; idlc does not see them")
         if participant.refused:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
-from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from idlc.robot.qos import HistoryPolicy, QoSProfile
 
 #: Seconds between heartbeats for readers that lack something.
 HEARTBEAT = 0.1
@@ -60,7 +60,7 @@ class Writer:
         self.guid = guid
         self.id = guid[wire.PREFIX :]
         self.qos = qos
-        self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        self.reliable = qos.is_reliable
         self.readers: dict[bytes, RemoteReader] = {}
         self.local: list[Reader] = []
         self.history: OrderedDict[int, HistorySample] = OrderedDict()
@@ -75,7 +75,7 @@ class Writer:
         if guid in self.readers:
             return
         self._expire()
-        reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        reliable = self.reliable and qos.is_reliable
         is_late = self.qos.is_latched and qos.is_latched
         first = next(iter(self.history), self.last + 1) if is_late else self.last + 1
         size = self._shared.fragment(address[0])
