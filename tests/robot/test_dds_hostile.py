@@ -3,7 +3,7 @@
 import random
 import struct
 import time
-from collections import Counter
+from collections import Counter, OrderedDict
 
 import pytest
 
@@ -13,6 +13,7 @@ from idlc.robot.dds.formats import MOST_WAITING
 from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
 from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.writer import Writer
 from tests.robot.test_dds_network import ALL, LATCHED, PORT, TYPE, Network, text
 from tests.support.rounds import SEED, rounds
 
@@ -228,6 +229,30 @@ def test_many_heartbeats_draw_one_answer_at_a_time():
     answers = own.receive(head + b"".join(beats), ("10.0.0.2", PORT), network.now)
     assert len(answers) == 1
     assert len(own.tick(network.now + 0.02)) in (1, 2)
+
+
+class Unread(OrderedDict):
+    """A history that nobody may read from end to end."""
+
+    def items(self):
+        raise AssertionError
+
+
+def test_an_answer_costs_the_same_however_long_the_history_is():
+    """A silent reader of Cyclone DDS gets 256 samples at its first answer, and asks for more."""
+    shared = formats.Shared(lambda _: 60_000)
+    writer = Writer(HEAD[8:] + b"\0\0\1\3", ALL, shared)
+    writer.history = Unread()
+    guid = b"\x01\x10" + bytes(10) + b"\0\0\2\4"
+    writer.match(guid, ("10.0.0.2", PORT), ALL)
+    for number in range(2000):
+        writer.write(text(number))
+    assert len(shared.collect()) == 1
+    for base, beat in ((2**62, 1), (0, 1), (1, 0), (1, 0)):
+        writer.receive(guid, wire.AckNack(guid[12:], writer.id, base, (), beat))
+        assert sum(map(len, shared.collect())) < 10
+    writer.receive(guid, wire.AckNack(guid[12:], writer.id, 1, (), 2))
+    assert len(shared.collect()) == 256 + 1
 
 
 def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():

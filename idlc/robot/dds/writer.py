@@ -134,8 +134,8 @@ class Writer:
     def _expire(self) -> None:
         """Forget the samples whose lifespan has ended."""
         limit = self._shared.now - self.qos.lifespan / 1e9
-        for number in [number for number, each in self.history.items() if each.written < limit]:
-            self.forget(number)
+        while self.history and next(iter(self.history.values())).written < limit:
+            self.forget(next(iter(self.history)))
 
     def forget(self, number: int) -> None:
         """Remove a sample from the history."""
@@ -196,7 +196,8 @@ class Writer:
         # Cyclone DDS counts its answers from 1, and its question after the match is 0
         if reader.waits and part.beat and part.base >= reader.start:
             reader.waits = False
-            part = part._replace(missing=tuple(n for n in self.history if n >= part.base))
+            end = min(self.last + 1, part.base + wire.MOST_BITS)
+            part = part._replace(missing=tuple(range(part.base, end)))
         reader.is_told |= part.base > 0 and not reader.waits
         gone = []
         for number in part.missing:
