@@ -7,7 +7,7 @@ from collections import Counter, OrderedDict
 
 import pytest
 
-from idlc.robot.dds import discovery, formats, graph, wire
+from idlc.robot.dds import formats, graph, wire
 from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import MOST_WAITING
 from idlc.robot.dds.graph import RemoteNodes
@@ -205,12 +205,12 @@ def test_extremes_are_refused_at_once(case, order):
 
 @pytest.mark.parametrize("order", [b"\0\1", b"\0\0"])
 def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order):
-    inline = discovery.format_related(b"a name of 16 byt", 2**40)
+    inline = formats.format_related(b"a name of 16 byt", 2**40)
     body = order + b"\0\0" + b"body"
-    sent = discovery.wrap(body, inline)
+    sent = formats.wrap(body, inline)
     for end in range(len(sent) + 1):
         sample = wire.Data(b"", b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
-        payload, named = discovery.unwrap(sample, b"a name o")
+        payload, named = formats.unwrap(sample, b"a name o")
         assert (named is None) == (end < 20)
         assert named in (None, (b"a name of 16 byt", 2**40))
     assert payload == body

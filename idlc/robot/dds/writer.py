@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from idlc.robot.dds import discovery, formats, wire
+from idlc.robot.dds import formats, wire
 from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
 from idlc.robot.qos import HistoryPolicy, QoSProfile
@@ -159,7 +159,7 @@ class Writer:
         """
         payload, inline, time, _ = self.history[number]
         if inline and payload and is_cyclone(reader.guid):
-            payload, inline = discovery.wrap(payload, inline), b""
+            payload, inline = formats.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
         if len(payload) <= size:
             self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
