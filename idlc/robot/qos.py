@@ -114,6 +114,11 @@ class QoSProfile(msgspec.Struct, kw_only=True):
         """True if late subscriptions get earlier messages."""
         return self.durability is DurabilityPolicy.TRANSIENT_LOCAL
 
+    @property
+    def is_reliable(self) -> bool:
+        """True if lost messages are sent again."""
+        return self.reliability is not ReliabilityPolicy.BEST_EFFORT
+
 
 # rclpy's older names
 QoSReliabilityPolicy = ReliabilityPolicy

@@ -13,7 +13,7 @@ from zenoh import CongestionControl, Reliability, ext
 
 from idlc.project.atomic import without_ctrl_c
 from idlc.robot.keys import Entity, all_tokens, parse_token
-from idlc.robot.qos import HistoryPolicy, ReliabilityPolicy
+from idlc.robot.qos import HistoryPolicy
 from idlc.robot.transport import Closeable, OnReply, Request, Sample, Sender
 
 #: Seconds between the heartbeats by which subscriptions notice that they missed a message.
@@ -45,7 +45,7 @@ class ZenohTransport:
     def publisher(self, entity: Entity) -> Sender:
         """Declare a publisher."""
         key, qos = entity.key, entity.qos
-        reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        reliable = qos.is_reliable
         blocks = reliable and qos.history is HistoryPolicy.KEEP_ALL
         options: dict[str, Any] = {
             "congestion_control": CongestionControl.BLOCK if blocks else CongestionControl.DROP,
@@ -74,7 +74,7 @@ class ZenohTransport:
             subscriber = self._session.declare_subscriber(key, _direct(put))
             return _Declared(self._declared, subscriber)
         options: dict[str, Any] = {}
-        if qos.reliability is not ReliabilityPolicy.BEST_EFFORT:
+        if qos.is_reliable:
             options["recovery"] = ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
         history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth)
         subscriber = ext.declare_advanced_subscriber(

@@ -3,16 +3,17 @@
 import random
 import struct
 import time
-from collections import Counter
+from collections import Counter, OrderedDict
 
 import pytest
 
-from idlc.robot.dds import discovery, formats, graph, wire
+from idlc.robot.dds import formats, graph, wire
 from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import MOST_WAITING
 from idlc.robot.dds.graph import RemoteNodes
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS
 from idlc.robot.dds.reader import Reader
+from idlc.robot.dds.writer import Writer
 from tests.robot.test_dds_network import ALL, LATCHED, PORT, TYPE, Network, text
 from tests.support.rounds import SEED, rounds
 
@@ -204,12 +205,12 @@ def test_extremes_are_refused_at_once(case, order):
 
 @pytest.mark.parametrize("order", [b"\0\1", b"\0\0"])
 def test_requests_of_cyclone_dds_are_read_as_they_were_written_or_ignored(order):
-    inline = discovery.format_related(b"a name of 16 byt", 2**40)
+    inline = formats.format_related(b"a name of 16 byt", 2**40)
     body = order + b"\0\0" + b"body"
-    sent = discovery.wrap(body, inline)
+    sent = formats.wrap(body, inline)
     for end in range(len(sent) + 1):
         sample = wire.Data(b"", b"\1\x10" + bytes(14), 1, wire.NONE, sent[:end], False, 0)
-        payload, named = discovery.unwrap(sample, b"a name o")
+        payload, named = formats.unwrap(sample, b"a name o")
         assert (named is None) == (end < 20)
         assert named in (None, (b"a name of 16 byt", 2**40))
     assert payload == body
@@ -228,6 +229,30 @@ def test_many_heartbeats_draw_one_answer_at_a_time():
     answers = own.receive(head + b"".join(beats), ("10.0.0.2", PORT), network.now)
     assert len(answers) == 1
     assert len(own.tick(network.now + 0.02)) in (1, 2)
+
+
+class Unread(OrderedDict):
+    """A history that nobody may read from end to end."""
+
+    def items(self):
+        raise AssertionError
+
+
+def test_an_answer_costs_the_same_however_long_the_history_is():
+    """A silent reader of Cyclone DDS gets 256 samples at its first answer, and asks for more."""
+    shared = formats.Shared(lambda _: 60_000)
+    writer = Writer(HEAD[8:] + b"\0\0\1\3", ALL, shared)
+    writer.history = Unread()
+    guid = b"\x01\x10" + bytes(10) + b"\0\0\2\4"
+    writer.match(guid, ("10.0.0.2", PORT), ALL)
+    for number in range(2000):
+        writer.write(text(number))
+    assert len(shared.collect()) == 1
+    for base, beat in ((2**62, 1), (0, 1), (1, 0), (1, 0)):
+        writer.receive(guid, wire.AckNack(guid[12:], writer.id, base, (), beat))
+        assert sum(map(len, shared.collect())) < 10
+    writer.receive(guid, wire.AckNack(guid[12:], writer.id, 1, (), 2))
+    assert len(shared.collect()) == 256 + 1
 
 
 def test_nodes_and_topics_with_other_names_than_those_of_ros_are_not_shown():

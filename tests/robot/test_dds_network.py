@@ -3,14 +3,16 @@
 import heapq
 import itertools
 import random
+import re
 
 import msgspec
 import pytest
 
-from idlc.robot.dds import formats, wire
+from idlc.robot.dds import discovery, formats, wire
 from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.graph import READER, WRITER, guid_of
 from idlc.robot.dds.participant import MOST_ANNOUNCEMENTS, MOST_PEERS, Participant
+from idlc.robot.dds.writer import Writer
 from idlc.robot.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from tests.support.rounds import SEED, rounds
 
@@ -248,3 +250,51 @@ def test_strangers_get_three_announcements_where_their_packets_come_from():
     assert drawn <= MOST_PEERS
     assert len(own.peers) <= MOST_PEERS
     assert not any(peer.endpoints for peer in own.peers.values())
+
+
+@pytest.mark.parametrize("qos", [QoSProfile(depth=3), LATCHED], ids=["volatile", "latched"])
+def test_a_reader_of_cyclone_dds_gets_samples_after_its_first_answer(qos):
+    """A volatile one skips what the first heartbeat tells of, as if it had come too late for it."""
+    shared = formats.Shared(lambda _: 60_000)
+    writer = Writer(wire.VENDOR + bytes(10) + b"\0\0\1\3", LATCHED, shared)
+    guid = b"\x01\x10" + bytes(10) + b"\0\0\2\4"
+
+    def sent():
+        packet = itertools.chain(*(outgoing.parts for outgoing in shared.collect()))
+        for _, part in wire.parse_packet(formats.format_packet(bytes(12), packet)).parts:
+            if isinstance(part, wire.Gap):
+                yield part.first, *part.others
+            else:
+                yield part.number if isinstance(part, wire.Data) else (part.first, part.last)
+
+    def answer(base, beat):
+        writer.receive(guid, wire.AckNack(guid[12:], writer.id, base, (), beat))
+        return [*sent()]
+
+    writer.write(text(1))
+    writer.match(guid, ("10.0.0.1", PORT), qos)
+    if qos is LATCHED:
+        assert [*sent()] == [(1, 1)]
+        writer.write(text(2))
+        assert [*sent()] == [2, (1, 2)]
+        return
+    assert [*sent()] == [(2, 1)]
+    writer.write(text(2))
+    assert [*sent()] == []
+    assert answer(1, 0) == [(2, 1)]  # its question after the match
+    for number in range(3, 7):
+        writer.write(text(number))
+    assert answer(2, 1) == [4, 5, 6, (2, 3), (4, 6)]
+    writer.write(text(7))
+    assert [*sent()] == [7, (5, 7)]
+
+
+def test_the_ends_of_a_client_have_one_name():
+    for half, other, role in (("rq/a", "rr/a", b"clientid"), ("rr/a", "rq/a", b"serviceid")):
+        ends = [(half, WRITER), (other, READER)]
+        guids = [(guid_of(wire.VENDOR + bytes(10), 7, kind), topic) for topic, kind in ends]
+        announced = [
+            discovery.format_endpoint(EndpointData(guid, topic, TYPE, ALL)) for guid, topic in guids
+        ]
+        (names,) = {re.findall(b"(?:client|service)id=[0-9a-f]+;", data)[0] for data in announced}
+        assert names.startswith(role)

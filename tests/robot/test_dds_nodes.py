@@ -17,7 +17,7 @@ from idlc.robot import (
     Node,
     QoSProfile,
 )
-from idlc.robot.dds import graph
+from idlc.robot.dds import discovery, graph
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import EntityKind
 from idlc.robot.names import dds_type
@@ -203,6 +203,23 @@ def test_services_of_every_node_are_known_by_both_halves():
             ]
             entities = graph.RemoteNodes(0).entities([], ends, {})
             assert [(each.type, each.hash) for each in entities] == [(name, shown)]
+
+
+def test_what_lyrical_adds_to_announcements_is_read_or_skipped():
+    """Its sources say so, as it has no wheel: the hash of a service, and topics for buffers."""
+    hashes = ["RIHS01_" + digit * 64 for digit in "12"]
+    user = "{};sertypehash={};bufbe=cpu:,gpu:device=0".format(*hashes)
+    image, request = "sensor_msgs::msg::dds_::Image_", "std_srvs::srv::dds_::SetBool_Request_"
+    topics = {"rt/image": image, "rt/image/_buf_cpu": image, "rt/image/_buf/010f78fd": image}
+    read = []
+    for number, (topic, type_) in enumerate((topics | {"rq/setRequest": request}).items()):
+        last = graph.READER if type_ == request else graph.WRITER
+        end = graph.EndpointData(bytes(14) + bytes([number]) + last, topic, type_, LATCHED, user)
+        read.append(discovery.parse_endpoint(discovery.format_endpoint(end)))
+    assert [[end.hash, end.service] for end in read] == [hashes] * 4
+    shown = graph.RemoteNodes(0).entities([], read, {})
+    expected = [("/image", hashes[0]), ("/set", hashes[1])]
+    assert [(each.name, each.hash) for each in shown] == expected
 
 
 def test_a_first_message_needs_no_other_package():

@@ -54,20 +54,6 @@ class Place(NamedTuple):
         """True if nothing leaves this machine."""
         return not self.subnet and all(host.startswith("127.") for host in self.hosts)
 
-    @property
-    def silence(self) -> str:
-        """A sentence for when there is no other participant."""
-        if not (self.hosts or self.subnet):
-            return "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, so idlc searched nothing"
-        domains = sorted({*range(_EPHEMERAL)} - {self.domain})
-        others = [f"`dds:{domain}`" for domain in domains if _is_used(domain)]
-        if others:
-            return f"this machine has participants in other domains: {first_few(others, 5)}"
-        if self.is_local:
-            return "idlc searched this machine only; `dds/HOST` also searches another one"
-        places = [*self.hosts, *(["the subnet"] if self.subnet else [])]
-        return f"idlc searched {', '.join(places)}; no participant answered"
-
 
 def parse_place(address: str, domain: int | None, environ: Mapping[str, str]) -> Place:
     """Return where to search by an address and ROS 2's variables; raise RobotError.
@@ -130,6 +116,20 @@ def _is_used(domain: int) -> bool:
         except OSError:
             return True
     return False
+
+
+def silence(place: Place) -> str:
+    """Return a sentence for when there is no other participant; it tries a port of each domain."""
+    if not (place.hosts or place.subnet):
+        return "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, so idlc searched nothing"
+    domains = sorted({*range(_EPHEMERAL)} - {place.domain})
+    others = [f"`dds:{domain}`" for domain in domains if _is_used(domain)]
+    if others:
+        return f"this machine has participants in other domains: {first_few(others, 5)}"
+    if place.is_local:
+        return "idlc searched this machine only; `dds/HOST` also searches another one"
+    places = [*place.hosts, *(["the subnet"] if place.subnet else [])]
+    return f"idlc searched {', '.join(places)}; no participant answered"
 
 
 def searched(place: Place) -> list[Address]:

@@ -42,15 +42,14 @@ class Connection:
             self._selector.register(each, selectors.EVENT_READ, each)
         self._place = place
         self._looked = self._ticked = self._due_at = 0.0
-        self._port = port = self._sockets[0].getsockname()[1]
-        self._own_address = "127.0.0.1", port
+        self._own_address = "127.0.0.1", self._sockets[0].getsockname()[1]
         #: Who takes a turn, whether it waits for a packet, and until when the thread takes none.
         self._turn, self._waits, self._lent_until = threading.RLock(), False, 0.0
         #: Until when only the thread receives, as large packets came: with one heap instead of two,
         #: the C library returns their memory to the system after each message.
         self._large_until = 0.0
         self.prefix = wire.VENDOR + os.urandom(wire.PREFIX - len(wire.VENDOR))
-        others = [each for each in address.searched(place) if each != ("127.0.0.1", port)]
+        others = [each for each in address.searched(place) if each != self._own_address]
         #: When the endpoints of others changed last.
         self.changed_at = time.monotonic()
         self.participant = Participant(
@@ -71,7 +70,7 @@ class Connection:
     def _look(self, now: float) -> None:
         """Announce the own addresses if they are others than before."""
         self._looked, self._hosts = now, address.own_hosts(self._place)
-        if self.participant.move([(host, self._port) for host in self._hosts]):
+        if self.participant.move([(host, self._own_address[1]) for host in self._hosts]):
             for group in self._sockets[1:]:
                 address.join(group, self._hosts)
 

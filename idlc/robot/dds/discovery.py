@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.robot.dds import formats, wire
-from idlc.robot.dds.formats import Address, is_cyclone
+from idlc.robot.dds.formats import Address
 from idlc.robot.qos import (
     INFINITE,
     MOST_DEPTH,
@@ -36,13 +36,9 @@ _LIVELINESS, _DURABILITY, _DEADLINE, _LIFESPAN, _USER_DATA = 0x1B, 0x1D, 0x23, 0
 _HISTORY = 0x40
 _ENDPOINT_ADDRESS, _DEFAULT_ADDRESS, _META_ADDRESS = 0x2F, 0x31, 0x32
 _PARTICIPANT, _BUILTIN, _ENDPOINT, KEY, STATUS = 0x50, 0x58, 0x5A, 0x70, 0x71
-#: The parameters by which Fast DDS names the request of a reply; the second is its older one.
-_RELATED = (0x83, 0x800F)
 #: Announcer and detector of participants, publications and subscriptions.
 _BUILTINS = 0x3F
 PARTICIPANT_ID = b"\x00\x00\x01\xc1"
-#: Of a request in the form of Cyclone DDS: the encapsulation, and where its fields begin.
-_HEAD, _START = 4, 20
 #: Seconds until a participant that sends nothing is gone: our own, and bounds of others.
 LEASE = 20.0
 _LEASES = (1.0, 600.0)
@@ -51,7 +47,7 @@ _MOST_TEXT = 1024
 _UDP4 = 1
 #: The address that a peer announces is only used if its packets come from it.
 _MULTICAST = range(224, 240)
-_HASH = re.compile(rb"(?:^|;)typehash=(RIHS\d{2}_[0-9a-f]{1,128});")
+_HASH = rb"(?:^|;)%s=(RIHS\d{2}_[0-9a-f]{1,128});"
 _ENDED = struct.pack(">I", 3)
 
 
@@ -65,13 +61,17 @@ class ParticipantData(NamedTuple):
 
 
 class EndpointData(NamedTuple):
-    """A writer or a reader as its participant announces it; `port` is 0 if it has no own one."""
+    """A writer or a reader as its participant announces it; `port` is 0 if it has no own one.
+
+    `hash` is that of the message, and `service` that of the service which Lyrical announces, too.
+    """
 
     guid: bytes
     topic: str
     type: str
     qos: QoSProfile
     hash: str = ""
+    service: str = ""
     port: int = 0
 
     @property
@@ -188,6 +188,11 @@ def parse_participant(payload: bytes) -> ParticipantData:
     return ParticipantData(guid[: wire.PREFIX], meta, default or meta, bounded)
 
 
+def _hash(user: bytes, name: bytes) -> str:
+    match = re.search(_HASH % name, user)
+    return match[1].decode() if match else ""
+
+
 def parse_endpoint(payload: bytes) -> EndpointData:
     """Return the endpoint of an announcement; raise WireError."""
     parameters, order = wire.parse_list(payload)
@@ -195,15 +200,15 @@ def parse_endpoint(payload: bytes) -> EndpointData:
     if guid is None:
         raise wire.WireError("no name")
     guid = guid[: wire.GUID]
-    user = _first(parameters, _USER_DATA, 4) or b""
-    match = _HASH.search(user[4 : 4 + _MOST_TEXT])
+    user = (_first(parameters, _USER_DATA, 4) or b"")[4 : 4 + _MOST_TEXT]
     is_writer = guid[-1] & 0x0F in (2, 3)
     return EndpointData(
         guid,
         _text(parameters, _TOPIC, order),
         _text(parameters, _TYPE, order),
         _profile(parameters, order, is_writer),
-        match[1].decode() if match else "",
+        _hash(user, b"typehash"),
+        _hash(user, b"sertypehash"),
         _port(parameters, _ENDPOINT_ADDRESS, order),
     )
 
@@ -220,48 +225,6 @@ def ended(part: wire.Data) -> bytes | None:
     except wire.WireError:
         return None
     return _first(parameters, _ENDPOINT, wire.GUID) or _first(parameters, _PARTICIPANT, wire.GUID)
-
-
-def related(parameters: wire.Parameters) -> tuple[bytes, int] | None:
-    """Return the writer and the number of the request that a reply answers."""
-    for name in _RELATED:
-        if (value := _first(parameters, name, 24)) is not None:
-            high, low = struct.unpack_from("<iI", value, wire.GUID)
-            return value[: wire.GUID], high << 32 | low
-    return None
-
-
-# requests and replies of rmw_cyclonedds begin with 8 bytes that the client chose, and a number
-
-
-def _order(payload: bytes) -> str:
-    return "<" if payload[1] & 1 else ">"
-
-
-def wrap(payload: bytes, inline: bytes) -> bytes:
-    """Return a request or reply for Cyclone DDS; `inline` names the request."""
-    named = related(wire.parse_parameters(inline, 0, "<")[0])
-    if named is None:
-        return payload
-    client, number = named
-    (client_id,) = struct.unpack_from("<8xQ", client)
-    head = struct.pack(_order(payload) + "Qq", client_id, number)
-    return payload[:_HEAD] + head + payload[_HEAD:]
-
-
-def unwrap(received: wire.Data, start: bytes) -> tuple[bytes, tuple[bytes, int] | None]:
-    """Return the payload of a request or reply, and the client and number that it names.
-
-    Of a client of Cyclone DDS, the name is 8 bytes, which follow `start`.
-    """
-    payload = received.payload
-    if not is_cyclone(received.writer):
-        return payload, related(received.parameters)
-    if len(payload) < _START:
-        return payload, None
-    client_id, number = struct.unpack_from(_order(payload) + "Qq", payload, _HEAD)
-    name = start + struct.pack("<Q", client_id)
-    return payload[:_HEAD] + payload[_START:], (name, number)
 
 
 # what idlc announces
@@ -303,10 +266,24 @@ def format_participant(prefix: bytes, addresses: Iterable[Address]) -> bytes:
     return formats.LIST + formats.parameter_list(parameters())
 
 
+def _user_data(end: EndpointData) -> str:
+    """Return the hash of a topic or service, and what names both ends of a service or client.
+
+    By this name, a server of rmw_cyclonedds waits for the reader of its reply.
+    """
+    half = end.topic[:3]
+    hashes = {"typehash": end.hash, "sertypehash": end.service}
+    words = [f"{name}={each};" for name, each in hashes.items() if each]
+    if half in ("rq/", "rr/"):
+        role = "clientid" if end.is_writer is (half == "rq/") else "serviceid"
+        words.append(f"{role}={end.guid[:-1].hex()};")
+    return "".join(words)
+
+
 def format_endpoint(end: EndpointData) -> bytes:
     """Return the announcement of an own endpoint."""
     qos = end.qos
-    reliability = 1 if qos.reliability is ReliabilityPolicy.BEST_EFFORT else 2
+    reliability = 2 if qos.is_reliable else 1
     liveliness = 2 if qos.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC else 0
 
     def parameters() -> Iterator[tuple[int, bytes]]:
@@ -324,8 +301,8 @@ def format_endpoint(end: EndpointData) -> bytes:
             yield _LIFESPAN, _span(qos.lifespan)
         yield _VERSION, b"\x02\x03"
         yield _VENDOR, wire.VENDOR
-        if end.hash:
-            yield _USER_DATA, _octets(f"typehash={end.hash};".encode())
+        if user := _user_data(end):
+            yield _USER_DATA, _octets(user.encode())
 
     return formats.LIST + formats.parameter_list(parameters())
 
@@ -333,9 +310,3 @@ def format_endpoint(end: EndpointData) -> bytes:
 def format_end(guid: bytes) -> bytes:
     """Return the inline parameters that say that something is gone."""
     return formats.parameter_list(iter([(KEY, guid), (STATUS, _ENDED)]))
-
-
-def format_related(writer: bytes, number: int) -> bytes:
-    """Return the inline parameters that name a request."""
-    value = writer + formats.format_number(number)
-    return formats.parameter_list((name, value) for name in _RELATED)

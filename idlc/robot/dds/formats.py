@@ -1,6 +1,7 @@
 """The packets to send: their bytes, always little-endian, and what the ends of a participant share.
 
-The ends share the time, the packets to send, and the room for samples.
+The ends share the time, the packets to send, and the room for samples. How requests and replies
+name each other is here, too.
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ _HEAD = b"RTPS\x02\x03" + wire.VENDOR
 LIST = b"\x00\x03\x00\x00"
 #: The IP address and the port of a socket.
 Address: TypeAlias = tuple[str, int]
+#: The parameters by which Fast DDS names the request of a reply; the second is its older one.
+_RELATED = (0x83, 0x800F)
+#: Of a request in the form of Cyclone DDS: where what names it begins, and the rest.
+_NAMED, _REST = 4, 20
 #: Bytes of all samples that cannot be delivered yet.
 MOST_WAITING = 512 << 20
 #: Bytes that the questions of a participant draw at once, and in a second; those that a packet
@@ -125,6 +130,56 @@ def parameter_list(parameters: Iterator[tuple[int, bytes]]) -> bytes:
 def is_cyclone(guid: bytes) -> bool:
     """Return whether an end is of Cyclone DDS, with which GUIDs there begin."""
     return guid.startswith(b"\x01\x10")
+
+
+# requests and replies name each other: for Fast DDS by inline parameters; those of rmw_cyclonedds
+# begin with 8 bytes that the client chose, and a number
+
+
+def _related(parameters: wire.Parameters) -> tuple[bytes, int] | None:
+    """Return the writer and the number of the request that a reply answers."""
+    for name in _RELATED:
+        for value in parameters.get(name, ()):
+            if len(value) >= 24:
+                high, low = struct.unpack_from("<iI", value, wire.GUID)
+                return value[: wire.GUID], high << 32 | low
+    return None
+
+
+def format_related(writer: bytes, number: int) -> bytes:
+    """Return the inline parameters that name a request."""
+    value = writer + format_number(number)
+    return parameter_list((name, value) for name in _RELATED)
+
+
+def _order(payload: bytes) -> str:
+    return "<" if payload[1] & 1 else ">"
+
+
+def wrap(payload: bytes, inline: bytes) -> bytes:
+    """Return a request or reply for Cyclone DDS; `inline` names the request."""
+    named = _related(wire.parse_parameters(inline, 0, "<")[0])
+    if named is None:
+        return payload
+    client, number = named
+    (client_id,) = struct.unpack_from("<8xQ", client)
+    head = struct.pack(_order(payload) + "Qq", client_id, number)
+    return payload[:_NAMED] + head + payload[_NAMED:]
+
+
+def unwrap(received: wire.Data, start: bytes) -> tuple[bytes, tuple[bytes, int] | None]:
+    """Return the payload of a request or reply, and the client and number that it names.
+
+    Of a client of Cyclone DDS, the name is 8 bytes, which follow `start`.
+    """
+    payload = received.payload
+    if not is_cyclone(received.writer):
+        return payload, _related(received.parameters)
+    if len(payload) < _REST:
+        return payload, None
+    client_id, number = struct.unpack_from(_order(payload) + "Qq", payload, _NAMED)
+    name = start + struct.pack("<Q", client_id)
+    return payload[:_NAMED] + payload[_REST:], (name, number)
 
 
 class Outgoing(NamedTuple):

@@ -23,11 +23,16 @@ from idlc.robot.nodes.interfaces import standard
 #: names are keys of caches.
 INFO_TOPIC = "ros_discovery_info"
 INFO_TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+#: The hash of this type since Iron; without one, nodes of rmw_cyclonedds print a warning.
+INFO_HASH = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
 _MOST, _MOST_NAME = 2**20, 512
 #: The last byte of the id of a writer and of a reader.
 WRITER, READER = b"\x03", b"\x04"
 #: The ends of the names and types of a service's topics.
 HALVES = {"rq": ("Request", "Request_"), "rr": ("Reply", "Response_")}
+#: The end of topics on which Lyrical's nodes exchange buffers; idlc gets these messages on the
+#: topic itself.
+_BUFFERS = "/_buf_cpu"
 #: The node of an endpoint that no node owns, as rcl calls it.
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 #: Endpoints whose entities are not made again after each change.
@@ -196,8 +201,8 @@ class RemoteNodes:
     ) -> Iterator[Entity]:
         """Yield the entities of the participants that exist; forget what others told.
 
-        DDS tells the hashes of requests and responses, but none of a service: `hashes` has those of
-        the own ones by name and type.
+        Before Lyrical, nodes tell the hashes of requests and responses, but none of a service:
+        `hashes` has those of the own ones by name and type.
         """
         self._nodes = {each: self._nodes[each] for each in prefixes if each in self._nodes}
         owners: dict[bytes, Entity | None] = {}
@@ -214,7 +219,8 @@ class RemoteNodes:
         for end, side in sides:
             _, name, type_, _ = side
             told = (halves[side].get(half, "")[:_BEGINNING] for half in HALVES)
-            service = hashes.get((name, type_)) or SERVICES.get((type_, *told), "")
+            own = hashes.get((name, type_))
+            service = end.service or own or SERVICES.get((type_, *told), "")
             unknown = _node(self._domain, end.guid[: wire.PREFIX], 0, "/", _UNKNOWN)
             if entity := _endpoint(end, owners.get(end.guid, unknown), service):
                 yield entity
@@ -263,15 +269,16 @@ def _node(domain: int, prefix: bytes, number: int, namespace: str, name: str) ->
 def _endpoint(end: EndpointData, owner: Entity | None, service: str) -> Entity | None:
     """Return what ROS 2 shows of an endpoint; `None` if it shows nothing.
 
-    `service` is the hash of a service if the participant tells none.
+    `service` is the hash of the service.
     """
     half = end.topic.partition("/")[0]
     kind, hash_ = _KINDS.get((half, end.is_writer)), end.hash
     name, type_ = _names(end)
-    if kind is None or owner is None or not is_absolute(name):
+    is_hidden = name.endswith(_BUFFERS) or not is_absolute(name)
+    if kind is None or owner is None or is_hidden:
         return None
-    if half in HALVES and not end.guid.startswith(wire.VENDOR):
-        hash_ = service  # it told the hash of the request or of the response
+    if half in HALVES:
+        hash_ = service  # that of the endpoint is of the request or of the response
     number = int.from_bytes(end.guid[12:15], "big")
     with suppress(ValueError):  # it is not a type of ROS 2
         return owner.replace(id=number, kind=kind, name=name, type=type_, hash=hash_, qos=end.qos)

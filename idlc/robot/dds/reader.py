@@ -9,7 +9,7 @@ from math import inf
 from idlc.robot.dds import formats, wire
 from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
 from idlc.robot.dds.wire import Data
-from idlc.robot.qos import QoSProfile, ReliabilityPolicy
+from idlc.robot.qos import QoSProfile
 
 #: Bytes of a sample.
 MOST_SAMPLE = 64 << 20
@@ -89,7 +89,7 @@ class Reader:
         self.id = guid[wire.PREFIX :]
         self.qos = qos
         self.deliver = deliver
-        self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        self.reliable = qos.is_reliable
         self.writers: dict[bytes, RemoteWriter] = {}
         self._shared = shared
         #: Where writers go on that were gone for a while, unless this reader begins again.
@@ -108,7 +108,7 @@ class Reader:
         """Receive from a writer, which learns by a question that this reader is there."""
         if guid in self.writers:
             return
-        reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        reliable = self.reliable and qos.is_reliable
         writer = self.writers[guid] = RemoteWriter(guid, address, reliable)
         self._shared.matched.setdefault(guid, []).append(self)
         if self._remembered:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.robot.dds import discovery, wire
+from idlc.robot.dds import formats, wire
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.formats import is_cyclone
@@ -60,7 +60,7 @@ class _Client:
     def receive(self, received: wire.Data) -> None:
         """Take a reply; those to other clients arrive, too."""
         start = self.pair.reader.guid[:8]
-        payload, named = discovery.unwrap(received, start)
+        payload, named = formats.unwrap(received, start)
         if named is None or named[0] not in {each.guid for each in self.pair}:
             return
         if (call := self.calls.pop(named[1], None)) is not None:
@@ -91,7 +91,7 @@ class _Request:
     def __init__(self, services: Services, writer: Writer, received: wire.Data) -> None:
         self._services = services
         self._writer = writer
-        self.payload, named = discovery.unwrap(received, bytes(8))
+        self.payload, named = formats.unwrap(received, bytes(8))
         # Fast DDS names the reader of the reply
         self._target = named[0] if named else received.writer
         self._number = named[1] if named and is_cyclone(received.writer) else received.number
@@ -100,7 +100,7 @@ class _Request:
 
     def reply(self, payload: bytes, attachment: bytes) -> None:  # noqa: ARG002 - it is Zenoh's
         """Send the reply, now or when its client is matched."""
-        named = discovery.format_related(self._target, self._number)
+        named = formats.format_related(self._target, self._number)
         self._services.reply(self._writer, self._client, named, payload)
 
     def drop(self) -> None:
@@ -124,11 +124,11 @@ class Services:
         qos = msgspec.structs.replace(entity.qos, depth=max(entity.qos.depth, _DEPTH))
         is_service = entity.kind is EntityKind.SERVICE
         ends = {}
-        for half, is_reader in (("rq", is_service), ("rr", not is_service)):
-            topic, type_ = (f"{half}{entity.name}", dds_type(entity.type))
+        for half, (topic, type_) in HALVES.items():
+            is_reader = is_service is (half == "rq")
             guid = guid_of(self._connection.prefix, entity.id + 1, READER if is_reader else WRITER)
-            names = topic + HALVES[half][0], type_ + HALVES[half][1]
-            ends[is_reader] = EndpointData(guid, *names, qos, entity.hash)
+            names = f"{half}{entity.name}{topic}", dds_type(entity.type) + type_
+            ends[is_reader] = EndpointData(guid, *names, qos, service=entity.hash)
         with self._connection.acting() as participant:
             writer = participant.add_writer(ends[False])
             return Pair(participant.add_reader(ends[True], deliver), writer)
@@ -167,7 +167,7 @@ class Services:
             number = writer.last + 1
             # before it is sent, as a service of this participant may answer at once
             client.calls[number] = _Call(attachment, callback, time.monotonic() + limit)
-            self._connection.write(writer, payload, discovery.format_related(reader.guid, number))
+            self._connection.write(writer, payload, formats.format_related(reader.guid, number))
 
         end = time.monotonic() + min(limit, _APPEARING)
         self._send(_Waiting(client.is_matched, send, lambda: callback(None), end), _MOST_WAITING)

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import NamedTuple
 
 from idlc.robot.dds import graph
-from idlc.robot.dds.address import Place
+from idlc.robot.dds.address import Place, silence
 from idlc.robot.dds.connection import Connection
 from idlc.robot.dds.discovery import EndpointData
 from idlc.robot.dds.graph import READER, WRITER, RemoteNodes, guid_of, own_nodes
@@ -70,9 +70,9 @@ class DdsTransport:
         self._services = Services(self._connection)
         self._started = time.monotonic()
         self.id = self._connection.prefix.hex()
+        about = graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS, graph.INFO_HASH
         writer, reader = (
-            EndpointData(self._guid(_INFO_ID, kind), graph.INFO_TOPIC, graph.INFO_TYPE, _INFO_QOS)
-            for kind in (WRITER, READER)
+            EndpointData(self._guid(_INFO_ID, kind), *about) for kind in (WRITER, READER)
         )
         with self._connection.acting() as participant:
             self._info = participant.add_writer(writer)
@@ -239,7 +239,7 @@ class DdsTransport:
         participant = self._connection.participant
         notes = [*self.place.notes]
         if not participant.peers:
-            notes.append(self.place.silence)
+            notes.append(silence(self.place))
         if participant.without_udp:
             notes.append("some participants offer no UDP over IPv4; idlc does not see them")
         if participant.refused:

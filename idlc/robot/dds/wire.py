@@ -21,7 +21,7 @@ ALL, ALL_READERS = bytes(PREFIX), bytes(GUID - PREFIX)
 #: A list of parameters in one payload has at most these.
 _MOST_PARAMETERS = 256
 #: The most bits of a set of numbers.
-_MOST_BITS = 256
+MOST_BITS = 256
 #: Fragments of one sample; 64 MiB of the smallest that idlc sends.
 MOST_FRAGMENTS = 50_000
 SENTINEL = 1
@@ -168,7 +168,7 @@ def _number(high: int, low: int) -> int:
 def _bits(data: bytes, order: str, at: int, base: int) -> tuple[tuple[int, ...], int]:
     """Return the members of a set that begins at `base`, and the position after it."""
     (count,) = struct.unpack_from(order + "I", data, at)
-    if count > _MOST_BITS:
+    if count > MOST_BITS:
         raise WireError("a set of too many numbers")
     words = struct.unpack_from(f"{order}{(count + 31) // 32}I", data, at + 4)
     members = (base + n for n in range(count) if words[n // 32] >> (31 - n % 32) & 1)

@@ -6,10 +6,10 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from idlc.robot.dds import discovery, formats, wire
+from idlc.robot.dds import formats, wire
 from idlc.robot.dds.formats import Address, Remote, Shared, is_cyclone
 from idlc.robot.dds.reader import Reader
-from idlc.robot.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from idlc.robot.qos import HistoryPolicy, QoSProfile
 
 #: Seconds between heartbeats for readers that lack something.
 HEARTBEAT = 0.1
@@ -27,6 +27,9 @@ class RemoteReader(Remote):
         self.count = -1
         #: True after it has said which number it wants, as it then has a heartbeat.
         self.is_told = False
+        #: True while samples wait for its answer to a heartbeat: a volatile reader of Cyclone DDS
+        #: skips all samples that the first heartbeat after its match tells of.
+        self.waits = False
 
 
 class HistorySample(NamedTuple):
@@ -57,7 +60,7 @@ class Writer:
         self.guid = guid
         self.id = guid[wire.PREFIX :]
         self.qos = qos
-        self.reliable = qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        self.reliable = qos.is_reliable
         self.readers: dict[bytes, RemoteReader] = {}
         self.local: list[Reader] = []
         self.history: OrderedDict[int, HistorySample] = OrderedDict()
@@ -72,12 +75,13 @@ class Writer:
         if guid in self.readers:
             return
         self._expire()
-        reliable = self.reliable and qos.reliability is not ReliabilityPolicy.BEST_EFFORT
+        reliable = self.reliable and qos.is_reliable
         is_late = self.qos.is_latched and qos.is_latched
         first = next(iter(self.history), self.last + 1) if is_late else self.last + 1
         size = self._shared.fragment(address[0])
         reader = self.readers[guid] = RemoteReader(guid, address, reliable, size, first)
         if reliable:
+            reader.waits = is_cyclone(guid) and not is_late
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()
         elif is_late:  # such a reader never asks
@@ -114,6 +118,8 @@ class Writer:
                 break
             self._bytes -= len(self.history.popitem(last=False)[1].payload)
         for reader in self.readers.values():
+            if reader.waits:
+                continue
             if reader.reliable:
                 self._send(reader, self.last, self._heartbeat(reader))
                 self._expect()
@@ -128,8 +134,8 @@ class Writer:
     def _expire(self) -> None:
         """Forget the samples whose lifespan has ended."""
         limit = self._shared.now - self.qos.lifespan / 1e9
-        for number in [number for number, each in self.history.items() if each.written < limit]:
-            self.forget(number)
+        while self.history and next(iter(self.history.values())).written < limit:
+            self.forget(next(iter(self.history)))
 
     def forget(self, number: int) -> None:
         """Remove a sample from the history."""
@@ -153,7 +159,7 @@ class Writer:
         """
         payload, inline, time, _ = self.history[number]
         if inline and payload and is_cyclone(reader.guid):
-            payload, inline = discovery.wrap(payload, inline), b""
+            payload, inline = formats.wrap(payload, inline), b""
         ids, size, stamp = (reader.id, self.id, number, inline), reader.size, formats.at_time(time)
         if len(payload) <= size:
             self._shared.send(reader, stamp, formats.format_data(*ids, payload), *tail)
@@ -167,7 +173,8 @@ class Writer:
     def _heartbeat(self, reader: RemoteReader) -> bytes:
         self._count += 1
         first = max(next(iter(self.history), self.last + 1), reader.start)
-        return formats.format_heartbeat(reader.id, self.id, first, self.last, self._count)
+        first, last = (reader.start, reader.start - 1) if reader.waits else (first, self.last)
+        return formats.format_heartbeat(reader.id, self.id, first, last, self._count)
 
     def receive(self, guid: bytes, part: wire.AckNack | wire.NackFragment) -> None:
         """Send again what a reader asks for."""
@@ -186,7 +193,12 @@ class Writer:
         self._expire()
         reader.count = part.beat
         reader.base = max(reader.base, part.base)
-        reader.is_told |= part.base > 0
+        # Cyclone DDS counts its answers from 1, and its question after the match is 0
+        if reader.waits and part.beat and part.base >= reader.start:
+            reader.waits = False
+            end = min(self.last + 1, part.base + wire.MOST_BITS)
+            part = part._replace(missing=tuple(range(part.base, end)))
+        reader.is_told |= part.base > 0 and not reader.waits
         gone = []
         for number in part.missing:
             sample = self.history.get(number) if number >= reader.start else None
@@ -196,7 +208,7 @@ class Writer:
                 self._send(reader, number)
         if gone and self._shared.may_draw(reader.prefix, 0):
             self._shared.send(reader, formats.format_gap(reader.id, self.id, gone))
-        is_asking = part.missing or part.base == 0
+        is_asking = part.missing or part.base == 0 or reader.waits
         if is_asking and self._shared.may_draw(reader.prefix, 0):
             self._shared.send(reader, self._heartbeat(reader))
             self._expect()

@@ -2,9 +2,9 @@
 
   Usage: python dds_capture.py PROGRAM > golden/dds/NAME.txt
 
-PROGRAM is `dds_peer.py` or `cyclone_peer.py`. Then `IDLC_REFRESH=1` with pytest adds what idlc
-reads in them. One packet of idlc gets lost, so that its reader asks for it. The names of the
-machine and of its user become letters.
+PROGRAM is `dds_peer.py`, also with another rmw in the place of Fast DDS, or `cyclone_peer.py`.
+Then `IDLC_REFRESH=1` with pytest adds what idlc reads in them. One packet of idlc gets lost, so
+that its reader asks for it. The names of the machine and of its user become letters.
 """
 
 import getpass
