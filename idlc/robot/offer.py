@@ -57,6 +57,7 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.qos_overriding_options": (
         "InvalidQosOverridesError QosCallbackResult QoSOverridingOptions"
     ),
+    "rclpy.service_introspection": "ServiceIntrospectionState",
     "rclpy.signals": "SignalHandlerOptions",
     "rclpy.task": "Future",
     "rclpy.time": "Duration Time",
@@ -65,7 +66,8 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
 #: The modules of idlc that provide the names.
 _HOMES = (
     "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.executor"
-    " robot.nodes.node robot.nodes.overrides robot.parameters robot.qos"
+    " robot.nodes.introspection robot.nodes.node robot.nodes.overrides"
+    " robot.nodes.parameter_client robot.parameters robot.qos"
 ).split()
 #: The names that idlc gives to what has other names in rclpy.
 _ALIASES = {
