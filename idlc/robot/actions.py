@@ -14,6 +14,7 @@ from traceback import format_exc
 from typing import Any, TypeAlias
 from uuid import uuid4
 
+from idlc.robot.errors import RobotError
 from idlc.robot.names import action_names
 from idlc.robot.nodes.executor import Future, ReentrantCallbackGroup
 from idlc.robot.nodes.interfaces import standard
@@ -76,8 +77,13 @@ class ServerGoalHandle:
         self._server.start(self._server.execute, self)
 
     def publish_feedback(self, feedback: Any) -> None:
-        """Send feedback to the clients; raise TypeError if it is of another type."""
+        """Send feedback to the clients.
+
+        Raises TypeError if it is of another type, and RobotError after Ctrl-C, which ends the goal.
+        """
         publisher = self._server.feedback_publisher
+        if not publisher.node.context.ok():
+            raise RobotError("the context is shut down")
         _check_type(feedback, self._server.action_type, "Feedback")
         publisher.publish(publisher.interface.kind(goal_id=self.goal_id, feedback=feedback))
 
@@ -141,6 +147,8 @@ class ActionServer:
         self._cancel_callback = cancel_callback or (lambda _: CancelResponse.REJECT)
         self._timeout = result_timeout if result_timeout >= 0 else math.inf
         self._goals: dict[bytes, ServerGoalHandle] = {}
+        #: Accepted goals by the ids of the response objects that say so.
+        self._new_goals: dict[int, ServerGoalHandle] = {}
         #: For the states of goals, which are published in the order in which they change.
         self.lock = RLock()
         names, impl = action_names(node.resolve_service_name(action_name)), action_type.Impl
@@ -155,6 +163,7 @@ class ActionServer:
                 serve(standard("action_msgs/srv/CancelGoal"), names.cancel_goal, self._cancel),
                 serve_result(impl.GetResultService, names.get_result, self._answer_result),
             )
+            self._services[0].after_response = self._begin
             publish = node.create_publisher
             self.feedback_publisher = publish(impl.FeedbackMessage, names.feedback, 10)
             self._status = publish(states, names.status, qos)
@@ -208,9 +217,13 @@ class ActionServer:
             response.stamp = self._node.get_clock().now().to_msg()
             goal = self._goals[key] = ServerGoalHandle(self, request, response.stamp)
             self.publish_status()
-            # as a task, so that the client learns that the goal is accepted before it begins
-            self.start(self._accepted_callback, goal)
+            self._new_goals[id(response)] = goal
         return response
+
+    async def _begin(self, response: Any) -> None:
+        """Begin a new goal; its client knows by now that it is accepted."""
+        if (goal := self._new_goals.pop(id(response), None)) is not None:
+            await _result_of(self._accepted_callback(goal))
 
     async def _answer_result(self, request: Any, response: Any) -> Any:
         goal = self._kept_goals().get(bytes(request.goal_id.uuid))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import IntEnum
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -22,12 +23,27 @@ class CountInfo(NamedTuple):
     total_count_change: int
 
 
+class _Policy(IntEnum):
+    """The base class of a policy that prints as in rclpy; it equals a QoSPolicyKind."""
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}.{self.name}"
+
+    def __format__(self, format_spec: str) -> str:
+        return format(str(self), format_spec)
+
+
+_policy: Any = _Policy(
+    "rmw_qos_policy_kind_t", {f"RMW_QOS_POLICY_{each.name}": each.value for each in QoSPolicyKind}
+)
+
+
 class IncompatibleInfo(NamedTuple):
     """The argument of a callback: ends that are not connected, as their QoS does not fit."""
 
     total_count: int
     total_count_change: int
-    last_policy_kind: QoSPolicyKind
+    last_policy_kind: int
 
 
 class MatchedInfo(NamedTuple):
@@ -172,5 +188,5 @@ class Events:
         if new_unfit and callbacks.incompatible_qos:
             # DDS has one policy of both
             policy = QoSPolicyKind[last.upper().removesuffix("_LEASE_DURATION")]
-            info = IncompatibleInfo(self._unfit_total, new_unfit, policy)
+            info = IncompatibleInfo(self._unfit_total, new_unfit, _policy(policy))
             await call(callbacks.incompatible_qos, info)
