@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import IntEnum
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -23,19 +22,14 @@ class CountInfo(NamedTuple):
     total_count_change: int
 
 
-class _Policy(IntEnum):
-    """The base class of a policy that prints as in rclpy; it equals a QoSPolicyKind."""
+class _Policy(int):
+    """A QoSPolicyKind that is printed as in rclpy."""
 
     def __str__(self) -> str:
-        return f"{type(self).__name__}.{self.name}"
+        return f"rmw_qos_policy_kind_t.RMW_QOS_POLICY_{QoSPolicyKind(self).name}"
 
     def __format__(self, format_spec: str) -> str:
         return format(str(self), format_spec)
-
-
-_policy: Any = _Policy(
-    "rmw_qos_policy_kind_t", {f"RMW_QOS_POLICY_{each.name}": each.value for each in QoSPolicyKind}
-)
 
 
 class IncompatibleInfo(NamedTuple):
@@ -188,5 +182,5 @@ class Events:
         if new_unfit and callbacks.incompatible_qos:
             # DDS has one policy of both
             policy = QoSPolicyKind[last.upper().removesuffix("_LEASE_DURATION")]
-            info = IncompatibleInfo(self._unfit_total, new_unfit, _policy(policy))
+            info = IncompatibleInfo(self._unfit_total, new_unfit, _Policy(policy))
             await call(callbacks.incompatible_qos, info)
