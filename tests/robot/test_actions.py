@@ -15,6 +15,7 @@ from idlc.robot import (
     Service,
 )
 from idlc.robot.actions import ClientGoalHandle, GoalState
+from idlc.robot.errors import RobotError
 from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.qos import qos_profile_action_status_default
@@ -84,6 +85,28 @@ def test_a_goal_is_reached_with_feedback_in_order(pair):
     assert (response.status, [*response.result.sequence]) == (GoalState.SUCCEEDED, [7])
     # the result is kept
     assert ends.result(handle.get_result_async()) == response
+
+
+def test_a_client_knows_that_a_goal_is_accepted_before_it_begins(pair):
+    futures = []
+
+    def begin(goal):
+        spin_until(futures[0].done, pair[1])
+        goal.execute()
+
+    ends = Ends(pair, handle_accepted_callback=begin)
+    futures.append(ends.client.send_goal_async(Fibonacci.Goal()))
+    spin_until(lambda: ends.goals, pair[0])
+    assert futures[0].result().accepted
+
+
+def test_ctrl_c_ends_a_goal_at_its_next_feedback(pair):
+    ends = Ends(pair)
+    ends.send()
+    ends.until(lambda: ends.goals)
+    pair[0].context.invalidate()
+    with pytest.raises(RobotError, match="the context is shut down"):
+        ends.goals[0].publish_feedback(Fibonacci.Feedback())
 
 
 def test_a_goal_can_be_rejected(pair):
