@@ -276,9 +276,13 @@ class ClientGoalHandle:
         """Ask for the result; the future has a response with `status` and `result`."""
         request = self._client.result_client.interface.kind.Request(goal_id=self.goal_id)
         future = self._client.result_client.call_async(request)
-        callbacks = self._client.feedback_callbacks
-        future.add_done_callback(lambda _: callbacks.pop(bytes(self.goal_id.uuid), None))
-        return future
+
+        def end(response: Any) -> Any:
+            self._client.follow_all()
+            self._client.feedback_callbacks.pop(bytes(self.goal_id.uuid), None)
+            return response
+
+        return _then(future, end)
 
 
 class ActionClient:
@@ -328,30 +332,47 @@ class ActionClient:
         key = uuid4().bytes
         request.goal_id.uuid = [*key]
         self.feedback_callbacks[key] = feedback_callback
-        sent: Future[ClientGoalHandle] = Future()
 
-        def answer(future: Future[Any]) -> None:
-            error = future.exception()
-            response = None if error else future.result()
-            if error is not None:
-                sent.set_exception(error)
-            elif response is not None:
-                sent.set_result(ClientGoalHandle(self, request.goal_id, response))
-            sent.cancel()  # if the request was
+        def answer(response: Any) -> Any:
             if response is None or not response.accepted:
                 self.feedback_callbacks.pop(key, None)
+            return response and ClientGoalHandle(self, request.goal_id, response)
 
-        self._send.call_async(request).add_done_callback(answer)
-        return sent
+        return _then(self._send.call_async(request), answer)
 
     def destroy(self) -> None:
         """Remove the clients and subscriptions."""
         for endpoint in (*self._clients, *self._subscriptions):
             self._node.destroy_client(endpoint)
 
+    def follow_all(self) -> None:
+        """Call back for the feedback that has arrived, which is older than a result."""
+        for message in iter(self._subscriptions[0].next_message, None):
+            result = self._follow(message)
+            if isawaitable(result) and self._node.executor is not None:
+                self._node.executor.create_task(result)
+
     def _follow(self, message: Any) -> Any:
         callback = self.feedback_callbacks.get(bytes(message.goal_id.uuid))
         return callback and callback(message)
+
+
+def _then(future: Future[Any], work: Callable[[Any], Any]) -> Future[Any]:
+    """Return the future of what `work` makes of a response, or of the `None` of a failure."""
+    later: Future[Any] = Future()
+
+    def finish(_: Future[Any]) -> None:
+        error = future.exception()
+        result = work(None if error else future.result())
+        later.executor = future.executor
+        if error is not None:
+            later.set_exception(error)
+        elif result is not None:
+            later.set_result(result)
+        later.cancel()  # if the request was
+
+    future.add_done_callback(finish)
+    return later
 
 
 def _check_type(message: Any, action: Any, part: str) -> None:
