@@ -70,8 +70,8 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
 #: The modules of idlc that provide the names.
 _HOMES = (
     "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.executor"
-    " robot.nodes.introspection robot.nodes.node robot.nodes.overrides"
-    " robot.nodes.parameter_client robot.parameters robot.qos robot.nodes.point_cloud2"
+    " robot.nodes.node robot.nodes.overrides robot.nodes.parameter_client robot.nodes.services"
+    " robot.parameters robot.qos robot.nodes.point_cloud2"
 ).split()
 #: The names that idlc gives to what has other names in rclpy.
 _ALIASES = {

@@ -2,7 +2,7 @@
 
 from idlc.robot import QoSProfile
 from idlc.robot.keys import EntityKind
-from idlc.robot.nodes.introspection import ServiceIntrospectionState as State
+from idlc.robot.nodes.services import ServiceIntrospectionState as State
 from tests.robot.nodes import SetBool, node_at, spin_until
 
 TOPIC = "/set/_service_event"

@@ -27,7 +27,7 @@ from idlc.robot import (
 )
 from idlc.robot.keys import EntityKind
 from idlc.robot.lifecycle import LifecycleNode
-from idlc.robot.nodes.introspection import ServiceIntrospectionState
+from idlc.robot.nodes.services import ServiceIntrospectionState
 from tests.ros.conftest import domain_of_its_own
 from tests.support.paths import PROGRAMS, ROOT
 from tests.support.waiting import LIMIT, wait_for

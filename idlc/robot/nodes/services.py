@@ -1,10 +1,11 @@
-"""Services and clients, and the service with which a node describes its types."""
+"""Services and clients, their events, and the service with which a node describes its types."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
 from concurrent import futures
+from enum import IntEnum
 from functools import partial
 from itertools import count
 from typing import Any, ClassVar, Generic
@@ -14,10 +15,11 @@ from msgspec.structs import replace
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, EntityKind, pack_attachment, parse_attachment
-from idlc.robot.nodes.endpoints import Bounded
+from idlc.robot.nodes.clock import Clock
+from idlc.robot.nodes.endpoints import Bounded, Endpoint, Publisher
 from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
-from idlc.robot.nodes.introspection import EventType, Introspected
+from idlc.robot.qos import QoSProfile
 from idlc.robot.transport import Closeable, Request, Sample
 from idlc.runtime.names import DecodeError
 from idlc.runtime.typeinfo import types_of
@@ -31,7 +33,70 @@ _TICK = 0.5
 MOST_OPEN = 10_000
 
 
-class Service(Introspected, Generic[RequestT, ResponseT]):
+class ServiceIntrospectionState(IntEnum):
+    """The content of events: none are published, or without messages, or with messages."""
+
+    OFF = 0
+    METADATA = 1
+    CONTENTS = 2
+
+
+class _EventType(IntEnum):
+    """The numbers of service_msgs/msg/ServiceEventInfo."""
+
+    REQUEST_SENT = 0
+    REQUEST_RECEIVED = 1
+    RESPONSE_SENT = 2
+    RESPONSE_RECEIVED = 3
+
+
+class _Introspected(Endpoint):
+    """The base class of services and clients, which publish events if a program wants them."""
+
+    _introspection: tuple[Publisher[Any], Clock, bool] | None = None
+
+    def configure_introspection(
+        self,
+        clock: Clock,
+        service_event_qos_profile: QoSProfile,
+        introspection_state: ServiceIntrospectionState,
+    ) -> None:
+        """Begin or stop to publish events on the topic `_service_event` below the service."""
+        if self._introspection is not None:
+            self.node.destroy_publisher(self._introspection[0])
+            self._introspection = None
+        if introspection_state is not ServiceIntrospectionState.OFF:
+            publisher = self.node.create_publisher(
+                self.interface.kind.Event,
+                f"{self.srv_name}/_service_event",
+                service_event_qos_profile,
+            )
+            has_contents = introspection_state is ServiceIntrospectionState.CONTENTS
+            self._introspection = publisher, clock, has_contents
+
+    def report(self, type_: _EventType, call: Attachment, message: Any) -> None:
+        """Publish an event about a request or response of a call."""
+        if self._introspection is None:
+            return
+        publisher, clock, has_contents = self._introspection
+        event = publisher.interface.kind()
+        event.info.event_type = type_
+        event.info.stamp = clock.now().to_msg()
+        event.info.client_gid = [*call.gid]
+        event.info.sequence_number = call.sequence
+        if has_contents:
+            is_request = type_ in (_EventType.REQUEST_SENT, _EventType.REQUEST_RECEIVED)
+            setattr(event, "request" if is_request else "response", [message])
+        publisher.publish(event)
+
+    def destroy(self) -> None:
+        """Withdraw the endpoint, and the publisher of events."""
+        super().destroy()
+        if self._introspection is not None:
+            self.node.destroy_publisher(self._introspection[0])
+
+
+class Service(_Introspected, Generic[RequestT, ResponseT]):
     """Answers requests: `callback` gets the request and an empty response, and returns it."""
 
     kind = EntityKind.SERVICE
@@ -79,12 +144,12 @@ class Service(Introspected, Generic[RequestT, ResponseT]):
 
     async def _answer(self, request: Request, attachment: Attachment, message: RequestT) -> None:
         kind = self.interface.kind.Response
-        self.report(EventType.REQUEST_RECEIVED, attachment, message)
+        self.report(_EventType.REQUEST_RECEIVED, attachment, message)
         try:
             response = await call(self.callback, message, kind())
             payload = self.encode(kind, response)
             # first, as a client in this process receives the response at once
-            self.report(EventType.RESPONSE_SENT, attachment, response)
+            self.report(_EventType.RESPONSE_SENT, attachment, response)
             request.reply(payload, pack_attachment(*attachment._replace(time=time.time_ns())))
         except BaseException:
             request.drop()
@@ -107,7 +172,7 @@ class DeepService(Service[RequestT, ResponseT]):
     depth = 1000
 
 
-class Client(Introspected, Generic[RequestT, ResponseT]):
+class Client(_Introspected, Generic[RequestT, ResponseT]):
     """Sends requests, from any thread; a thread of the transport completes their futures."""
 
     kind = EntityKind.CLIENT
@@ -148,7 +213,7 @@ class Client(Introspected, Generic[RequestT, ResponseT]):
         except Exception as error:
             future.cancel()
             raise RobotError(f"`{self.srv_name}`: {one_line(str(error))}") from None
-        self.report(EventType.REQUEST_SENT, attachment, request)
+        self.report(_EventType.REQUEST_SENT, attachment, request)
         return future
 
     def _receive(self, number: int, sample: Sample | None) -> None:
@@ -178,7 +243,7 @@ class Client(Introspected, Generic[RequestT, ResponseT]):
             problem = f"sent data that is not its response: {one_line(str(error))}"
             future.set_exception(RobotError(f"`{self.srv_name}` {problem}"))
             return
-        self.report(EventType.RESPONSE_RECEIVED, attachment, response)
+        self.report(_EventType.RESPONSE_RECEIVED, attachment, response)
         future.set_result(response)
 
     def service_is_ready(self) -> bool:
