@@ -8,6 +8,7 @@ list into the page.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import pkgutil
 import textwrap
@@ -15,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from enum import Enum
 from importlib import import_module
-from typing import Any
+from typing import Any, TypeGuard
 
 from idlc.robot.offer import OFFERED, attribute
 
@@ -43,9 +44,18 @@ def names_of(module: Any) -> set[str]:
     own = {
         name
         for name, value in vars(module).items()
-        if not name.startswith("_") and getattr(value, "__module__", "") == module.__name__
+        if getattr(value, "__module__", "") == module.__name__
     }
+    # a constant, or another name of something that is elsewhere
+    for statement in ast.parse(inspect.getsource(module)).body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign):
+            own |= {each.id for each in ast.walk(statement) if _is_assigned(each)}
+    own = {name for name in own if not name.startswith(("_", "g_"))}
     return own | {name for name in getattr(module, "__all__", ()) if hasattr(module, name)}
+
+
+def _is_assigned(node: ast.AST) -> TypeGuard[ast.Name]:
+    return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
 
 
 def members_of(kind: type) -> dict[str, Any]:
@@ -56,15 +66,16 @@ def members_of(kind: type) -> dict[str, Any]:
     return {name: value for name, value in members.items() if name not in _HANDLES}
 
 
-def arguments_of(function: Any) -> set[str] | None:
-    """Return the names of arguments; `None` if any are accepted or it is unknown."""
+def arguments_of(function: Any) -> dict[str, bool] | None:
+    """Return the arguments, and whether they are required; `None` if any or unknown ones are."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return None
     if any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in parameters):
         return None
-    return {each.name for each in parameters} - {"self", "cls"}
+    required = {each.name: each.default is each.empty for each in parameters}
+    return {name: required[name] for name in required.keys() - {"self", "cls"}}
 
 
 def source_of(kind: type) -> str:
@@ -81,7 +92,10 @@ def lacking(real: Any, ours: Any, seen: set[int]) -> Iterator[str]:
     if not inspect.isclass(real):
         wanted, known = arguments_of(real), arguments_of(ours)
         if wanted is not None and known is not None:
-            yield from (f"`{name}=`" for name in sorted(wanted - known))
+            yield from (f"`{name}=`" for name in sorted(wanted.keys() - known.keys()))
+            for name in sorted(wanted.keys() & known.keys()):
+                if known[name] and not wanted[name]:
+                    yield f"the default of `{name}=`"
         return
     present = {*dir(ours), *getattr(ours, "__annotations__", ())}
     text = "".join(map(source_of, getattr(ours, "__mro__", ())))

@@ -14,6 +14,7 @@ from traceback import format_exc
 from typing import Any, TypeAlias
 from uuid import uuid4
 
+from idlc.robot.errors import RobotError
 from idlc.robot.names import action_names
 from idlc.robot.nodes.executor import Future, ReentrantCallbackGroup
 from idlc.robot.nodes.interfaces import standard
@@ -76,8 +77,13 @@ class ServerGoalHandle:
         self._server.start(self._server.execute, self)
 
     def publish_feedback(self, feedback: Any) -> None:
-        """Send feedback to the clients; raise TypeError if it is of another type."""
+        """Send feedback to the clients.
+
+        Raises TypeError if it is of another type, and RobotError after Ctrl-C, which ends the goal.
+        """
         publisher = self._server.feedback_publisher
+        if not publisher.node.context.ok():
+            raise RobotError("the context is shut down")
         _check_type(feedback, self._server.action_type, "Feedback")
         publisher.publish(publisher.interface.kind(goal_id=self.goal_id, feedback=feedback))
 
@@ -141,6 +147,8 @@ class ActionServer:
         self._cancel_callback = cancel_callback or (lambda _: CancelResponse.REJECT)
         self._timeout = result_timeout if result_timeout >= 0 else math.inf
         self._goals: dict[bytes, ServerGoalHandle] = {}
+        #: Accepted goals by the ids of the response objects that say so.
+        self._new_goals: dict[int, ServerGoalHandle] = {}
         #: For the states of goals, which are published in the order in which they change.
         self.lock = RLock()
         names, impl = action_names(node.resolve_service_name(action_name)), action_type.Impl
@@ -155,6 +163,7 @@ class ActionServer:
                 serve(standard("action_msgs/srv/CancelGoal"), names.cancel_goal, self._cancel),
                 serve_result(impl.GetResultService, names.get_result, self._answer_result),
             )
+            self._services[0].after_response = self._begin
             publish = node.create_publisher
             self.feedback_publisher = publish(impl.FeedbackMessage, names.feedback, 10)
             self._status = publish(states, names.status, qos)
@@ -208,9 +217,13 @@ class ActionServer:
             response.stamp = self._node.get_clock().now().to_msg()
             goal = self._goals[key] = ServerGoalHandle(self, request, response.stamp)
             self.publish_status()
-            # as a task, so that the client learns that the goal is accepted before it begins
-            self.start(self._accepted_callback, goal)
+            self._new_goals[id(response)] = goal
         return response
+
+    async def _begin(self, response: Any) -> None:
+        """Begin a new goal; its client knows by now that it is accepted."""
+        if (goal := self._new_goals.pop(id(response), None)) is not None:
+            await _result_of(self._accepted_callback(goal))
 
     async def _answer_result(self, request: Any, response: Any) -> Any:
         goal = self._kept_goals().get(bytes(request.goal_id.uuid))
@@ -263,9 +276,13 @@ class ClientGoalHandle:
         """Ask for the result; the future has a response with `status` and `result`."""
         request = self._client.result_client.interface.kind.Request(goal_id=self.goal_id)
         future = self._client.result_client.call_async(request)
-        callbacks = self._client.feedback_callbacks
-        future.add_done_callback(lambda _: callbacks.pop(bytes(self.goal_id.uuid), None))
-        return future
+
+        def end(response: Any) -> Any:
+            self._client.follow_all()
+            self._client.feedback_callbacks.pop(bytes(self.goal_id.uuid), None)
+            return response
+
+        return _then(future, end)
 
 
 class ActionClient:
@@ -315,30 +332,47 @@ class ActionClient:
         key = uuid4().bytes
         request.goal_id.uuid = [*key]
         self.feedback_callbacks[key] = feedback_callback
-        sent: Future[ClientGoalHandle] = Future()
 
-        def answer(future: Future[Any]) -> None:
-            error = future.exception()
-            response = None if error else future.result()
-            if error is not None:
-                sent.set_exception(error)
-            elif response is not None:
-                sent.set_result(ClientGoalHandle(self, request.goal_id, response))
-            sent.cancel()  # if the request was
+        def answer(response: Any) -> Any:
             if response is None or not response.accepted:
                 self.feedback_callbacks.pop(key, None)
+            return response and ClientGoalHandle(self, request.goal_id, response)
 
-        self._send.call_async(request).add_done_callback(answer)
-        return sent
+        return _then(self._send.call_async(request), answer)
 
     def destroy(self) -> None:
         """Remove the clients and subscriptions."""
         for endpoint in (*self._clients, *self._subscriptions):
             self._node.destroy_client(endpoint)
 
+    def follow_all(self) -> None:
+        """Call back for the feedback that has arrived, which is older than a result."""
+        for message in iter(self._subscriptions[0].next_message, None):
+            result = self._follow(message)
+            if isawaitable(result) and self._node.executor is not None:
+                self._node.executor.create_task(result)
+
     def _follow(self, message: Any) -> Any:
         callback = self.feedback_callbacks.get(bytes(message.goal_id.uuid))
         return callback and callback(message)
+
+
+def _then(future: Future[Any], work: Callable[[Any], Any]) -> Future[Any]:
+    """Return the future of what `work` makes of a response, or of the `None` of a failure."""
+    later: Future[Any] = Future()
+
+    def finish(_: Future[Any]) -> None:
+        error = future.exception()
+        result = work(None if error else future.result())
+        later.executor = future.executor
+        if error is not None:
+            later.set_exception(error)
+        elif result is not None:
+            later.set_result(result)
+        later.cancel()  # if the request was
+
+    future.add_done_callback(finish)
+    return later
 
 
 def _check_type(message: Any, action: Any, part: str) -> None:

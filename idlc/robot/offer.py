@@ -57,15 +57,21 @@ OFFERED = {f"rclpy.{name.lower()}": name for name in _CLASSES} | {
     "rclpy.qos_overriding_options": (
         "InvalidQosOverridesError QosCallbackResult QoSOverridingOptions"
     ),
+    "rclpy.service_introspection": "ServiceIntrospectionState",
     "rclpy.signals": "SignalHandlerOptions",
     "rclpy.task": "Future",
     "rclpy.time": "Duration Time",
     "rclpy.utilities": "get_default_context ok remove_ros_args shutdown try_shutdown",
+    "sensor_msgs_py": "",
+    "sensor_msgs_py.point_cloud2": (
+        "create_cloud create_cloud_xyz32 read_points read_points_numpy"
+    ),
 }
 #: The modules of idlc that provide the names.
 _HOMES = (
     "robot robot.lifecycle robot.nodes.context robot.nodes.events robot.nodes.executor"
-    " robot.nodes.node robot.nodes.overrides robot.parameters robot.qos"
+    " robot.nodes.node robot.nodes.overrides robot.nodes.parameter_client robot.nodes.services"
+    " robot.parameters robot.qos robot.nodes.point_cloud2"
 ).split()
 #: The names that idlc gives to what has other names in rclpy.
 _ALIASES = {
@@ -106,7 +112,7 @@ class Importer(MetaPathFinder, Loader):
         if name in OFFERED:
             return ModuleSpec(name, self, is_package=True)
         package = name.partition(".")[0]
-        if package == "rclpy":
+        if package in ("rclpy", "sensor_msgs_py"):
             # Python ignores errors with the full name of what `from rclpy.node import X` imports
             raise ModuleNotFoundError(not_offered(name), name=package)
         from idlc.model.catalog import packages

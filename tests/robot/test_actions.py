@@ -15,10 +15,11 @@ from idlc.robot import (
     Service,
 )
 from idlc.robot.actions import ClientGoalHandle, GoalState
+from idlc.robot.errors import RobotError
 from idlc.robot.nodes.executor import Future
 from idlc.robot.nodes.interfaces import standard
 from idlc.robot.qos import qos_profile_action_status_default
-from tests.robot.nodes import node_at, spin_until
+from tests.robot.nodes import LONG, node_at, spin_until
 
 Fibonacci = idlc.load("example_interfaces/action/Fibonacci").Fibonacci
 CancelGoal = standard("action_msgs/srv/CancelGoal").kind
@@ -84,6 +85,52 @@ def test_a_goal_is_reached_with_feedback_in_order(pair):
     assert (response.status, [*response.result.sequence]) == (GoalState.SUCCEEDED, [7])
     # the result is kept
     assert ends.result(handle.get_result_async()) == response
+
+
+def test_a_client_knows_that_a_goal_is_accepted_before_it_begins(pair):
+    futures = []
+
+    def begin(goal):
+        spin_until(futures[0].done, pair[1])
+        goal.execute()
+
+    ends = Ends(pair, handle_accepted_callback=begin)
+    futures.append(ends.client.send_goal_async(Fibonacci.Goal()))
+    spin_until(lambda: ends.goals, pair[0])
+    assert futures[0].result().accepted
+
+
+def test_ctrl_c_ends_a_goal_at_its_next_feedback(pair):
+    ends = Ends(pair)
+    ends.send()
+    ends.until(lambda: ends.goals)
+    pair[0].context.invalidate()
+    with pytest.raises(RobotError, match="the context is shut down"):
+        ends.goals[0].publish_feedback(Fibonacci.Feedback())
+
+
+def test_all_feedback_comes_before_the_result(pair):
+    server, client = pair
+    ends = Ends(pair)
+    result = ends.send(order=0).get_result_async()
+    ends.until(lambda: ends.goals)
+    for number in range(8):
+        ends.goals[0].publish_feedback(Fibonacci.Feedback(sequence=[number]))
+    ends.release.set_result(None)
+    spin_until(lambda: ends.goals[0].response.done(), server)
+    for _ in range(5):
+        server.executor.spin_once(timeout_sec=0.01)
+    client.executor.spin_until_future_complete(result, LONG)
+    assert result.result().status == GoalState.SUCCEEDED
+    assert [message.feedback.sequence[0] for message in ends.feedback] == [*range(8)]
+
+
+def test_a_callback_of_a_goal_that_fails_is_not_silent(pair):
+    ends = Ends(pair)
+    failed = ends.client.send_goal_async(Fibonacci.Goal())
+    failed.add_done_callback(lambda _: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        ends.until(lambda: False)
 
 
 def test_a_goal_can_be_rejected(pair):

@@ -53,6 +53,8 @@ def test_ends_that_come_and_go_are_reported(address):
         spin_until(lambda: len(sent) == 2 if is_zenoh else unfit, left, right)
         # on Zenoh, volatile publishers and latched subscriptions are connected
         assert unfit == ([] if is_zenoh else [(1, 1, QoSPolicyKind.DURABILITY)])
+        names = [f"{info.last_policy_kind}" for info in unfit]
+        assert names == ["rmw_qos_policy_kind_t.RMW_QOS_POLICY_DURABILITY"][: len(unfit)]
         for number, end in ((1, second), (0, first)):
             right.destroy_subscription(end)
             spin_until(lambda n=number: sent[-1].current_count == n, left, right)

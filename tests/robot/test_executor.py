@@ -379,12 +379,14 @@ def lines(monkeypatch, capsys):
     return lambda: [line.partition("]: ")[2] for line in capsys.readouterr().err.splitlines()]
 
 
-def test_arguments_of_ros_are_read(lines):
+def test_arguments_of_ros_are_read(lines, monkeypatch):
     words = ["prog", "a", "--ros-args", "-r", "x:=y", "--remap", "n:__node:=m", "-p", "k:=1", "--"]
     words += ["b", "--ros-args", "-r", "c:=/d", "-r", "__ns:=/e"]
     words += ["--param", "n:k.l:=[1, 2]", "--params-file", "f.yaml", "--log-level", "debug"]
     words += ["--log-level", "a.b:=WARN", "-r", "__name:=z"]
     assert remove_ros_args(words) == ["prog", "a", "b"]
+    monkeypatch.setattr("sys.argv", words)
+    assert remove_ros_args() == ["prog", "a", "b"]
     arguments = parse_arguments(words)
     assert arguments == Arguments(
         (

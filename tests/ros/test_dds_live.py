@@ -27,6 +27,7 @@ from idlc.robot import (
 )
 from idlc.robot.keys import EntityKind
 from idlc.robot.lifecycle import LifecycleNode
+from idlc.robot.nodes.services import ServiceIntrospectionState
 from tests.ros.conftest import domain_of_its_own
 from tests.support.paths import PROGRAMS, ROOT
 from tests.support.waiting import LIMIT, wait_for
@@ -142,7 +143,9 @@ def offer(node):
         return Fibonacci.Result(sequence=[0, 1, 1, 2][: goal.request.order])
 
     node.declare_parameter("rate", 1.5)
-    node.create_service(SetBool, "ours", serve)
+    service = node.create_service(SetBool, "ours", serve)
+    contents = ServiceIntrospectionState.CONTENTS
+    service.configure_introspection(node.get_clock(), LATCHED, contents)
     node.words = node.create_publisher(String, "words", 1000)
     node.action_server = ActionServer(node, Fibonacci, "our_count", execute)
 
@@ -189,6 +192,21 @@ def services_of_ours(pair):
 def services_of_theirs(pair):
     response = pair.ask(SetBool, "theirs", SetBool.Request(data=True))
     assert (response.success, response.message) == (True, "theirs")
+
+
+def services_of_ours_introspected(pair):
+    """The client publishes events without messages."""
+    assert pair.report("events") == [[0, 1, []], [1, 1, [True]], [2, 1, ["ours"]], [3, 1, []]]
+
+
+def services_of_theirs_introspected(pair):
+    events = []
+    pair.node.create_subscription(SetBool.Event, "theirs/_service_event", events.append, LATCHED)
+    pair.ask(SetBool, "theirs", SetBool.Request(data=True))
+    pair.until(lambda: [event.info.event_type for event in events[-2:]] == [1, 2])
+    received, sent = events[-2:]
+    assert received.request == [SetBool.Request(data=True)]
+    assert sent.response[0].message == "theirs"
 
 
 def actions_of_ours(pair):
@@ -262,6 +280,7 @@ CELLS = {
     cell.__name__: cell
     for cell in (
         *(topics_of_both, topics_that_are_latched, services_of_ours, services_of_theirs),
+        *(services_of_ours_introspected, services_of_theirs_introspected),
         *(actions_of_ours, actions_of_theirs, parameters_of_ours, parameters_of_theirs),
         *(
             lifecycle_of_ours,

@@ -48,22 +48,34 @@ _KINDS = {
 }
 
 
-#: The services that every node has, with the beginnings of the hashes of their requests and
-#: responses in Jazzy.
+#: The services that every node has, with the hashes of their requests and responses in Jazzy.
 _OF_NODES = """
-rcl_interfaces/srv/DescribeParameters 05dd1c2bc87dec26 ad6747319613c613
-rcl_interfaces/srv/GetParameterTypes 87d7ec5ef545d4da ac1335dce67c478e
-rcl_interfaces/srv/GetParameters 135a9e1c3d7cebef 9fa773b46e39cc5d
-rcl_interfaces/srv/ListParameters a1b0b5d6b967a5b8 31b937b82de36124
-rcl_interfaces/srv/SetParameters 130d46386b7e84ea 7a0e8140a0b8d983
-rcl_interfaces/srv/SetParametersAtomically db0bd950ed5ed867 31b1a38c5b0b9d89
-type_description_interfaces/srv/GetTypeDescription 470f56ccbcf13d55 648c49d976240861
-"""
-_BEGINNING = len("RIHS01_") + 16
-#: The hashes of these services by their types and those beginnings.
+rcl_interfaces/srv/DescribeParameters
+  05dd1c2bc87dec2627105c8070d6f9725c781a4f2ab852975bf105462b82b644
+  ad6747319613c6131589e062e095b469a46cc764f7d0f12a001a49e6cd893995
+rcl_interfaces/srv/GetParameterTypes
+  87d7ec5ef545d4daa289d500025d31fb2437bc8b8365ca367161c4dac4be33fd
+  ac1335dce67c478e669434f6ac2fbff34fcd529580f272d3006785ba8b54e47f
+rcl_interfaces/srv/GetParameters
+  135a9e1c3d7cebef792f6687d7ddf99949b21a0bd9a320d863a9110a3f5cf4d6
+  9fa773b46e39cc5d02db6224d8fd520bb9caeeffc2b27c96c1e59431baba9f2a
+rcl_interfaces/srv/ListParameters
+  a1b0b5d6b967a5b8ac5bc8563c3ea678f349e312a6a4967227c5a96bc5ce38df
+  31b937b82de3612426be79f231e386259f97e8dc843e3f2845288b4bfa296bdd
+rcl_interfaces/srv/SetParameters
+  130d46386b7e84ea9ecf60608a4d83cbe5e5cb7c6cc5b712b7a4e3a6c254e932
+  7a0e8140a0b8d98308fa81a5403a766e610af29a239caf54b7553227906fc266
+rcl_interfaces/srv/SetParametersAtomically
+  db0bd950ed5ed867a0e90b225e44dea382d762c0762ff3e0ee842190042a59e5
+  31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8
+type_description_interfaces/srv/GetTypeDescription
+  470f56ccbcf13d55c78c8b735fb12da03e639e5acded994426c89d94778d9e28
+  648c49d976240861a482f961c5621ddd0d2135d8cce6f297a76d4f6376d93b75
+""".split()
+#: The hashes of these services by their types, and by both hashes that DDS tells.
 SERVICES: dict[tuple[str, ...], str] = {
     (name, f"RIHS01_{request}", f"RIHS01_{response}"): standard(name).hash
-    for name, request, response in map(str.split, _OF_NODES.strip().splitlines())
+    for name, request, response in zip(*(_OF_NODES[part::3] for part in range(3)), strict=True)
 }
 
 
@@ -218,7 +230,7 @@ class RemoteNodes:
             halves.setdefault(side, {})[end.topic.partition("/")[0]] = end.hash
         for end, side in sides:
             _, name, type_, _ = side
-            told = (halves[side].get(half, "")[:_BEGINNING] for half in HALVES)
+            told = (halves[side].get(half, "") for half in HALVES)
             own = hashes.get((name, type_))
             service = end.service or own or SERVICES.get((type_, *told), "")
             unknown = _node(self._domain, end.guid[: wire.PREFIX], 0, "/", _UNKNOWN)

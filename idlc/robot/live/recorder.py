@@ -37,7 +37,7 @@ MOST_CHANNELS = (1 << 16) - 1
 #: Bytes of messages that wait for definitions; more are written without these.
 MOST_HELD = 128 << 20
 #: Seconds that definitions have at the end.
-LAST = 0.3
+LAST = 0.2
 #: Topics that a report names.
 NAMED = 5
 

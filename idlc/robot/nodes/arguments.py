@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from argparse import ArgumentError, ArgumentParser
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -47,9 +48,9 @@ class Arguments(NamedTuple):
 _NONE = Arguments()
 
 
-def remove_ros_args(args: Sequence[str]) -> list[str]:
-    """Return arguments without `--ros-args`, and the words between it and `--`."""
-    return _split(args)[0]
+def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
+    """Return arguments, `sys.argv` by default, without `--ros-args` and the words up to `--`."""
+    return _split(sys.argv if args is None else args)[0]
 
 
 def parse_arguments(args: Sequence[str], others: Arguments = _NONE) -> Arguments:

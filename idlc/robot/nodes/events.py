@@ -22,12 +22,22 @@ class CountInfo(NamedTuple):
     total_count_change: int
 
 
+class _Policy(int):
+    """A QoSPolicyKind that is printed as in rclpy."""
+
+    def __str__(self) -> str:
+        return f"rmw_qos_policy_kind_t.RMW_QOS_POLICY_{QoSPolicyKind(self).name}"
+
+    def __format__(self, format_spec: str) -> str:
+        return format(str(self), format_spec)
+
+
 class IncompatibleInfo(NamedTuple):
     """The argument of a callback: ends that are not connected, as their QoS does not fit."""
 
     total_count: int
     total_count_change: int
-    last_policy_kind: QoSPolicyKind
+    last_policy_kind: int
 
 
 class MatchedInfo(NamedTuple):
@@ -172,5 +182,5 @@ class Events:
         if new_unfit and callbacks.incompatible_qos:
             # DDS has one policy of both
             policy = QoSPolicyKind[last.upper().removesuffix("_LEASE_DURATION")]
-            info = IncompatibleInfo(self._unfit_total, new_unfit, policy)
+            info = IncompatibleInfo(self._unfit_total, new_unfit, _Policy(policy))
             await call(callbacks.incompatible_qos, info)

@@ -1,10 +1,11 @@
-"""Services and clients, and the service with which a node describes its types."""
+"""Services and clients, their events, and the service with which a node describes its types."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
 from concurrent import futures
+from enum import IntEnum
 from functools import partial
 from itertools import count
 from typing import Any, ClassVar, Generic
@@ -14,9 +15,11 @@ from msgspec.structs import replace
 from idlc.diagnostics.text import one_line
 from idlc.robot.errors import RobotError
 from idlc.robot.keys import Attachment, EntityKind, pack_attachment, parse_attachment
-from idlc.robot.nodes.endpoints import Bounded, Endpoint
+from idlc.robot.nodes.clock import Clock
+from idlc.robot.nodes.endpoints import Bounded, Endpoint, Publisher
 from idlc.robot.nodes.executor import Future, call
 from idlc.robot.nodes.interfaces import RequestT, ResponseT
+from idlc.robot.qos import QoSProfile
 from idlc.robot.transport import Closeable, Request, Sample
 from idlc.runtime.names import DecodeError
 from idlc.runtime.typeinfo import types_of
@@ -30,12 +33,77 @@ _TICK = 0.5
 MOST_OPEN = 10_000
 
 
-class Service(Endpoint, Generic[RequestT, ResponseT]):
+class ServiceIntrospectionState(IntEnum):
+    """The content of events: none are published, or without messages, or with messages."""
+
+    OFF = 0
+    METADATA = 1
+    CONTENTS = 2
+
+
+class _EventType(IntEnum):
+    """The numbers of service_msgs/msg/ServiceEventInfo."""
+
+    REQUEST_SENT = 0
+    REQUEST_RECEIVED = 1
+    RESPONSE_SENT = 2
+    RESPONSE_RECEIVED = 3
+
+
+class _Introspected(Endpoint):
+    """The base class of services and clients, which publish events if a program wants them."""
+
+    _introspection: tuple[Publisher[Any], Clock, bool] | None = None
+
+    def configure_introspection(
+        self,
+        clock: Clock,
+        service_event_qos_profile: QoSProfile,
+        introspection_state: ServiceIntrospectionState,
+    ) -> None:
+        """Begin or stop to publish events on the topic `_service_event` below the service."""
+        if self._introspection is not None:
+            self.node.destroy_publisher(self._introspection[0])
+            self._introspection = None
+        if introspection_state is not ServiceIntrospectionState.OFF:
+            publisher = self.node.create_publisher(
+                self.interface.kind.Event,
+                f"{self.srv_name}/_service_event",
+                service_event_qos_profile,
+            )
+            has_contents = introspection_state is ServiceIntrospectionState.CONTENTS
+            self._introspection = publisher, clock, has_contents
+
+    def report(self, type_: _EventType, call: Attachment, message: Any) -> None:
+        """Publish an event about a request or response of a call."""
+        if self._introspection is None:
+            return
+        publisher, clock, has_contents = self._introspection
+        event = publisher.interface.kind()
+        event.info.event_type = type_
+        event.info.stamp = clock.now().to_msg()
+        event.info.client_gid = [*call.gid]
+        event.info.sequence_number = call.sequence
+        if has_contents:
+            is_request = type_ in (_EventType.REQUEST_SENT, _EventType.REQUEST_RECEIVED)
+            setattr(event, "request" if is_request else "response", [message])
+        publisher.publish(event)
+
+    def destroy(self) -> None:
+        """Withdraw the endpoint, and the publisher of events."""
+        super().destroy()
+        if self._introspection is not None:
+            self.node.destroy_publisher(self._introspection[0])
+
+
+class Service(_Introspected, Generic[RequestT, ResponseT]):
     """Answers requests: `callback` gets the request and an empty response, and returns it."""
 
     kind = EntityKind.SERVICE
     #: The requests that wait, if these are more than the announced depth.
     depth: ClassVar[int] = 0
+    #: Called with each response when it has been sent.
+    after_response: Callable[[ResponseT], Any] | None = None
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the service."""
@@ -76,14 +144,20 @@ class Service(Endpoint, Generic[RequestT, ResponseT]):
 
     async def _answer(self, request: Request, attachment: Attachment, message: RequestT) -> None:
         kind = self.interface.kind.Response
+        self.report(_EventType.REQUEST_RECEIVED, attachment, message)
         try:
-            payload = self.encode(kind, await call(self.callback, message, kind()))
+            response = await call(self.callback, message, kind())
+            payload = self.encode(kind, response)
+            # first, as a client in this process receives the response at once
+            self.report(_EventType.RESPONSE_SENT, attachment, response)
             request.reply(payload, pack_attachment(*attachment._replace(time=time.time_ns())))
         except BaseException:
             request.drop()
             raise
         finally:
             self._open.discard(id(request))
+        if self.after_response is not None:
+            await call(self.after_response, response)
 
     def destroy(self) -> None:
         """Withdraw the service; requests in the queue get no response."""
@@ -98,7 +172,7 @@ class DeepService(Service[RequestT, ResponseT]):
     depth = 1000
 
 
-class Client(Endpoint, Generic[RequestT, ResponseT]):
+class Client(_Introspected, Generic[RequestT, ResponseT]):
     """Sends requests, from any thread; a thread of the transport completes their futures."""
 
     kind = EntityKind.CLIENT
@@ -127,17 +201,19 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
         """
         payload = self.encode(self.interface.kind.Request, request)
         number = next(self._numbers)
-        attachment = pack_attachment(number, time.time_ns(), self._gid)
+        attachment = Attachment(number, time.time_ns(), self._gid)
         timeout = _LONG_TIMEOUT if self.srv_name.endswith("/_action/get_result") else _TIMEOUT
         receive = partial(self._receive, number)
         future: Future[ResponseT] = Future()
         self._pending[number] = future
         future.wake_at_end(partial(self._pending.pop, number, None))
         try:
-            self.node.transport.call(self.entity, payload, attachment, receive, timeout=timeout)
+            packed = pack_attachment(*attachment)
+            self.node.transport.call(self.entity, payload, packed, receive, timeout=timeout)
         except Exception as error:
             future.cancel()
             raise RobotError(f"`{self.srv_name}`: {one_line(str(error))}") from None
+        self.report(_EventType.REQUEST_SENT, attachment, request)
         return future
 
     def _receive(self, number: int, sample: Sample | None) -> None:
@@ -150,22 +226,25 @@ class Client(Endpoint, Generic[RequestT, ResponseT]):
             self.ignored += sample is not None
             return
         executor = future.executor = self._executor
-        self._finish(future, sample)
+        self._finish(future, sample, attachment)
         if executor is not None:
             # a response counts as a callback, so that `spin_once` returns
             executor.schedule(lambda: True)
 
-    def _finish(self, future: Future[ResponseT], sample: Sample | None) -> None:
+    def _finish(self, future: Future[ResponseT], sample: Sample | None, attachment: Any) -> None:
         if sample is None:
             hint = "is the service running? `wait_for_service` waits until the service runs"
             future.set_exception(RobotError(f"no service answered `{self.srv_name}`", hint))
             return
         try:
-            future.set_result(self.interface.kind.Response.deserialize(sample.payload))
+            response = self.interface.kind.Response.deserialize(sample.payload)
         except DecodeError as error:
             self.ignored += 1
             problem = f"sent data that is not its response: {one_line(str(error))}"
             future.set_exception(RobotError(f"`{self.srv_name}` {problem}"))
+            return
+        self.report(_EventType.RESPONSE_RECEIVED, attachment, response)
+        future.set_result(response)
 
     def service_is_ready(self) -> bool:
         """Return whether there is a service."""

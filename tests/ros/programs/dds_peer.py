@@ -13,6 +13,7 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.service_introspection import ServiceIntrospectionState
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
@@ -44,11 +45,15 @@ node.create_subscription(Image, "images", images.publish, 5)
 latched = node.create_publisher(String, "latched", LATCHED)
 for number in range(5):
     latched.publish(String(data=str(number)))
-node.create_service(SetBool, "theirs", serve)
+service = node.create_service(SetBool, "theirs", serve)
+clock, contents = node.get_clock(), ServiceIntrospectionState.CONTENTS
+service.configure_introspection(clock, LATCHED, contents)
 server = ActionServer(node, Fibonacci, "count", execute)
 cycle = LifecycleNode("their_cycle")
 
 client = node.create_client(SetBool, "ours")
+client.configure_introspection(clock, LATCHED, ServiceIntrospectionState.METADATA)
+events = []
 parameters = {
     kind: node.create_client(kind, f"ours/{name}_parameters")
     for name, kind in (("get", GetParameters), ("set", SetParameters))
@@ -57,6 +62,16 @@ change = node.create_client(ChangeState, "our_cycle/change_state")
 state = node.create_client(GetState, "our_cycle/get_state")
 types = node.create_client(GetTypeDescription, "ours/get_type_description")
 action = ActionClient(node, Fibonacci, "our_count")
+
+
+def keep(event):
+    data = [each.data for each in event.request] + [each.message for each in event.response]
+    events.append([event.info.event_type, event.info.sequence_number, data])
+    if len(events) == 4:
+        report("events", sorted(events))
+
+
+node.create_subscription(SetBool.Event, "ours/_service_event", keep, LATCHED)
 
 
 def done(future):
