@@ -179,7 +179,7 @@ class Selection:
         """Return messages in the version that they are read as."""
         if self.options.reading is None or self._upgrade.plan.same:
             return batch
-        from idlc.api.upgraded import Upgraded
+        from idlc.api.upgrade import Upgraded
 
         times = batch.log_times, batch.publish_times
         return Upgraded(*times, batch, self._upgrade, self.topic.name, first)

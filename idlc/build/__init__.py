@@ -73,7 +73,7 @@ def compile_library_at_build(distribution: Any) -> None:
         return  # setuptools reports what is wrong
 
     def run_commands() -> None:
-        from idlc.build.library_command import build_command
+        from idlc.build.library import build_command
 
         del distribution.run_commands
         build = distribution.get_command_class("build")

@@ -180,7 +180,7 @@ def _declared(settings: Mapping[str, Any], report: Report) -> tuple[_Package, Op
 
 def _package(report: Report) -> _Package:
     """Return the package's name and its `[project]` table. Raises ReportedError."""
-    from idlc.build import manifest
+    from idlc.build import content
 
     config = load_settings(Root.here(), report)
     if not Path(MANIFEST).is_file():
@@ -188,8 +188,8 @@ def _package(report: Report) -> _Package:
         hint = "`idlc scaffold package NAME --interfaces` creates a folder that you can build"
         report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
     report.raise_errors()
-    declared = manifest.project(config.runtime, report)
-    project = manifest.complete_table(declared, report)
+    declared = content.project(config.runtime, report)
+    project = content.complete_table(declared, report)
     require_runtime(config, project.get("dependencies", ()), report)
     report.raise_errors()
     return declared["name"], project
@@ -206,7 +206,7 @@ def require_runtime(config: Config, requirements: Iterable[str], report: Report)
 def _options(settings: Mapping[str, Any], report: Report) -> Options:
     """Return what a frontend's settings say; report IDL611 for each that is wrong."""
     from idlc.build.content import Options
-    from idlc.generate.native.layouts import LAYOUTS
+    from idlc.generate.native.platforms import LAYOUTS
 
     choices = {"distro": tuple(LAYOUTS), "libraries": ("yes", "no")}
     for key, value in settings.items():

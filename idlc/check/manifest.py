@@ -11,8 +11,8 @@ from idlc.diagnostics.source import Span
 from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
 from idlc.model.link import Model, own_fields
+from idlc.packaging.dependencies import LIBRARIES, addition
 from idlc.packaging.facts import Facts
-from idlc.packaging.neighbours import LIBRARIES
 from idlc.version import RUNTIME
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
@@ -193,7 +193,5 @@ def _is_test(module: str, package: str) -> bool:
 
 def _additions(facts: Facts, *elements: tuple[str, str]) -> tuple[Edit, ...]:
     """Return the edits that add elements to package.xml, each after similar ones."""
-    from idlc.packaging.dependencies import addition
-
     edits = (addition(facts.manifest, facts.statements, tag, text) for tag, text in elements)
     return tuple(edit for added in edits for edit in added)

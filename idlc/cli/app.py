@@ -13,6 +13,7 @@ import click
 
 from idlc.cli.exit_status import PipeClosedError, status_of
 from idlc.cli.streams import colours
+from idlc.diagnostics.text import did_you_mean
 from idlc.version import __version__
 
 _EXAMPLE = re.compile("(?m)^Examples?(, [a-z ]+)?:$")
@@ -81,8 +82,6 @@ class LazyGroup(click.Group):
         name = args[0]
         unknown = name not in self.overview and not name.startswith("-")
         if unknown and not ctx.resilient_parsing:
-            from idlc.diagnostics.text import did_you_mean
-
             synonym = self.synonyms.get(name.lower())
             hint = f"did you mean `{synonym}`?" if synonym else did_you_mean(name, self.overview)
             hint = hint or f"the commands are {', '.join(self.overview)}"
@@ -133,8 +132,10 @@ GROUPS = {
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 #: Commands whose module contains several.
 HOMES = {
+    "init": "scaffold",
     **dict.fromkeys(("check", "fmt", "lsp"), "check"),
-    **dict.fromkeys(("list", "docs", "doctor", "explain"), "look"),
+    **dict.fromkeys(("show", "list", "docs", "doctor", "explain"), "look"),
+    **dict.fromkeys(("breaking", "upgrade"), "versions"),
     **dict.fromkeys(("echo", "call", "record", "router"), "robots"),
 }
 
@@ -155,14 +156,6 @@ SYNONYMS = {
     **dict.fromkeys(("migrate", "rewrite", "update"), "upgrade"),
     **dict.fromkeys(("zenoh", "zenohd", "rmw_zenohd", "daemon"), "router"),
     **dict.fromkeys(("rule", "rules", "why", "codes"), "explain"),
-}
-
-#: Options of other tools and of earlier versions, with the options here.
-OPTION_SYNONYMS = {
-    "--dry-run": "--diff",
-    "--lerobot": "--format",
-    "--no-index": "--no-check",
-    "--prefix": "--ament",
 }
 
 
@@ -243,7 +236,7 @@ def _through_click(words: list[str]) -> object:
         context = getattr(error, "ctx", None)
         message, _, hint = error.format_message().partition("; ")
         if isinstance(error, click.NoSuchOption):
-            similar = _similar_option(error)
+            similar = next(iter(error.possibilities or ()), None)
             message, hint = error.message, f"did you mean `{similar}`?" if similar else ""
         missing = error.param if isinstance(error, click.MissingParameter) else None
         if context and "address" in context.params and isinstance(missing, click.Argument):
@@ -260,12 +253,3 @@ def _through_click(words: list[str]) -> object:
         return 2
     except click.Abort as error:
         raise KeyboardInterrupt from error
-
-
-def _similar_option(error: click.NoSuchOption) -> str | None:
-    """Return the option of the command that may have been meant."""
-    synonym = OPTION_SYNONYMS.get(error.option_name)
-    parameters = error.ctx.command.params if error.ctx else []
-    if any(synonym in (*each.opts, *each.secondary_opts) for each in parameters):
-        return synonym
-    return next(iter(error.possibilities or ()), None)

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion, options
+from idlc.cli import options
 
 
 @click.command("check", epilog=options.example(*options.DEMO, "idlc check demo"))
@@ -14,11 +14,14 @@ from idlc.cli import completion, options
 @click.option(
     "--select",
     metavar="RULE,...",
-    shell_complete=completion.rules,
+    shell_complete=options.completed("rules"),
     help="Enable only these rules, by category, code or name; `all` enables every rule.",
 )
 @click.option(
-    "--ignore", metavar="RULE,...", shell_complete=completion.rules, help="Disable these rules."
+    "--ignore",
+    metavar="RULE,...",
+    shell_complete=options.completed("rules"),
+    help="Disable these rules.",
 )
 @click.option("--fix", is_flag=True, help="Apply safe fixes.")
 @click.option(

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion, options
+from idlc.cli import options
 
 
 @click.command(
@@ -22,7 +22,9 @@ from idlc.cli import completion, options
     ),
 )
 @click.argument("subject", metavar="REC", type=click.Path())
-@click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
+@click.argument(
+    "topics", metavar="[TOPIC]...", nargs=-1, shell_complete=options.completed("topics")
+)
 @click.option(
     "-o",
     "--out",

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion, options
+from idlc.cli import options
 
 EPILOG = options.example(*options.DEMO, "idlc gen demo -o out/demo")
 
@@ -26,7 +26,7 @@ class _Command(click.Command):
     metavar="[PATH|PACKAGE|TYPE|REC]...",
     nargs=-1,
     type=click.Path(),
-    shell_complete=completion.topics_and_paths,
+    shell_complete=options.completed("topics_and_paths"),
 )
 @click.option(
     "-o",

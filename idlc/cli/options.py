@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from idlc.cli import completion
-
 FORMATS = ("text", "json")
 #: The formats of reports that CI systems read.
 DOCUMENTS = ("github", "sarif", "junit", "gitlab")
@@ -20,6 +18,17 @@ REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 DEMO = ("mkdir -p demo/msg", "echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def completed(by: str) -> Callable[[click.Context, click.Parameter, str], Any]:
+    """Return the function of `run/completion.py` that offers words; a shell's question loads it."""
+
+    def offer(context: click.Context, parameter: click.Parameter, word: str) -> Any:
+        from idlc.cli.run import completion
+
+        return getattr(completion, by)(context, parameter, word)
+
+    return offer
 
 
 def example(*lines: str, title: str = "Example") -> str:
@@ -96,7 +105,7 @@ def _distro(metavar: str, text: str, callback: Any) -> Callable[[Command], Comma
         metavar=metavar,
         help=f"{text}  [default: the installed one]",
         callback=callback,
-        shell_complete=completion.distros,
+        shell_complete=completed("distros"),
     )
 
 

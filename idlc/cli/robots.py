@@ -6,16 +6,16 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion, options
+from idlc.cli import options
 
 
 @click.command(
     "call", epilog=options.example("idlc call tcp/robot:7447 /add_two_ints a=1 b=2 --format json")
 )
 @options.on_robot
-@click.argument("service", metavar="SERVICE", shell_complete=completion.robot_names)
+@click.argument("service", metavar="SERVICE", shell_complete=options.completed("robot_names"))
 @click.argument(
-    "values", metavar="[FIELD=VALUE]...", nargs=-1, shell_complete=completion.robot_fields
+    "values", metavar="[FIELD=VALUE]...", nargs=-1, shell_complete=options.completed("robot_fields")
 )
 @click.option(
     "--timeout",
@@ -49,7 +49,7 @@ def call_command(**arguments: Any) -> None:
     ),
 )
 @options.on_robot
-@click.argument("topic", metavar="TOPIC", shell_complete=completion.robot_names)
+@click.argument("topic", metavar="TOPIC", shell_complete=options.completed("robot_names"))
 @click.option(
     "--count",
     metavar="N",
@@ -89,7 +89,9 @@ def echo_command(**arguments: Any) -> None:
     ),
 )
 @options.on_robot
-@click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.robot_names)
+@click.argument(
+    "topics", metavar="[TOPIC]...", nargs=-1, shell_complete=options.completed("robot_names")
+)
 @click.option(
     "-o", "--out", metavar="FILE", required=True, type=click.Path(), help="Output file (.mcap)."
 )

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion
+from idlc.cli import options
 from idlc.cli.scaffold import common
 from idlc.scaffold.roles import QOS_NAMES, ROLES
 
@@ -57,7 +57,7 @@ def _role_options(function: Any) -> Any:
             role.name,
             metavar=role.metavar,
             multiple=True,
-            shell_complete=completion.endpoint if role.kind else None,
+            shell_complete=options.completed("endpoint") if role.kind else None,
             help=role.help,
         )(function)
     return function

@@ -11,9 +11,8 @@ from typing import NamedTuple
 from idlc.compiler.compiler import stage
 from idlc.diagnostics.report import Report
 from idlc.generate.native.elf import Machine
-from idlc.generate.native.inspect import inspect
-from idlc.generate.native.layouts import LAYOUTS, StructLayout
-from idlc.generate.native.library import MACHINES, libraries
+from idlc.generate.native.library import MACHINES, inspect, libraries
+from idlc.generate.native.platforms import LAYOUTS, StructLayout
 from idlc.generate.target import Output, Target
 from idlc.model.idl_text import file_text, idl
 from idlc.model.link import Model

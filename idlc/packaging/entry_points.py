@@ -12,14 +12,19 @@ from collections.abc import Mapping
 from contextlib import suppress
 from fnmatch import fnmatchcase
 from posixpath import normpath
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
-from idlc.packaging.files import SETUP_CFG, SETUP_PY
+from idlc.packaging.files import (
+    SETUP_CFG,
+    SETUP_PY,
+    Edited,
+    Outcome,
+    Refused,
+    SetupCfg,
+)
 from idlc.packaging.layout import PackageLayout
-from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused, already_taken, split
-from idlc.packaging.setup_cfg import SetupCfg
 from idlc.packaging.setup_edits import (
     append_element,
     insertion,
@@ -35,6 +40,34 @@ KEY = "console_scripts"
 UNKNOWN = "idlc cannot parse the entry points"
 IN_SETUP_CFG = f"below `{KEY} =` in [{SECTION}]"
 _HEADER = re.compile(r"\s*\[([^\]]*)\]")
+
+
+class ConsoleScript(NamedTuple):
+    """A console script: the command and the function that it calls."""
+
+    name: str
+    target: str
+
+    @property
+    def line(self) -> str:
+        """The entry in `console_scripts`."""
+        return f"{self.name} = {self.target}"
+
+    def same(self, entry: str) -> bool:
+        """Return whether an entry is the same, with any whitespace."""
+        return split_entry(entry) == (self.name, self.target)
+
+
+def split_entry(entry: str) -> tuple[str, str]:
+    """Return the command and the target of an entry; an empty target if there is none."""
+    name, _, target = entry.partition("=")
+    return name.strip(), "".join(target.split())
+
+
+def already_taken(script: ConsoleScript, target: str, where: str) -> Refused:
+    """Return the refusal of a command that calls something else already."""
+    why = f"`{script.name}` is already the command for `{target}`"
+    return Refused(why, script.line, where)
 
 
 def _section(lines: list[str], name: str) -> tuple[int, int] | None:
@@ -97,7 +130,7 @@ def _with_entry(
     """Return a text with another line in a range of entries; a command has one entry."""
     for line in lines[start:end]:
         entry = re.sub(rf"^{KEY}\s*[=:]", "", line)
-        name, target = split(entry.partition("#")[0])
+        name, target = split_entry(entry.partition("#")[0])
         if name == script.name and target:
             if script.same(entry):
                 return Edited("".join(lines))
@@ -216,7 +249,7 @@ def _in_scripts(setup: Setup, node: ast.expr, script: ConsoleScript) -> EntryPoi
                 return _in_scripts(setup, side, script)
     if isinstance(value, (ast.List, ast.Tuple)) and _is_enclosed(setup.source, value):
         for element in value.elts:
-            name, target = split(setup.text(element) or "")
+            name, target = split_entry(setup.text(element) or "")
             if name == script.name:
                 return already_taken(script, target, IN_SETUP).why
         return append_element(setup.source, value, f"'{script.line}'")
@@ -225,7 +258,7 @@ def _in_scripts(setup: Setup, node: ast.expr, script: ConsoleScript) -> EntryPoi
         literal = setup.source.text[start:end]
         if literal.endswith(("'''", '"""')):
             return _in_literal(setup, value, script, in_section=False)
-        name, target = split(value.value)
+        name, target = split_entry(value.value)
         if name == script.name:
             return already_taken(script, target, IN_SETUP).why
         line = f"'{script.line}'".replace("'", literal[-1])

@@ -11,8 +11,8 @@ import msgspec
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.packaging.cmake import GENERATE, calls
+from idlc.packaging.dependencies import Neighbours
 from idlc.packaging.files import PackageFiles, read_package_files
-from idlc.packaging.neighbours import Neighbours
 from idlc.project.find import CLOSING, KINDS, SKIPPED
 from idlc.project.inputs import Inputs
 from idlc.project.lock import BUILD_STEP, FILE, Lock, Runtime, load_lock

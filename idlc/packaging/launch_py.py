@@ -10,7 +10,7 @@ from typing import NamedTuple
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source
 from idlc.packaging import setup_edits
-from idlc.packaging.outcome import Edited, Outcome, Refused
+from idlc.packaging.files import Edited, Outcome, Refused
 from idlc.packaging.setup_py import Setup, parse, range_of
 
 WHERE = "to the launch description"

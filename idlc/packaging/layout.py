@@ -13,7 +13,7 @@ from posixpath import normpath
 from typing import Any, NamedTuple
 
 from idlc.diagnostics.source import Source, Span
-from idlc.packaging.setup_cfg import SetupCfg
+from idlc.packaging.files import SetupCfg
 from idlc.packaging.setup_py import Setup, name_of_call
 from idlc.project.settings import toml
 

@@ -14,8 +14,7 @@ from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.packaging.facts import home_of
-from idlc.packaging.files import SETUP_PY
-from idlc.packaging.outcome import Edited, Outcome
+from idlc.packaging.files import SETUP_PY, Edited, Outcome
 from idlc.packaging.setup_edits import arrange
 from idlc.project.files import entries
 from idlc.project.library import Library

@@ -30,10 +30,17 @@ from idlc.model import catalog, derive, ir
 from idlc.model.link import Model
 from idlc.packaging import dependencies
 from idlc.packaging.facts import folders
-from idlc.packaging.files import CMAKE_LISTS, SETUP_CFG, SETUP_FILES, SETUP_PY
+from idlc.packaging.files import (
+    CMAKE_LISTS,
+    SETUP_CFG,
+    SETUP_FILES,
+    SETUP_PY,
+    Edited,
+    Outcome,
+    Refused,
+    SetupCfg,
+)
 from idlc.packaging.layout import layout
-from idlc.packaging.outcome import Edited, Outcome, Refused
-from idlc.packaging.setup_cfg import SetupCfg
 from idlc.packaging.setup_edits import KEYWORD, append_element, step_before_setup
 from idlc.packaging.setup_py import BOM, Setup
 from idlc.project import git

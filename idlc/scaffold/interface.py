@@ -14,8 +14,7 @@ from idlc.model.link import Model
 from idlc.packaging import dependencies
 from idlc.packaging.cmake import calls
 from idlc.packaging.facts import folders
-from idlc.packaging.files import CMAKE_LISTS, SETUP_PY
-from idlc.packaging.outcome import Edited, Outcome, Refused
+from idlc.packaging.files import CMAKE_LISTS, SETUP_PY, Edited, Outcome, Refused
 from idlc.project.root import MANIFEST
 from idlc.project.settings import SETTINGS_FILE, load_settings
 from idlc.scaffold.changes import ScaffoldOptions, ScaffoldResult, find_package

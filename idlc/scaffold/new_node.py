@@ -16,10 +16,18 @@ from idlc.diagnostics.source import Source
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.packaging import dependencies, entry_points, launch_py
+from idlc.packaging.entry_points import ConsoleScript
 from idlc.packaging.facts import folders, home_of
-from idlc.packaging.files import CMAKE_LISTS, SETUP_FILES, SETUP_PY, read_package_files
+from idlc.packaging.files import (
+    CMAKE_LISTS,
+    SETUP_FILES,
+    SETUP_PY,
+    Edited,
+    Outcome,
+    Refused,
+    read_package_files,
+)
 from idlc.packaging.layout import layout
-from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused
 from idlc.packaging.setup_py import Setup
 from idlc.project.package_xml import statements
 from idlc.project.prefixes import distribution, python_folders

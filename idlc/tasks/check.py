@@ -19,9 +19,9 @@ from idlc.diagnostics.source import Source
 from idlc.language.parse import parse
 from idlc.model import link
 from idlc.model.link import Model
+from idlc.packaging.dependencies import Neighbours
 from idlc.packaging.facts import Facts, facts
 from idlc.packaging.files import PACKAGE_FILES, SETUP_PY
-from idlc.packaging.neighbours import Neighbours
 from idlc.project import inputs
 from idlc.project.files import is_folder
 from idlc.project.find import KINDS, RULES, list_files, no_interfaces, unread_idl

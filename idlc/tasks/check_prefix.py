@@ -10,8 +10,8 @@ from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.native import library as native
-from idlc.generate.native.inspect import inspect
-from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.native.library import inspect
+from idlc.generate.native.platforms import LAYOUTS
 from idlc.model import derive, ir
 from idlc.project import inputs, prefixes
 from idlc.project.files import is_file, read_bytes

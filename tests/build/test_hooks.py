@@ -18,7 +18,7 @@ from setuptools import Distribution
 from idlc import backend
 from idlc.build import compile_at_build
 from idlc.cli.main import main
-from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.native.platforms import LAYOUTS
 from idlc.project import prefixes
 from idlc.version import RUNTIME
 from tests.support import programs

@@ -7,7 +7,7 @@ import pytest
 
 from idlc.check import portability, registry, style
 from idlc.cli.main import main
-from idlc.compiler import name_rules, value_rules, verdicts
+from idlc.compiler import verdicts
 from idlc.diagnostics import codes
 from idlc.diagnostics.explain import page
 from idlc.diagnostics.report import Severity
@@ -54,7 +54,7 @@ def test_a_terminal_gets_each_page_without_its_markup(monkeypatch, capsys):
 def test_every_rule_is_registered():
     rules = {
         rule
-        for module in (name_rules, value_rules, portability, style)
+        for module in (verdicts, portability, style)
         for name, rule in vars(module).items()
         if not name.startswith("_") and getattr(rule, "__module__", "") == module.__name__
         if [*inspect.signature(rule).parameters] == ["model"]

@@ -386,7 +386,6 @@ def test_headings_are_bold(words, headings):
     [
         (["gne"], "no such command: `gne`", "did you mean `gen`?"),
         (["gen", "--wacth"], "no such option", "did you mean `--watch`?"),
-        (["scaffold", "package", "a", "--dry-run"], "no such option", "did you mean `--diff`?"),
         (["show"], "missing argument `TYPE|PATH|REC`", "`idlc show --help` lists the arguments"),
         (
             ["check", "--format", "xml"],

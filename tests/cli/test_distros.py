@@ -11,9 +11,9 @@ import pytest
 
 import idlc
 from idlc.check.registry import advise
-from idlc.cli import completion
 from idlc.cli.check import check_command as check
 from idlc.cli.main import main
+from idlc.cli.run import completion
 from idlc.compiler.compiler import compile_package, derived_names
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source

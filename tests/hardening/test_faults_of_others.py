@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import pytest
 
-from idlc.tasks.docs.pages import LISTING
+from idlc.tasks.docs import LISTING
 from tests.support.machine import another_user, running, tree
 
 pytestmark = pytest.mark.long

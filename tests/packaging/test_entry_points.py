@@ -7,8 +7,8 @@ import tokenize
 
 import pytest
 
-from idlc.packaging.entry_points import add_to_setup
-from idlc.packaging.outcome import ConsoleScript, Edited, Refused
+from idlc.packaging.entry_points import ConsoleScript, add_to_setup
+from idlc.packaging.files import Edited, Refused
 from tests.support.examples import HealthCheck, given, settings, st
 
 TALKER = ConsoleScript("talker", "demo.talker:main")

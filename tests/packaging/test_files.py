@@ -6,8 +6,8 @@ import pytest
 from catkin_pkg.package import parse_package_string
 
 from idlc.packaging import dependencies, entry_points, launch_py
-from idlc.packaging.entry_points import add_console_script
-from idlc.packaging.outcome import ConsoleScript, Edited, Outcome, Refused
+from idlc.packaging.entry_points import ConsoleScript, add_console_script
+from idlc.packaging.files import Edited, Outcome, Refused
 from idlc.scaffold import interface
 
 TALKING = launch_py.Started("demo", "talker")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.native.platforms import LAYOUTS
 from idlc.generate.prefix import target_of
 from idlc.project.prefixes import DEFAULT, distribution
 

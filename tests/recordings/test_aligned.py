@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 import idlc
-from idlc.recordings.aligned import blend
+from idlc.recordings.aligned import clock
 from idlc.recordings.containers.source import RecordingError
 from tests.support import recordings as made
 from tests.support.rounds import rounds
@@ -133,12 +133,12 @@ def test_quaternions_turn_at_a_constant_rate():
     for sign, size in ((1, 1), (-1, 1), (1, 5)):
         first = np.tile(about_z(0.0), (7, 1))
         second = np.tile(sign * size * about_z(angle), (7, 1))
-        turned = blend.turn(first, second, weights)
+        turned = clock.turned(first, second, weights)
         wanted = np.stack([about_z(weight * angle) for weight in weights])
         np.testing.assert_allclose(turned, wanted, atol=1e-12)
-    near = blend.turn(first, np.tile(about_z(1e-9), (7, 1)), weights)
+    near = clock.turned(first, np.tile(about_z(1e-9), (7, 1)), weights)
     np.testing.assert_allclose(near[:, 2], weights * 5e-10)
-    assert np.isnan(blend.turn(np.zeros((1, 4)), np.ones((1, 4)), np.array([0.5]))).all()
+    assert np.isnan(clock.turned(np.zeros((1, 4)), np.ones((1, 4)), np.array([0.5]))).all()
 
 
 #: What cannot be asked for -> the message.

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.main import main
-from idlc.packaging.outcome import Edited, Refused
+from idlc.packaging.files import Edited, Refused
 from idlc.scaffold import new_node, spec
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.spec import NodePlan, plan

@@ -11,7 +11,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from idlc.packaging import dependencies, entry_points, launch_py
-from idlc.packaging.outcome import ConsoleScript, Edited, Outcome
+from idlc.packaging.entry_points import ConsoleScript
+from idlc.packaging.files import Edited, Outcome
 
 TALKER = ConsoleScript("talker", "demo.talker:main")
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from idlc.generate.native.layouts import LAYOUTS, StructLayout
+from idlc.generate.native.platforms import LAYOUTS, StructLayout
 from idlc.project.prefixes import distribution
 
 SHARE = Path(sys.prefix) / "share"

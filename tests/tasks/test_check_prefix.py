@@ -9,9 +9,8 @@ import pytest
 from idlc.cli.main import main
 from idlc.compiler.compiler import models_of
 from idlc.diagnostics.report import Report
-from idlc.generate.native.inspect import inspect
-from idlc.generate.native.layouts import LAYOUTS
-from idlc.generate.native.library import MACHINES, libraries
+from idlc.generate.native.library import MACHINES, inspect, libraries
+from idlc.generate.native.platforms import LAYOUTS
 from idlc.project.find import list_files
 from idlc.project.inputs import load
 from idlc.project.prefixes import Distribution

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from idlc.cli.main import main
-from idlc.tasks.docs.view import blocks
+from idlc.tasks.docs_view import blocks
 from tests.support.files import write
 
 HOSTILE = '</p><script>alert(1)</script> "quoted" & <img src=x onerror=alert(1)>'

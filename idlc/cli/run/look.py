@@ -63,7 +63,7 @@ def list_names(packages: tuple[str, ...], style: str, scope: Scope, report: Repo
 
 def write_docs(paths: tuple[str, ...], out: str, scope: Scope, report: Report) -> str:
     """Write a site, and return the line about it."""
-    from idlc.tasks.docs.pages import docs
+    from idlc.tasks.docs import docs
 
     pages = docs(paths or scope.paths or (".",), out, scope, report)
     return f"{counted(pages, 'page')} written; open {out}/index.html\n" if pages else ""

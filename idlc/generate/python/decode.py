@@ -14,15 +14,18 @@ from typing import TypeAlias
 
 from msgspec.structs import replace
 
-from idlc.generate.python.lines import (
+from idlc.generate.python.statements import (
+    Builder,
     CodeStatement,
     CompoundStatement,
     Comprehension,
+    Cursor,
     Group,
+    NamedExpressions,
     PlainStatement,
+    ValueRun,
     call,
 )
-from idlc.generate.python.positions import Builder, Cursor, NamedExpressions, ValueRun
 from idlc.model import ir
 from idlc.model.names import snake_case
 from idlc.wire import plan

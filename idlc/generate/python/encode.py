@@ -13,19 +13,22 @@ from itertools import accumulate
 
 from msgspec.structs import replace
 
-from idlc.generate.python.lines import (
+from idlc.generate.python.statements import (
+    Builder,
     CodeStatement,
     CompoundStatement,
     Comprehension,
+    Cursor,
     Expression,
     Group,
+    NamedExpressions,
     Note,
     PlainStatement,
     Put,
+    ValueRun,
     call,
     flat,
 )
-from idlc.generate.python.positions import Builder, Cursor, NamedExpressions, ValueRun
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 

@@ -14,8 +14,15 @@ from typing import NamedTuple
 
 from idlc.diagnostics.text import did_you_mean
 from idlc.generate.python.decode import UNENDED, Decoder, slice_of
-from idlc.generate.python.lines import CompoundStatement, Group, PlainStatement, call, text_of
-from idlc.generate.python.positions import Cursor, NamedExpressions
+from idlc.generate.python.statements import (
+    CompoundStatement,
+    Cursor,
+    Group,
+    NamedExpressions,
+    PlainStatement,
+    call,
+    text_of,
+)
 from idlc.model import ir
 from idlc.model.python_names import Locals
 from idlc.wire import plan

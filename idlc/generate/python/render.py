@@ -19,9 +19,8 @@ from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
 from idlc.generate.python.encode import encode
 from idlc.generate.python.imports import ALONE, References, Surroundings
-from idlc.generate.python.lines import call, text_of
 from idlc.generate.python.literals import string_literal
-from idlc.generate.python.positions import NamedExpressions
+from idlc.generate.python.statements import NamedExpressions, call, text_of
 from idlc.generate.templates import Code, EscapedText, RenderedFile
 from idlc.generate.templates import code as code_environment
 from idlc.model import derive, ir, link, python_names

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from idlc.diagnostics.text import worded
-from idlc.recordings.aligned import blend
+from idlc.recordings.aligned import clock
 from idlc.recordings.aligned.clock import FOREVER, WAYS, Match, grid, length, match
 from idlc.recordings.aligned.describe import leaves, metadata, quaternions
 from idlc.recordings.arguments import texts
@@ -512,14 +512,14 @@ def _between(track: Track, table: pa.Table, each: Match) -> list[Any]:
         {name: table[name].combine_chunks().take(rows) for name in table.column_names}
         for rows in (pa.array(np.maximum(places, 0)) for places in (each.first, each.second))
     )
-    arrays = {name: blend.line(first[name], second[name], each.weight) for name in first}
+    arrays = {name: clock.interpolated(first[name], second[name], each.weight) for name in first}
     for paths in track.quaternions:
         if paths[0] in arrays:
             starts, ends = (
                 np.stack([columns[path].to_numpy() for path in paths], axis=1)
                 for columns in (first, second)
             )
-            turned = blend.turn(starts, ends, each.weight)
+            turned = clock.turned(starts, ends, each.weight)
             for path, values in zip(paths, turned.T, strict=True):
                 arrays[path] = pa.array(values, first[path].type)
     return list(arrays.values())

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from idlc.generate.native.layouts import LAYOUTS
 from idlc.generate.native.library import MACHINES as MADE_FOR
 from idlc.generate.native.library import OWN, libraries
+from idlc.generate.native.platforms import LAYOUTS
 from idlc.model import derive
 from tests.support.generated import model_of
 from tests.support.paths import ROOT

@@ -11,7 +11,7 @@ from ctypes import CFUNCTYPE, POINTER, c_bool, c_char, c_char_p, c_size_t, c_uin
 
 from trees import class_of
 
-from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.native.platforms import LAYOUTS
 from idlc.project.prefixes import distribution
 
 LAYOUT = LAYOUTS.get(distribution().name, LAYOUTS["jazzy"])

@@ -26,7 +26,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.words import read_word
 from idlc.project.write import apply, owned_files, plan
-from idlc.tasks.docs.view import KINDS, Home, PagePaths, Paragraph, blocks, page, prefix, words
+from idlc.tasks.docs_view import KINDS, Home, PagePaths, Paragraph, blocks, page, prefix, words
 from idlc.tasks.gen import named_packages
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from idlc.generate.native.layouts import LAYOUTS
 from idlc.generate.native.library import FIELDS_CPP, MACHINES, OWN, libraries
+from idlc.generate.native.platforms import LAYOUTS
 from tests.support.generated import model_of
 from tests.support.tools import run, tool
 

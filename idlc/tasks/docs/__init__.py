@@ -1,1 +1,0 @@
-"""`idlc docs`: pages about packages."""
