@@ -74,7 +74,7 @@ class ServerGoalHandle:
         """Execute the goal soon, by the callback of the server."""
         if not self.is_cancel_requested:
             self.enter(GoalState.EXECUTING)
-        self._server.start(self._server.execute, self)
+        self._server.start(self)
 
     def publish_feedback(self, feedback: Any) -> None:
         """Send feedback to the clients.
@@ -147,8 +147,8 @@ class ActionServer:
         self._cancel_callback = cancel_callback or (lambda _: CancelResponse.REJECT)
         self._timeout = result_timeout if result_timeout >= 0 else math.inf
         self._goals: dict[bytes, ServerGoalHandle] = {}
-        #: Accepted goals by the ids of the response objects that say so.
-        self._new_goals: dict[int, ServerGoalHandle] = {}
+        #: By its id, each response that accepts a goal and is not sent yet, and the goal.
+        self._new_goals: dict[int, tuple[Any, ServerGoalHandle]] = {}
         #: For the states of goals, which are published in the order in which they change.
         self.lock = RLock()
         names, impl = action_names(node.resolve_service_name(action_name)), action_type.Impl
@@ -182,10 +182,10 @@ class ActionServer:
             states = [kind(goal_info=goal.info, status=goal.status) for goal in goals]
             self._status.publish(self._status.interface.kind(status_list=states))
 
-    def start(self, callback: GoalCallback, goal: ServerGoalHandle) -> None:
-        """Call a function or coroutine as a task, unless the node was removed in the meantime."""
+    def start(self, goal: ServerGoalHandle) -> None:
+        """Execute a goal as a task, unless the node was removed in the meantime."""
         if self._node.executor is not None:
-            self._node.executor.create_task(callback, goal)
+            self._node.executor.create_task(self.execute, goal)
 
     async def execute(self, goal: ServerGoalHandle) -> None:
         """Execute a goal, and respond to the requests for its result."""
@@ -217,13 +217,13 @@ class ActionServer:
             response.stamp = self._node.get_clock().now().to_msg()
             goal = self._goals[key] = ServerGoalHandle(self, request, response.stamp)
             self.publish_status()
-            self._new_goals[id(response)] = goal
+            self._new_goals[id(response)] = response, goal
         return response
 
     async def _begin(self, response: Any) -> None:
         """Begin a new goal; its client knows by now that it is accepted."""
-        if (goal := self._new_goals.pop(id(response), None)) is not None:
-            await _result_of(self._accepted_callback(goal))
+        if (accepted := self._new_goals.pop(id(response), None)) is not None:
+            await _result_of(self._accepted_callback(accepted[1]))
 
     async def _answer_result(self, request: Any, response: Any) -> Any:
         goal = self._kept_goals().get(bytes(request.goal_id.uuid))

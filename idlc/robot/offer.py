@@ -77,18 +77,6 @@ _HOMES = (
 _ALIASES = {
     f"rclpy.lifecycle.{name}": f"Lifecycle{name}"
     for name in "Node NodeMixin Publisher State".split()
-} | {
-    f"rclpy.event_handler.QoS{name}Info": home
-    for name, home in (
-        ("LivelinessChanged", "LivelinessInfo"),
-        ("MessageLost", "CountInfo"),
-        ("OfferedDeadlineMissed", "CountInfo"),
-        ("OfferedIncompatibleQoS", "IncompatibleInfo"),
-        ("PublisherMatched", "MatchedInfo"),
-        ("RequestedDeadlineMissed", "CountInfo"),
-        ("RequestedIncompatibleQoS", "IncompatibleInfo"),
-        ("SubscriptionMatched", "MatchedInfo"),
-    )
 }
 
 

@@ -201,7 +201,8 @@ def services_of_ours_introspected(pair):
 
 def services_of_theirs_introspected(pair):
     events = []
-    pair.node.create_subscription(SetBool.Event, "theirs/_service_event", events.append, LATCHED)
+    every = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    pair.node.create_subscription(SetBool.Event, "theirs/_service_event", events.append, every)
     pair.ask(SetBool, "theirs", SetBool.Request(data=True))
     pair.until(lambda: [event.info.event_type for event in events[-2:]] == [1, 2])
     received, sent = events[-2:]

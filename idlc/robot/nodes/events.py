@@ -58,6 +58,13 @@ class LivelinessInfo(NamedTuple):
     not_alive_count_change: int
 
 
+# rclpy's names
+QoSMessageLostInfo = QoSOfferedDeadlineMissedInfo = QoSRequestedDeadlineMissedInfo = CountInfo
+QoSOfferedIncompatibleQoSInfo = QoSRequestedIncompatibleQoSInfo = IncompatibleInfo
+QoSPublisherMatchedInfo = QoSSubscriptionMatchedInfo = MatchedInfo
+QoSLivelinessChangedInfo = LivelinessInfo
+
+
 class UnsupportedEventTypeError(Exception):
     """An event was requested that idlc never reports."""
 

@@ -71,7 +71,8 @@ def keep(event):
         report("events", sorted(events))
 
 
-node.create_subscription(SetBool.Event, "ours/_service_event", keep, LATCHED)
+every = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+node.create_subscription(SetBool.Event, "ours/_service_event", keep, every)
 
 
 def done(future):
