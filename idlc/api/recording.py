@@ -34,7 +34,7 @@ from idlc.recordings.containers.messages import (
 )
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.damage import Damage, DamageWarning
-from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths
+from idlc.recordings.lengths import MOST_PADDING, SAMPLE, check_lengths, sample
 from idlc.recordings.times import END_OF_TIME, date_text, moment
 from idlc.runtime.codec import PAUSE
 from idlc.runtime.typeinfo import Structure, structure_of
@@ -211,12 +211,7 @@ class Selection:
 
     def _sample(self) -> list[Raw]:
         """Return some messages as they are recorded."""
-        raws: list[Raw] = []
-        for batch in self.read_all():
-            raws += batch.first_views(SAMPLE - len(raws))
-            if len(raws) >= SAMPLE:
-                break
-        return raws
+        return sample(self.read_all())
 
     def compare_lengths(self, batch: TopicMessages | None = None, kind: Any = None) -> None:
         """Compare the lengths of the first messages with their type: see `_judge`."""

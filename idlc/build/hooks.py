@@ -15,6 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from idlc.build import content
 from idlc.check.manifest import names_runtime
 from idlc.cli import output
 from idlc.cli.exit_status import status_of
@@ -31,8 +32,6 @@ from idlc.version import RUNTIME, __version__
 if TYPE_CHECKING:
     from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
     from hatchling.builders.wheel import RecordFile, WheelArchive
-
-    from idlc.build.content import Options
 
 _Built = TypeVar("_Built")
 #: The name of a package, and its `[project]` table.
@@ -120,13 +119,11 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str:
     """Compile the package in the working folder into a wheel."""
     from hatchling.builders.wheel import WheelBuilder
 
-    from idlc.build.content import compile_package
-
     (name, project), options = _declared(settings, report)
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
         classes, prefix = Path(folder) / "classes" / name, Path(folder) / "prefix"
-        content = compile_package(name, classes, options, report)
-        native, tag = content.libraries.files, content.libraries.build_tag
+        compiled = content.compile_package(name, classes, options, report)
+        native, tag = compiled.libraries.files, compiled.libraries.build_tag
 
         platform = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
 
@@ -144,7 +141,7 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str:
                 lines += [f"Build: {tag}"] * bool(tag) + [f"Tag: {platform}", ""]
                 records.write(archive.write_metadata("WHEEL", "\n".join(lines)))
 
-        for path, data in content.prefix.items():
+        for path, data in compiled.prefix.items():
             (prefix / path).parent.mkdir(parents=True, exist_ok=True)
             (prefix / path).write_bytes(data)
         target = _target(
@@ -153,7 +150,7 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str:
                 "bypass-selection": True,
                 "exclude": [f"/{name}", f"/src/{name}"],  # committed classes: these are new ones
                 "force-include": {str(classes): name},
-                "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
+                "shared-data": {str(prefix / path): path for path in sorted(compiled.prefix)},
             },
         )
         builder = PackageWheel(str(Path.cwd()), config={"project": project, **target})
@@ -167,7 +164,7 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str:
     return archive
 
 
-def _declared(settings: Mapping[str, Any], report: Report) -> tuple[_Package, Options]:
+def _declared(settings: Mapping[str, Any], report: Report) -> tuple[_Package, content.Options]:
     """Return the package, and what a frontend's settings say. Raises ReportedError."""
     package = None
     with suppress(ReportedError):  # so that problems of both are reported
@@ -180,8 +177,6 @@ def _declared(settings: Mapping[str, Any], report: Report) -> tuple[_Package, Op
 
 def _package(report: Report) -> _Package:
     """Return the package's name and its `[project]` table. Raises ReportedError."""
-    from idlc.build import content
-
     config = load_settings(Root.here(), report)
     if not Path(MANIFEST).is_file():
         message = f"there is no {MANIFEST} next to pyproject.toml"
@@ -203,9 +198,8 @@ def require_runtime(config: Config, requirements: Iterable[str], report: Report)
         report.add(codes.UNDECLARED_IMPORT.of(settings.SETTINGS_FILE, message, hint=hint))
 
 
-def _options(settings: Mapping[str, Any], report: Report) -> Options:
+def _options(settings: Mapping[str, Any], report: Report) -> content.Options:
     """Return what a frontend's settings say; report IDL611 for each that is wrong."""
-    from idlc.build.content import Options
     from idlc.generate.native.platforms import LAYOUTS
 
     choices = {"distro": tuple(LAYOUTS), "libraries": ("yes", "no")}
@@ -219,7 +213,7 @@ def _options(settings: Mapping[str, Any], report: Report) -> Options:
             report.add(codes.BAD_CONFIG.of("", message, hint=f"use {', '.join(choices[key])}"))
     distro = settings.get("distro")
     distribution = Distribution(distro, f"distro={distro}") if distro else None
-    return Options(distribution, settings.get("libraries") != "no")
+    return content.Options(distribution, settings.get("libraries") != "no")
 
 
 def _target(name: str, **settings: Any) -> dict[str, Any]:

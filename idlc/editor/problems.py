@@ -15,15 +15,9 @@ import msgspec
 
 from idlc.diagnostics import codes, explain
 from idlc.diagnostics.report import Diagnostic, Severity
+from idlc.editor import parts
 from idlc.editor.documents import TOP, Document
 from idlc.editor.elements import uses
-from idlc.editor.parts import (
-    DocumentParams,
-    Location,
-    ProtocolStruct,
-    Range,
-    WorkspaceDiagnosticParams,
-)
 from idlc.editor.protocol import requests_problems
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Workspace, in_folder
@@ -36,23 +30,23 @@ _NEEDLESS = frozenset({codes.UNUSED_DEPENDENCY.id, codes.UNUSED_IGNORE.id})
 _PAGES = Path(explain.__file__).parent / "explain"
 
 
-class CodeDescription(ProtocolStruct, frozen=True):
+class CodeDescription(parts.ProtocolStruct, frozen=True):
     """The page of a code."""
 
     href: str
 
 
-class RelatedInformation(ProtocolStruct, frozen=True):
+class RelatedInformation(parts.ProtocolStruct, frozen=True):
     """A second place that explains the first."""
 
-    location: Location
+    location: parts.Location
     message: str
 
 
-class DocumentDiagnostic(ProtocolStruct, frozen=True):
+class DocumentDiagnostic(parts.ProtocolStruct, frozen=True):
     """A problem at its place in a document."""
 
-    range: Range
+    range: parts.Range
     severity: int
     code: str
     code_description: CodeDescription
@@ -113,7 +107,7 @@ def diagnostics(state: ServerState) -> dict[str, list[DocumentDiagnostic]]:
     return {uri: list(some) for uri, some in by_uri.items()}
 
 
-def document(state: ServerState, params: DocumentParams) -> dict[str, object]:
+def document(state: ServerState, params: parts.DocumentParams) -> dict[str, object]:
     """Return the problems of a document.
 
     All of them each time: Neovim forgets them with a document that it reads again, but not their
@@ -122,7 +116,7 @@ def document(state: ServerState, params: DocumentParams) -> dict[str, object]:
     return _report(diagnostics(state).get(params.text_document.uri, []), None)
 
 
-def workspace(state: ServerState, params: WorkspaceDiagnosticParams) -> dict[str, object]:
+def workspace(state: ServerState, params: parts.WorkspaceDiagnosticParams) -> dict[str, object]:
     """Return the problems of every document that has any, or had some in the last answer."""
     by_uri = diagnostics(state)
     before = {previous.uri: previous.value for previous in params.previous_result_ids}

@@ -15,16 +15,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import INCOMPLETE, Source, Span
 from idlc.diagnostics.text import one_line
 from idlc.language.parse import parse
-from idlc.model import catalog, ir
-from idlc.model.describe import (
-    ARRAY_OFFSET,
-    STRING_TYPE_IDS,
-    DescriptionDict,
-    FieldDict,
-    IndividualDict,
-    TypeDict,
-    individual,
-)
+from idlc.model import catalog, describe, ir
 from idlc.model.distros import NEWEST
 from idlc.model.ir import spell
 from idlc.model.link import Model, circles, link
@@ -35,7 +26,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _PRIMITIVES = {
     info.type_id: ir.Primitive(name) for name, info in ir.PRIMITIVES.items() if name != "char"
 }
-_STRINGS = {type_id: kind for kind, type_id in STRING_TYPE_IDS.items()}
+_STRINGS = {type_id: kind for kind, type_id in describe.STRING_TYPE_IDS.items()}
 
 
 class DescriptionError(ValueError):
@@ -43,7 +34,7 @@ class DescriptionError(ValueError):
 
 
 def model_of_description(
-    description: DescriptionDict, name: str, type_hash: str, program: str
+    description: describe.DescriptionDict, name: str, type_hash: str, program: str
 ) -> Model:
     """Return the model of a type of this name and hash, as `program` describes it.
 
@@ -70,11 +61,11 @@ def model_of_description(
     return model
 
 
-def message_of(part: IndividualDict, program: str) -> ir.Message:
+def message_of(part: describe.IndividualDict, program: str) -> ir.Message:
     """Return the message that one description describes; raises DescriptionError."""
     name = _type_name(part["type_name"])
-    bare: list[FieldDict] = [{**field, "default_value": ""} for field in part["fields"]]
-    written = part["fields"] if bare != individual(ir.Message(name=name))["fields"] else []
+    bare: list[describe.FieldDict] = [{**field, "default_value": ""} for field in part["fields"]]
+    written = part["fields"] if bare != describe.individual(ir.Message(name=name))["fields"] else []
     bare_fields: dict[str, ir.Field] = {}
     for field in written:
         own = field["name"]
@@ -98,7 +89,7 @@ def message_of(part: IndividualDict, program: str) -> ir.Message:
     return ir.Message(name=name, source=source, fields=tuple(fields))
 
 
-def defaults_of(description: DescriptionDict) -> Defaults:
+def defaults_of(description: describe.DescriptionDict) -> Defaults:
     """Return the default values in a description, as the node sends them."""
     every = (description["type_description"], *description["referenced_type_descriptions"])
     owners = ((_type_name(part["type_name"]), field) for part in every for field in part["fields"])
@@ -115,8 +106,8 @@ def _type_name(text: str) -> ir.TypeName:
     return name
 
 
-def _type(type_: TypeDict) -> ir.FieldType:
-    shape, element_id = divmod(type_["type_id"], ARRAY_OFFSET)
+def _type(type_: describe.TypeDict) -> ir.FieldType:
+    shape, element_id = divmod(type_["type_id"], describe.ARRAY_OFFSET)
     element: ir.Element
     if element_id == 1:
         element = ir.Ref(_type_name(type_["nested_type_name"]))
@@ -171,7 +162,7 @@ def _model(
 
 
 def reported_model(
-    description: DescriptionDict,
+    description: describe.DescriptionDict,
     sources: Mapping[str, str],
     name: str,
     type_hash: str,

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from idlc.diagnostics.report import Edit, apply
 from idlc.diagnostics.source import Source, Span
+from idlc.packaging import setup_edits
 from idlc.packaging.files import (
     SETUP_CFG,
     SETUP_PY,
@@ -25,13 +26,6 @@ from idlc.packaging.files import (
     SetupCfg,
 )
 from idlc.packaging.layout import PackageLayout
-from idlc.packaging.setup_edits import (
-    append_element,
-    insertion,
-    is_spread,
-    margin_of,
-    step_of,
-)
 from idlc.packaging.setup_py import DataFiles, Setup, name_of_call, parse, range_of
 from idlc.project.settings import SETTINGS_FILE, toml
 
@@ -206,11 +200,11 @@ def _with_script(setup: Setup, call: ast.Call, script: ConsoleScript) -> EntryPo
     if None in passed:
         return "setup() takes its arguments from other code (`**`)"
     points = f"{{'{KEY}': ['{script.line}']}}"
-    if is_spread(setup.source, call):
-        margin, step = margin_of(setup.source, call), step_of(setup.source)
+    if setup_edits.is_spread(setup.source, call):
+        margin, step = setup_edits.margin_of(setup.source, call), setup_edits.step_of(setup.source)
         inner = f"{margin}{step}'{KEY}': [\n{margin}{step * 2}'{script.line}',\n{margin}{step}],"
         points = f"{{\n{inner}\n{margin}}}"
-    return append_element(setup.source, call, f"entry_points={points}")
+    return setup_edits.append_element(setup.source, call, f"entry_points={points}")
 
 
 def _in_entry_points(setup: Setup, node: ast.expr, script: ConsoleScript) -> EntryPointEdits:
@@ -229,7 +223,7 @@ def _in_entry_points(setup: Setup, node: ast.expr, script: ConsoleScript) -> Ent
     if KEY in scripts:
         return _in_scripts(setup, scripts[KEY], script)
     if isinstance(value, ast.Dict):
-        return append_element(setup.source, value, f"'{KEY}': ['{script.line}']")
+        return setup_edits.append_element(setup.source, value, f"'{KEY}': ['{script.line}']")
     return _unknown(node, value) or "the entry points are not a literal dictionary or string"
 
 
@@ -252,7 +246,7 @@ def _in_scripts(setup: Setup, node: ast.expr, script: ConsoleScript) -> EntryPoi
             name, target = split_entry(setup.text(element) or "")
             if name == script.name:
                 return already_taken(script, target, IN_SETUP).why
-        return append_element(setup.source, value, f"'{script.line}'")
+        return setup_edits.append_element(setup.source, value, f"'{script.line}'")
     if isinstance(value, ast.Constant) and isinstance(value.value, str):
         start, end = range_of(setup.source, value)
         literal = setup.source.text[start:end]
@@ -361,7 +355,7 @@ def add_launch(text: str, package: str, path: str) -> tuple[str, str]:
         return text, ""
     if setup.call is None or listed is None or entries is None:
         return text, element
-    return apply(text, append_element(setup.source, listed, element))[0], ""
+    return apply(text, setup_edits.append_element(setup.source, listed, element))[0], ""
 
 
 def _installs(entry: DataFiles, path: str) -> bool:
@@ -392,10 +386,10 @@ def add_package(text: str, package: str, view: PackageLayout | None) -> tuple[st
     target = setup.value(setup.arguments.get("packages"))
     edits: tuple[Edit, ...] = ()
     if listed is not None:
-        edits = append_element(setup.source, listed, f"'{package}'")
+        edits = setup_edits.append_element(setup.source, listed, f"'{package}'")
     elif isinstance(target, ast.Call):
         end = range_of(setup.source, target)[1]
-        edits = (insertion(setup.source, end, f" + ['{package}']"),)
+        edits = (setup_edits.insertion(setup.source, end, f" + ['{package}']"),)
     if not edits:
         return text, f"add `{package}` to `packages` in `{view.installed.place.source.path}`"
     return apply(text, edits)[0], ""

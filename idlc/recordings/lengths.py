@@ -13,12 +13,22 @@ from idlc.recordings.containers.source import RecordingError
 from idlc.runtime.typeinfo import Structure
 
 if TYPE_CHECKING:  # it imports numpy, which classes do not need
-    from idlc.recordings.containers.messages import Raw
+    from idlc.recordings.containers.messages import Raw, TopicMessages
 
 #: Middlewares pad messages to a multiple of four bytes.
 MOST_PADDING = 3
 #: So many messages show whether a type fits.
 SAMPLE = 64
+
+
+def sample(batches: Iterable[TopicMessages]) -> list[Raw]:
+    """Return the first messages, as many as show whether a type fits."""
+    raws: list[Raw] = []
+    for batch in batches:
+        raws += batch.first_views(SAMPLE - len(raws))
+        if len(raws) >= SAMPLE:
+            break
+    return raws
 
 
 def fits(structure: Structure, raws: Sequence[Raw]) -> bool:

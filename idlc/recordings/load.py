@@ -24,19 +24,12 @@ from idlc.project.library import resolve
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.project.words import read_word
+from idlc.recordings import memory
 from idlc.recordings.arguments import message_class, texts
 from idlc.recordings.containers.container import Topic
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import RECORDING, Origin, read_definition
 from idlc.recordings.lengths import KnownVersion, fits
-from idlc.recordings.memory import (
-    ModelsByName,
-    class_in,
-    find_spec,
-    home_of,
-    is_kept,
-    keep_as_named,
-)
 from idlc.recordings.packages import check_versions
 from idlc.recordings.types import (
     LocalTypes,
@@ -60,11 +53,11 @@ def known_spec(package: str, module: str) -> Any:
     It is `None` if the package has no such module. Other packages are imported by their own names,
     too. Raises CompileError.
     """
-    if not is_kept(package):
+    if not memory.is_kept(package):
         with _compiling() as report:
             models, _ = _models_of(package, (), None, report)
-        keep_as_named(models[package])
-    return find_spec(module)
+        memory.keep_as_named(models[package])
+    return memory.find_spec(module)
 
 
 # what is loaded
@@ -77,8 +70,8 @@ class CompileError(ValueError):
 class LoadedPackages(ModuleType):
     """Packages that were compiled together; requested interfaces also by their own names."""
 
-    def __init__(self, models: ModelsByName, names: Iterable[ir.TypeName]) -> None:
-        super().__init__(home_of(models), "The packages that `idlc.load` compiled.")
+    def __init__(self, models: memory.ModelsByName, names: Iterable[ir.TypeName]) -> None:
+        super().__init__(memory.home_of(models), "The packages that `idlc.load` compiled.")
         self._packages = {package: model.kinds for package, model in sorted(models.items())}
         self._interfaces = {str(class_(name)): name for name in names}
 
@@ -88,12 +81,12 @@ class LoadedPackages(ModuleType):
                 import_module(f"{self.__name__}.{name}.{kind}")
             return import_module(f"{self.__name__}.{name}")
         if name in self._interfaces:
-            return class_in(self.__name__, self._interfaces[name])
+            return memory.class_in(self.__name__, self._interfaces[name])
         raise AttributeError(f"no `{name}` was loaded, but {', '.join(dir(self))}")
 
     def __getitem__(self, name: str) -> Any:
         """Return a class by its full name, such as "std_msgs/msg/Header"."""
-        return class_in(self.__name__, ir.TypeName(*name.split("/")))  # type: ignore[arg-type]
+        return memory.class_in(self.__name__, ir.TypeName(*name.split("/")))  # type: ignore[arg-type]
 
     def __dir__(self) -> list[str]:
         return [*self._packages, *sorted(self._interfaces)]
@@ -135,7 +128,7 @@ def _models_of(
     distro: str | None,
     report: Report,
     read: TypesReader = read_topics,
-) -> tuple[ModelsByName, Iterable[ir.TypeName]]:
+) -> tuple[memory.ModelsByName, Iterable[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
     where = scope(Config(root=Root.here()), None, include, distro=distro)
     meaning = read_word(what, where.root, "name")
@@ -170,7 +163,7 @@ def _models_of(
 class TopicType:
     """The type of a topic's messages, compiled from what was recorded."""
 
-    def __init__(self, models: ModelsByName, name: ir.TypeName) -> None:
+    def __init__(self, models: memory.ModelsByName, name: ir.TypeName) -> None:
         self.models = models
         self.name = name
 
@@ -186,7 +179,7 @@ class TopicType:
     @cached_property
     def kind(self) -> Any:
         """The class of the messages."""
-        return class_in(home_of(self.models), self.name)
+        return memory.class_in(memory.home_of(self.models), self.name)
 
 
 def type_of(

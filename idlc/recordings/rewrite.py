@@ -19,13 +19,7 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from idlc.diagnostics.terminal import Progress
-from idlc.project.atomic import (
-    ended_by_errors,
-    locked,
-    make_folder,
-    move_new,
-    uninterrupted,
-)
+from idlc.project import atomic
 from idlc.project.words import METADATA, ZSTD
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.compression import ZSTD_MAGIC, unpack
@@ -104,8 +98,8 @@ def rewrite(
             if path.is_file() and not path.is_symlink():
                 with path.open("r+b") as file:
                     os.fsync(file.fileno())
-        with uninterrupted():
-            move_new(draft, end)
+        with atomic.uninterrupted():
+            atomic.move_new(draft, end)
     return rewriting.result
 
 
@@ -114,14 +108,14 @@ def _draft(target: Path) -> Iterator[Path]:
     """Give a path in a hidden folder beside the target, which is removed at the end."""
     created: list[Path] = []
     folder = target.parent
-    with ended_by_errors(), ExitStack() as held:
+    with atomic.ended_by_errors(), ExitStack() as held:
         try:
-            make_folder(target.parent, created)
+            atomic.make_folder(target.parent, created)
             _remove_abandoned(target)
             for _ in range(ATTEMPTS):
                 folder = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
                 folder.mkdir()
-                is_locked = held.enter_context(locked(folder))
+                is_locked = held.enter_context(atomic.locked(folder))
                 if is_locked is not False and folder.exists():
                     break  # no other run has taken it for an abandoned one meanwhile
             yield folder / target.name
@@ -142,7 +136,7 @@ def _remove_abandoned(target: Path) -> None:
     name = re.compile(re.escape(f".{target.name}.") + "[0-9a-f]{8}")
     for folder in target.parent.iterdir():
         if name.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
-            with locked(folder) as is_mine:
+            with atomic.locked(folder) as is_mine:
                 if is_mine:
                     shutil.rmtree(folder, ignore_errors=True)
 

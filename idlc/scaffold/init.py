@@ -432,18 +432,22 @@ def add_table(text: str, table: Mapping[str, Any]) -> Outcome:
     for header, values in {"[tool.idlc]": plain, **tables}.items():
         # JSON's strings, lists and switches are TOML's
         lines = [f"{key} = {json.dumps(each)}" for key, each in values.items()]
-        block = ending.join((*lines, ""))
         shown += "\n".join((header, *lines, ""))
-        at = re.search(rf"(?m)^{re.escape(header)}[ \t]*(?:#.*)?\r?\n", new)
-        if at:
-            new = f"{new[: at.end()]}{block}{new[at.end() :]}"
-        else:
-            new += f"{ending if new.strip() else ''}{header}{ending}{block}"
+        new = _with_values(new, header, lines, ending)
     with suppress(ValueError, TypeError):
         if toml(new) == {**old, "tool": {**tool, "idlc": {**present, **missing}}}:
             return Edited(new)
     where = "to its end, and write the values in `tool` below headers such as `[tool.idlc]`"
     return Refused(why, shown.rstrip(), where)
+
+
+def _with_values(text: str, header: str, lines: Sequence[str], ending: str) -> str:
+    """Return a TOML text with lines below a header, which is at its end if there was none."""
+    block = ending.join((*lines, ""))
+    at = re.search(rf"(?m)^{re.escape(header)}[ \t]*(?:#.*)?\r?\n", text)
+    if at:
+        return f"{text[: at.end()]}{block}{text[at.end() :]}"
+    return f"{text}{ending if text.strip() else ''}{header}{ending}{block}"
 
 
 def _ament_python(
@@ -622,11 +626,7 @@ def _outdated_builds(draft: Draft, layout: Layout, out: str) -> str:
 def _with_setting(text: str, table: str, key: str, value: str) -> str:
     """Return a pyproject.toml with one more setting; empty if it has another value already."""
     ending = "\r\n" if "\r\n" in text else "\n"
-    line = f"{key} = {json.dumps(value)}{ending}"
-    at = re.search(rf"(?m)^{re.escape(f'[{table}]')}[ \t]*(?:#.*)?\r?\n", text)
-    new = f"{text}{ending}[{table}]{ending}{line}"
-    if at:
-        new = f"{text[: at.end()]}{line}{text[at.end() :]}"
+    new = _with_values(text, f"[{table}]", [f"{key} = {json.dumps(value)}"], ending)
     with suppress(ValueError, AttributeError, TypeError):
         wanted = toml(text)
         place = wanted

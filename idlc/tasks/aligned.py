@@ -15,18 +15,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import Progress
 from idlc.recordings.aligned.table import Aligned, ClockFit
 from idlc.recordings.containers.source import RecordingError
-from idlc.tasks.columns import (
-    STDOUT,
-    STYLES,
-    TEXT,
-    ColumnsOptions,
-    Job,
-    WrittenFile,
-    checked,
-    opened,
-    stdout_style,
-    write,
-)
+from idlc.tasks import columns
 
 
 class Grid(msgspec.Struct, frozen=True):
@@ -45,10 +34,10 @@ def write_aligned(
     grid: Grid,
     announce: Callable[[list[ClockFit]], None],
     recording: Recording,
-    options: ColumnsOptions,
+    options: columns.ColumnsOptions,
     report: Report,
     progress: Progress,
-) -> Iterator[WrittenFile]:
+) -> Iterator[columns.WrittenFile]:
     """Announce how well the topics fit the clock, and write their table."""
     topics = dict(topic_of(word, recording) for word in options.topics or recording)
     rows = grid.clock_of_rows
@@ -58,11 +47,11 @@ def write_aligned(
         field_problem(error, options, report)
         return
     style = _style(options)
-    job = Job(recording[next(iter(topics), rows)], options.out, style)
-    if style != TEXT and not checked([job], options, report):
+    job = columns.Job(recording[next(iter(topics), rows)], options.out, style)
+    if style != columns.TEXT and not columns.checked([job], options, report):
         return
     announce(table.summary())
-    if style == TEXT:
+    if style == columns.TEXT:
         return
     done = 0
 
@@ -73,12 +62,12 @@ def write_aligned(
             progress(rows, done, len(table))
             yield batch
 
-    with opened(job.path) as file:
-        write(counted(), table.schema, file, style)
-    yield WrittenFile(", ".join(topics), job.path, len(table))
+    with columns.opened(job.path) as file:
+        columns.write(counted(), table.schema, file, style)
+    yield columns.WrittenFile(", ".join(topics), job.path, len(table))
 
 
-def field_problem(error: ValueError, options: ColumnsOptions, report: Report) -> None:
+def field_problem(error: ValueError, options: columns.ColumnsOptions, report: Report) -> None:
     """Report a field that a topic does not have; raise other errors."""
     if isinstance(error, RecordingError):
         raise error
@@ -89,7 +78,7 @@ def field_problem(error: ValueError, options: ColumnsOptions, report: Report) ->
 
 
 def table_of(
-    grid: Grid, topics: Mapping[str, Any], recording: Recording, options: ColumnsOptions
+    grid: Grid, topics: Mapping[str, Any], recording: Recording, options: columns.ColumnsOptions
 ) -> Aligned:
     """Return the table of topics, each with its fields."""
     rows = grid.clock_of_rows
@@ -107,11 +96,11 @@ def table_of(
     )
 
 
-def _style(options: ColumnsOptions) -> str:
+def _style(options: columns.ColumnsOptions) -> str:
     """Return the format of the file; a terminal sees only the summary."""
-    if options.out == STDOUT:
-        return stdout_style(options)
-    return options.style or STYLES.get(Path(options.out).suffix.lower(), "")
+    if options.out == columns.STDOUT:
+        return columns.stdout_style(options)
+    return options.style or columns.STYLES.get(Path(options.out).suffix.lower(), "")
 
 
 def topic_of(word: str, recording: Recording) -> tuple[str, list[str] | None]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from idlc.compiler.compiler import models_of, stage
 from idlc.diagnostics import codes
@@ -13,15 +12,13 @@ from idlc.generate.native import library as native
 from idlc.generate.native.library import inspect
 from idlc.generate.native.platforms import LAYOUTS
 from idlc.model import derive, ir
+from idlc.model.link import Model
 from idlc.project import inputs, prefixes
 from idlc.project.files import is_file, read_bytes
 from idlc.project.find import list_files
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.tasks.check import CheckResult
-
-if TYPE_CHECKING:
-    from idlc.model.link import Model
 
 _AGAIN = "install idlc and build the package again, or run `idlc gen SOURCES --ament PREFIX`"
 

@@ -18,14 +18,7 @@ from idlc.diagnostics.text import edit_distance
 from idlc.model import derive, ir
 from idlc.model.ir import meaning
 from idlc.model.link import Model
-from idlc.project.settings import (
-    Config,
-    TableLocation,
-    TablesValue,
-    TextValue,
-    command_table,
-    read_table,
-)
+from idlc.project import settings
 from idlc.versions.changes import LEVELS, Change, Level
 from idlc.versions.fields import Sides, added, constant_changes, field_changes
 
@@ -212,8 +205,8 @@ def raised(version: str, part: Literal["major", "minor", "patch"]) -> str | None
 class BreakingSettings(msgspec.Struct, frozen=True):
     """`[tool.idlc.breaking]`."""
 
-    allow: TablesValue = ()
-    against: TextValue = ""
+    allow: settings.TablesValue = ()
+    against: settings.TextValue = ""
     levels: Annotated[tuple[Level, ...], Meta(title=f"a list of {', '.join(LEVELS)}")] = ()
 
 
@@ -235,7 +228,7 @@ class Allowance(msgspec.Struct, frozen=True):
         datetime.date,
         Meta(title="a date such as 2030-12-31", description="its last day, such as 2030-12-31"),
     ]
-    code: TextValue = ""
+    code: settings.TextValue = ""
 
     def covers(self, change: Change) -> bool:
         """Return whether the entry allows a change, or the one that it follows from."""
@@ -245,36 +238,36 @@ class Allowance(msgspec.Struct, frozen=True):
         return any(fnmatchcase(name, self.at) for name in names if name)
 
 
-def against(config: Config, report: Report) -> str | None:
+def against(config: settings.Config, report: Report) -> str | None:
     """Return the setting `against`: the default of `idlc breaking --against`."""
-    table, place = command_table(config, "breaking", BreakingSettings, report)
+    table, place = settings.command_table(config, "breaking", BreakingSettings, report)
     if place is not None:
         place.no_url("against", table.against, report)
     return table.against or None
 
 
-def levels(config: Config, report: Report) -> tuple[Level, ...]:
+def levels(config: settings.Config, report: Report) -> tuple[Level, ...]:
     """Return the setting `levels`: the levels of changes that `idlc breaking` reports."""
-    return command_table(config, "breaking", BreakingSettings, report)[0].levels
+    return settings.command_table(config, "breaking", BreakingSettings, report)[0].levels
 
 
-def allowances(config: Config, report: Report) -> tuple[Allowance, ...]:
+def allowances(config: settings.Config, report: Report) -> tuple[Allowance, ...]:
     """Return the entries of `[[tool.idlc.breaking.allow]]`."""
-    entries = command_table(config, "breaking", BreakingSettings, report)[0].allow
+    entries = settings.command_table(config, "breaking", BreakingSettings, report)[0].allow
     parsed = [_allowance(config, at, entry, report) for at, entry in enumerate(entries)]
     return tuple(entry for entry in parsed if entry is not None)
 
 
 def _allowance(
-    config: Config, number: int, entry: Mapping[str, Any], report: Report
+    config: settings.Config, number: int, entry: Mapping[str, Any], report: Report
 ) -> Allowance | None:
     assert config.source is not None
     at, until = entry.get("at"), entry.get("until")
     which = f"the entry for `{at}`" if isinstance(at, str) else "an entry"
     name = "tool.idlc.breaking.allow"
-    place = TableLocation(config.source, name, f"{which} in [[{name}]]", number)
+    place = settings.TableLocation(config.source, name, f"{which} in [[{name}]]", number)
     day = {"until": until.date()} if isinstance(until, datetime.datetime) else {}
-    allowance = read_table({**entry, **day}, Allowance, place, report)
+    allowance = settings.read_table({**entry, **day}, Allowance, place, report)
     if allowance and allowance.code not in ("", *(code for code in CODES if code[:4] == "IDL5")):
         message = f"{place.shown} contains `{allowance.code}`, which is not a breaking change"
         place.wrong("code", message, report)

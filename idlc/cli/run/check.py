@@ -41,10 +41,12 @@ def check_paths(
         from idlc.tasks.check_prefix import check_prefix
 
         checked = check_prefix(prefix, settings.root, report)
-    elif not report.had_errors:  # of the settings
-        where = scope(settings, package, include, exclude, distro)
-        options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix, diff)
-        checked = check(options, report)
+    else:
+        with suppress(ReportedError):
+            report.raise_errors()  # of the settings
+            where = scope(settings, package, include, exclude, distro)
+            options = CheckOptions(paths or settings.paths or (".",), where, chosen, fix, diff)
+            checked = check(options, report)
     if style == "text":
         _show(checked, report, diff=diff)
     elif style == "json":

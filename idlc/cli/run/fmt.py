@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 
 from idlc.cli import output
 from idlc.compiler.compiler import stage
+from idlc.diagnostics.report import ReportedError
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
@@ -22,7 +24,8 @@ def run(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...
     done = "changed" if write else "would change"
     broken, clean = "with errors skipped", "already formatted"
     numbers = dict.fromkeys((done, broken, clean), 0)
-    if not report.had_errors:  # of the settings
+    with suppress(ReportedError):
+        report.raise_errors()  # of the settings
         left_out = scope(settings, exclude=exclude).exclude
         for file in find(paths or settings.paths or (".",), settings.root, report, left_out):
             source = settings.root.read_source(file.path, file.shown, report)

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,15 +16,12 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import Paint, counted, summary
 from idlc.diagnostics.text import one_line
+from idlc.generate.package import Generated
 from idlc.project.find import Stamp, list_files, snapshot, stamps
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope, settings_here
 from idlc.project.words import files, is_address, read_words, split_topics
 from idlc.tasks.gen import GenOptions, gen, in_package, with_settings
-
-if TYPE_CHECKING:
-    from idlc.generate.package import Generated
-
 
 #: The seconds between two looks at the files.
 INTERVAL = 0.25

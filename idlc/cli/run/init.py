@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -16,27 +15,15 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, ReportedError
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line, printable
+from idlc.generate.package import Generated
 from idlc.packaging.files import SETUP_PY
 from idlc.project.find import list_files
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
+from idlc.scaffold import init
 from idlc.scaffold.changes import ScaffoldOptions
-from idlc.scaffold.init import (
-    Draft,
-    Preparation,
-    continuous,
-    generate,
-    obtaining,
-    prepare,
-    recommendation,
-    siblings,
-)
 from idlc.scaffold.layouts import Layout, layout_of
 from idlc.scaffold.proof import Proof, installed_files, prove
-
-if TYPE_CHECKING:
-    from idlc.generate.package import Generated
-
 
 TEST = "The test runs the package's own build."
 
@@ -59,16 +46,16 @@ def run(path: str, service: str | None, yes: bool) -> int:
         sys.stderr.write("nothing was written\n")
         return output.status(report)
     planned, status = _plans(layout, root, report)
-    extras: list[tuple[Draft, list[str]]] = []
+    extras: list[tuple[init.Draft, list[str]]] = []
     if service:
         others = Report()
         with suppress(ReportedError):
-            checks = continuous(service, layout, others)
-            extras.append((checks, obtaining(checks)))
+            checks = init.continuous(service, layout, others)
+            extras.append((checks, init.obtaining(checks)))
         output.show(others, "text", sys.stderr)
         status = max(status, output.status(others))
     if planned:
-        extras.append((recommendation(root, report), []))
+        extras.append((init.recommendation(root, report), []))
     drafts = [(each.draft, each.out) for each in planned] + [(draft, "") for draft, _ in extras]
     for draft, out in drafts:
         _show(draft, out, root)
@@ -96,7 +83,7 @@ def _consents(path: str) -> bool:
     return False
 
 
-def _show_next(path: str, layout: Layout, planned: Sequence[Preparation]) -> None:
+def _show_next(path: str, layout: Layout, planned: Sequence[init.Preparation]) -> None:
     """Name the commands that a new user tries next."""
     words = ["check"]
     if not layout.packages:
@@ -114,7 +101,7 @@ def _pasted(words: list[str]) -> str:
     return shlex.join([*output.program().split(), *words])
 
 
-def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation], int]:
+def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[init.Preparation], int]:
     """Say what stands in a folder, plan its packages, and return the plans and the exit status."""
     planned, status = [], 0
     if layout.packages:
@@ -135,7 +122,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
             inner = layout_of(own, report) if layout.packages else layout
             interfaces = counted(number, "interface") if number else "no interfaces yet"
             sys.stdout.write(f"{within}{one_line(inner.sentence(interfaces))}\n")
-            preparation = prepare(inner, ScaffoldOptions(own), report, siblings(inner))
+            preparation = init.prepare(inner, ScaffoldOptions(own), report, init.siblings(inner))
         sys.stdout.flush()
         output.show(report, "text", sys.stderr)
         if preparation is None:
@@ -147,7 +134,7 @@ def _plans(layout: Layout, root: Root, report: Report) -> tuple[list[Preparation
     return planned, status
 
 
-def _show(draft: Draft, out: str, root: Root) -> None:
+def _show(draft: init.Draft, out: str, root: Root) -> None:
     """Show the changes to a package, with the reason for each, and as a diff."""
     if not draft.reasons:
         return
@@ -160,7 +147,7 @@ def _show(draft: Draft, out: str, root: Root) -> None:
     sys.stdout.flush()
 
 
-def _write(draft: Draft, next_commands: Sequence[str]) -> int:
+def _write(draft: init.Draft, next_commands: Sequence[str]) -> int:
     """Write a file that belongs to no package, and return the exit status.
 
     The next commands belong into the file's repository.
@@ -178,7 +165,7 @@ def _write(draft: Draft, next_commands: Sequence[str]) -> int:
     return output.status(report)
 
 
-def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
+def _finish(preparation: init.Preparation, root: Root, *, again: bool) -> int:
     """Write and compile a package, prove it, and return the exit status.
 
     A package that did not change is proved `again`, because an earlier proof may have failed.
@@ -214,12 +201,12 @@ def _finish(preparation: Preparation, root: Root, *, again: bool) -> int:
     return int(bool(proof.failure))
 
 
-def _compile(preparation: Preparation, within: str, report: Report) -> tuple[Generated, ...]:
+def _compile(preparation: init.Preparation, within: str, report: Report) -> tuple[Generated, ...]:
     """Write and compile a package; return the generated packages, none after an error."""
     done: tuple[Generated, ...] = ()
     with suppress(ReportedError):
         preparation.draft.write(report)
-        done = generate(preparation, report)
+        done = init.generate(preparation, report)
     output.show(report, "text", sys.stderr)
     if not done:
         sys.stderr.write(f"{within}idlc did not generate the classes\n")

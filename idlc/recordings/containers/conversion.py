@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
+from idlc.recordings.containers import file
 from idlc.recordings.containers.compression import (
     ZSTD_MAGIC,
     DecompressionBudget,
     compress,
     zstd_frame,
-)
-from idlc.recordings.containers.file import (
-    CDR,
-    START,
-    Schema,
-    full_name,
-    other_encoding,
-    unread_reason,
 )
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.source import RecordingError
@@ -30,9 +23,9 @@ BATCH = 1 << 24
 DefinitionKey: TypeAlias = tuple[str, str]
 
 
-def definition_key(kind: str, schema: Schema | None) -> DefinitionKey:
+def definition_key(kind: str, schema: file.Schema | None) -> DefinitionKey:
     """Return the key of a definition of a type."""
-    return full_name(kind), "" if schema is None else schema.text
+    return file.full_name(kind), "" if schema is None else schema.text
 
 
 class Conversion(NamedTuple):
@@ -83,7 +76,7 @@ RewrittenTopics: TypeAlias = dict[tuple[str, DefinitionKey], RewrittenTopic]
 
 
 #: A type's name, and its definition where a recording has one.
-Recorded: TypeAlias = tuple[str, Schema | None]
+Recorded: TypeAlias = tuple[str, file.Schema | None]
 
 
 def check(
@@ -97,8 +90,8 @@ def check(
 
     `recorded` has the definitions of topics that were checked before, and is added to.
     """
-    if conversion.convert and encoding != CDR:
-        raise RecordingError(*other_encoding(topic, encoding))
+    if conversion.convert and encoding != file.CDR:
+        raise RecordingError(*file.other_encoding(topic, encoding))
     if conversion.old is not None:
         return
     kind, schema = definition
@@ -126,7 +119,7 @@ def converted(
         size += len(plain[-1])
         if size < BATCH and index < len(raws):
             continue
-        if why := unread_reason(topic, bytes(plain[0][:START])):
+        if why := file.unread_reason(topic, bytes(plain[0][: file.START])):
             raise RecordingError(*why)
         new = conversion.convert(plain, times[done:index])
         for was, payload in zip(raws[done:index], new, strict=True):

@@ -15,13 +15,7 @@ from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 
-from idlc.recordings.containers import records
-from idlc.recordings.containers.compression import (
-    MOST_IN_A_CHUNK,
-    DecompressionBudget,
-    compress,
-    decompress,
-)
+from idlc.recordings.containers import compression, mcap_writer, records
 from idlc.recordings.containers.conversion import (
     Conversion,
     Conversions,
@@ -37,13 +31,6 @@ from idlc.recordings.containers.conversion import (
 from idlc.recordings.containers.file import Schema, full_name, wrong_count
 from idlc.recordings.containers.mcap import FileStatistics, read_facts
 from idlc.recordings.containers.mcap_messages import MESSAGE, indexed_messages
-from idlc.recordings.containers.mcap_writer import (
-    Content,
-    McapWriter,
-    channel,
-    record,
-    schema,
-)
 from idlc.recordings.containers.messages import Raw
 from idlc.recordings.containers.records import (
     CHANNEL_OP,
@@ -113,7 +100,7 @@ class RewritePlan:
                 if not numbers[own]:
                     raise RecordingError("it has no number for another schema")
                 kept.add(numbers[own])
-                content = schema(numbers[own], own.name, own.encoding, own.text)
+                content = mcap_writer.schema(numbers[own], own.name, own.encoding, own.text)
                 self.contents[SCHEMA_OP, numbers[own]] = content
             self.schemas[number] = numbers[own]
             raw, digest = facts.raws[CHANNEL_OP, number], self.changed[number].type_hash
@@ -146,7 +133,7 @@ def _retyped(raw: bytes, schema_number: int, digest: str) -> bytes:
     metadata[HASH] = digest.encode()
     if not digest:
         del metadata[HASH]
-    return channel(number, schema_number, topic, encoding, metadata)
+    return mcap_writer.channel(number, schema_number, topic, encoding, metadata)
 
 
 #: A part of records, from one offset to another, and what takes its place.
@@ -168,10 +155,10 @@ class Rewriting:
         self.facts = facts
         self.damage = damage
         self.plan = plan
-        self.room = DecompressionBudget(source.size)
+        self.room = compression.DecompressionBudget(source.size)
         #: The schemas that are defined outside of chunks.
         self.known: set[int] = set()
-        self.writer = McapWriter(write, _has_checksum(source))
+        self.writer = mcap_writer.McapWriter(write, _has_checksum(source))
 
     def run(self, progress: Callable[[int], object]) -> None:
         """Write the whole file."""
@@ -179,7 +166,7 @@ class Rewriting:
         ended = False
         first = next(heads(self.source, start, self.source.size), None)
         if first is None or first[0] != records.HEADER_OP:
-            self.writer.write(record(records.HEADER_OP, bytes(8)))
+            self.writer.write(mcap_writer.record(records.HEADER_OP, bytes(8)))
         for op, at, size in sound_heads(self.source, end, self.source.size, self._skip):
             progress(at)
             is_loose = op == MESSAGE_OP or (op in (SCHEMA_OP, CHANNEL_OP) and not ended)
@@ -255,10 +242,10 @@ class Rewriting:
     def _loose(self, start: int, end: int) -> None:
         """Write records outside of chunks."""
         self._check_size(end - start)
-        content = Content(self.source.view(start, end - start), self.room)
+        content = mcap_writer.Content(self.source.view(start, end - start), self.room)
         self._define_channels(content)
         edits = self._edits(content, self.known)
-        self.writer.add(Content(_edited(content.data, edits)) if edits else content)
+        self.writer.add(mcap_writer.Content(_edited(content.data, edits)) if edits else content)
 
     def _decompressed(self, head: ChunkHead) -> tuple[memoryview, memoryview]:
         """Return the content of a chunk as it is stored, and decompressed."""
@@ -267,7 +254,7 @@ class Rewriting:
         if not head.compression and head.size == head.stored:
             return stored, stored
         data = memoryview(bytearray(head.size))
-        decompress(stored, head.compression, data)
+        compression.decompress(stored, head.compression, data)
         return stored, data
 
     def _chunk(self, at: int, size: int, is_proof_needed: bool = False) -> None:
@@ -288,21 +275,21 @@ class Rewriting:
             raise DamageError(f"the checksum of the chunk at byte {at} is wrong")
         is_cut = False
         try:
-            content = Content(data, self.room)
+            content = mcap_writer.Content(data, self.room)
         except DamageError as error:
             if crc:
                 raise
             # without a checksum, the messages before the damage are as good as any
             is_cut = True
             self.damage.add(error.message, at, at + size)
-            content = Content(memoryview(self._salvaged(at, data)), self.room)
+            content = mcap_writer.Content(memoryview(self._salvaged(at, data)), self.room)
         self._define_channels(content)
         edits = self._edits(content, set())
         if edits or is_cut:
             new = _edited(content.data, edits)
             self._check_size(len(new))
-            content, crc = Content(new), zlib.crc32(new)
-            stored = memoryview(compress(new, head.compression))
+            content, crc = mcap_writer.Content(new), zlib.crc32(new)
+            stored = memoryview(compression.compress(new, head.compression))
         self.writer.add_chunk(content, head.compression, stored, crc)
 
     @cached_property
@@ -322,7 +309,7 @@ class Rewriting:
         chunk = self._chunks.get(at)
         if chunk is not None:
             indexed = indexed_messages(self.source, chunk, data, self.facts.channels)
-            walked = set(Content(data[:sound], self.room).places.tolist())
+            walked = set(mcap_writer.Content(data[:sound], self.room).places.tolist())
             for start, stop in sorted(indexed):
                 # messages of damaged sizes may overlap
                 if start not in walked and size + stop - start <= 2 * len(data):
@@ -340,11 +327,12 @@ class Rewriting:
             self.writer.write(self.source.view(start, min(BLOCK, at + size - start)))
 
     def _check_size(self, size: int) -> None:
-        if size > MOST_IN_A_CHUNK:
-            what = f"messages that are together take {size:,} bytes, more than {MOST_IN_A_CHUNK:,}"
+        most = compression.MOST_IN_A_CHUNK
+        if size > most:
+            what = f"messages that are together take {size:,} bytes, more than {most:,}"
             raise RecordingError(what)
 
-    def _define_channels(self, content: Content) -> None:
+    def _define_channels(self, content: mcap_writer.Content) -> None:
         """Write definitions that only come later, or only the summary has."""
         inside = {own.number for own in content.definitions if own.op == CHANNEL_OP}
         for number in content.by_channel.keys() - inside:
@@ -360,9 +348,9 @@ class Rewriting:
             self._define(SCHEMA_OP, int.from_bytes(content[2:4], "little"))
         else:
             self.known.add(number)
-        self.writer.add(Content(record(op, content)))
+        self.writer.add(mcap_writer.Content(mcap_writer.record(op, content)))
 
-    def _edits(self, content: Content, known: set[int]) -> list[BytesEdit]:
+    def _edits(self, content: mcap_writer.Content, known: set[int]) -> list[BytesEdit]:
         """Return the changes of records; `known` are the schemas that need no definition."""
         edits: list[BytesEdit] = []
         for op, at, number, data in content.definitions:
@@ -374,7 +362,7 @@ class Rewriting:
             is_sound = self._is_sound(op, data)
             new = self._definition(op, number, known)
             if new is None and not is_sound:
-                new = record(op, self.plan.contents[op, number])
+                new = mcap_writer.record(op, self.plan.contents[op, number])
             end = at + HEAD.size + len(data)
             if new is not None and new != content.data[at:end]:
                 edits.append((at, end, new))
@@ -403,18 +391,18 @@ class Rewriting:
                 return b""
             known.add(number)
             is_new = plan.contents[op, number] != self.facts.raws[op, number]
-            return record(op, plan.contents[op, number]) if is_new else None
+            return mcap_writer.record(op, plan.contents[op, number]) if is_new else None
         if number not in plan.changed:
             return None
-        new, own = record(op, plan.contents[op, number]), plan.schemas[number]
+        new, own = mcap_writer.record(op, plan.contents[op, number]), plan.schemas[number]
         if own not in known:
             known.add(own)
             is_new = plan.contents[SCHEMA_OP, own] != self.facts.raws.get((SCHEMA_OP, own))
             if is_new or (SCHEMA_OP, own) not in self.writer.definitions:
-                new = record(SCHEMA_OP, plan.contents[SCHEMA_OP, own]) + new
+                new = mcap_writer.record(SCHEMA_OP, plan.contents[SCHEMA_OP, own]) + new
         return new
 
-    def _messages(self, content: Content) -> Iterator[BytesEdit]:
+    def _messages(self, content: mcap_writer.Content) -> Iterator[BytesEdit]:
         """Yield the messages with new payloads, and those of channels without a definition."""
         for number in content.by_channel.keys() - self.facts.channels.keys():
             mine = content.by_channel[number]

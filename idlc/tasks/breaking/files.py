@@ -18,16 +18,8 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, ReportedError, first_few
 from idlc.model import ir
 from idlc.model.link import Model
-from idlc.project import git, inputs, lock
+from idlc.project import find, git, inputs, lock
 from idlc.project.files import entries, is_file, is_folder
-from idlc.project.find import (
-    KIND_FOLDERS,
-    RULES,
-    InterfaceFile,
-    find,
-    list_files,
-    no_interfaces,
-)
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
@@ -99,14 +91,14 @@ class Verdict(NamedTuple):
 def breaking(options: BreakingOptions, report: Report) -> Verdict:
     """Report each change that breaks something; ReportedError if a version cannot be compiled."""
     root, exclude = options.scope.root, options.scope.exclude
-    listing = list_files(options.paths, root, report, exclude)
+    listing = find.list_files(options.paths, root, report, exclude)
     packages = inputs.packages(listing.files, options.scope, report)
     report.raise_errors()
     version = read_version(options.against, root)
     comparison = _against(options, version, packages, report)
     # an empty folder is fine if its interfaces were removed; errors may be why it seems empty
     if listing.empty and not (comparison.differs or report.had_errors):
-        report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
+        report.extend(find.no_interfaces(path, root, exclude) for path in listing.empty)
         raise ReportedError
     is_complete = not comparison.skipped
     skipped = report_skipped(comparison.skipped, options, report)
@@ -272,7 +264,7 @@ def _compare(
             for package in {**old, **new}
         )
     homes = [folder for package in packages for folder in package.folders]
-    if any(is_folder(home / RULES) for home in homes):
+    if any(is_folder(home / find.RULES) for home in homes):
         from idlc.versions.coverage import rule_folders, with_rules
 
         places = rule_folders(homes)
@@ -314,7 +306,7 @@ def _before(
     skipped: Sequence[Skipped] = ()
     problems = Report()
     if revision is None:
-        files = find([options.against], scope.root, report, scope.exclude)
+        files = find.find([options.against], scope.root, report, scope.exclude)
         old = inputs.packages(files, scope, problems)
     else:
         files = revision.files(options.paths, scope.exclude, report)
@@ -354,7 +346,7 @@ def _before(
 
 def _moved(
     packages: Packages, old: Packages, revision: Revision, options: BreakingOptions
-) -> tuple[tuple[InterfaceFile, ...], list[Skipped]]:
+) -> tuple[tuple[find.InterfaceFile, ...], list[Skipped]]:
     """Return files of packages that were outside of the paths, and interfaces without a history.
 
     Packages are found by their names. If several had the name, the one that is gone has moved.
@@ -368,7 +360,7 @@ def _moved(
     candidates = _candidates(revision, scope)
     present = {package.package for package in old}
     submodules = {*revision.unknown([top])}.difference(revision.unknown(options.paths))
-    moved: list[InterfaceFile] = []
+    moved: list[find.InterfaceFile] = []
     skipped: list[Skipped] = []
     for package in packages:
         names = missing.get(package.package)
@@ -396,11 +388,11 @@ def _moved(
 
 def _candidates(
     revision: Revision, scope: Scope
-) -> Mapping[str, list[tuple[Inputs, Sequence[InterfaceFile]]]]:
+) -> Mapping[str, list[tuple[Inputs, Sequence[find.InterfaceFile]]]]:
     """Return the packages of a whole revision by name, with their files."""
     files = revision.files([revision.top.as_posix()], scope.exclude, Report())
     unnamed = msgspec.structs.replace(scope, package=None)
-    candidates: dict[str, list[tuple[Inputs, Sequence[InterfaceFile]]]] = {}
+    candidates: dict[str, list[tuple[Inputs, Sequence[find.InterfaceFile]]]] = {}
     for group in by_home(files, scope.root).values():
         for package in inputs.packages(group, unnamed, Report()):
             candidates.setdefault(package.package, []).append((package, group))
@@ -408,8 +400,8 @@ def _candidates(
 
 
 def _moved_files(
-    files: Iterable[InterfaceFile], names: AbstractSet[ir.TypeName], parts: Collection[Path]
-) -> Iterator[InterfaceFile]:
+    files: Iterable[find.InterfaceFile], names: AbstractSet[ir.TypeName], parts: Collection[Path]
+) -> Iterator[find.InterfaceFile]:
     """Yield the files with these interfaces, and all files in these parts of the package."""
     for file in files:
         package = next(iter(names)).package
@@ -441,7 +433,7 @@ def _beside(packages: Packages, old: Packages, scope: Scope) -> Iterator[str]:
 
 
 def _is_package(folder: Path) -> bool:
-    return is_file(folder / MANIFEST) or any(is_folder(folder / kind) for kind in KIND_FOLDERS)
+    return is_file(folder / MANIFEST) or any(is_folder(folder / kind) for kind in find.KIND_FOLDERS)
 
 
 def _newer_scope(options: BreakingOptions) -> Scope:
@@ -463,7 +455,10 @@ def _common(path: Path, other: Path) -> int:
 
 
 def _side(
-    packages: Packages, files: Mapping[Path, Sequence[InterfaceFile]], scope: Scope, report: Report
+    packages: Packages,
+    files: Mapping[Path, Sequence[find.InterfaceFile]],
+    scope: Scope,
+    report: Report,
 ) -> Side:
     """Compile one version; `files` are all files by package, including unread ones."""
     compiled = {
@@ -509,7 +504,7 @@ def _compare_with_lock(options: BreakingOptions, packages: Packages, report: Rep
     mine = [package for package in packages if package.package == record.package]
     if len(packages) == 1 and not mine:
         named = msgspec.structs.replace(options.scope, package=record.package)
-        files = find(options.paths, named.root, report, named.exclude)
+        files = find.find(options.paths, named.root, report, named.exclude)
         mine = list(inputs.packages(files, named, report))
     others = [package for package in packages if len(packages) > 1 and package not in mine]
     models = error_free_models([*mine, *others], options.scope, report)

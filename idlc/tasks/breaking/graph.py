@@ -28,14 +28,7 @@ from idlc.project.settings import Scope
 from idlc.project.words import is_address
 from idlc.robot.keys import Entity as RobotEntity
 from idlc.robot.keys import EntityKind
-from idlc.robot.live.connect import (
-    DROPPED,
-    MOST_OPEN,
-    TOPICS,
-    connected,
-    place_of,
-    robot_entities,
-)
+from idlc.robot.live import connect
 from idlc.robot.live.graph import (
     Answer,
     Communication,
@@ -225,7 +218,7 @@ class _Calls:
         for question, (future, since) in [*self._open.items()]:
             if future.done():
                 self.results[question] = future.result()
-            if future.done() or now - since > DROPPED:
+            if future.done() or now - since > connect.DROPPED:
                 del self._open[question]
                 self._clients[question.node].remove_pending_request(future)
 
@@ -236,7 +229,7 @@ class _Calls:
             node, name, hash_ = question
             is_due = question not in self.results and question not in self._open
             client = self._clients[node]
-            if is_due and counts[node] < MOST_OPEN and _is_ready(client):
+            if is_due and counts[node] < connect.MOST_OPEN and _is_ready(client):
                 request = self._service.Request(
                     type_name=name, type_hash=hash_, include_type_sources=True
                 )
@@ -256,7 +249,7 @@ class RobotGraph:
     def endpoints(self, patience: float) -> tuple[GraphEndpoint, ...]:
         """Return all ends of topics, services and actions, after waiting for the first one."""
         self._session.graph.wait_for(lambda graph: graph.entities(), patience)
-        entities = robot_entities(self._session)
+        entities = connect.robot_entities(self._session)
         return tuple(sorted({each for end in entities for each in _robot_endpoints(end)}))
 
     def ask(self, questions: Iterable[TypeQuestion], patience: float) -> dict[TypeQuestion, Answer]:
@@ -265,14 +258,14 @@ class RobotGraph:
 
 
 def _robot_endpoints(end: RobotEntity) -> Iterator[GraphEndpoint]:
-    noun, name, _ = place_of(end)
+    noun, name, _ = connect.place_of(end)
     sends = end.kind in (EntityKind.PUBLISHER, EntityKind.CLIENT)
     role: EndpointRole = (
         "server" if end.kind in (EntityKind.PUBLISHER, EntityKind.SERVICE) else "client"
     )
     if noun == "topic":
         role = "publisher" if sends else "subscription"
-    if end.kind in TOPICS:
+    if end.kind in connect.TOPICS:
         yield GraphEndpoint(end.node_name, noun, name, role, sends, end.type, end.hash)
     elif end.kind is not EntityKind.NODE:
         for suffix, direction in (("_Request", sends), ("_Response", not sends)):
@@ -331,7 +324,9 @@ def compare_with_graph(
     local_models = error_free_models(packages, scope, report).values()
     report.raise_errors()
     is_robot = is_address(options.against)
-    joined = connected(options.against, report, patience) if is_robot else join_graph(report)
+    joined = (
+        connect.connected(options.against, report, patience) if is_robot else join_graph(report)
+    )
     with joined as view:
         graph = RobotGraph(view) if isinstance(view, Session) else view
         if graph is None:

@@ -33,19 +33,13 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.words import is_address, read_version
 from idlc.recordings.columns import unread_bytes
+from idlc.recordings.containers import conversion
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.conversion import (
-    Conversion,
-    Conversions,
-    DefinitionKey,
-    RewrittenTopic,
-    definition_key,
-)
 from idlc.recordings.containers.file import CDR, MSG
 from idlc.recordings.containers.messages import ALWAYS
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import definition_text, interface_of
-from idlc.recordings.lengths import SAMPLE, check_lengths, first_longer, wrong_definition
+from idlc.recordings.lengths import check_lengths, first_longer, sample, wrong_definition
 from idlc.recordings.load import TopicType, known_versions
 from idlc.recordings.types import (
     NAMED,
@@ -100,7 +94,7 @@ class TopicPlan(NamedTuple):
     topic: str
     type: str
     plan: Plan | None
-    definition: DefinitionKey = ("", "")
+    definition: conversion.DefinitionKey = ("", "")
     several: bool = False
 
     @property
@@ -116,7 +110,7 @@ class TopicPlan(NamedTuple):
         """The worst fate of any field."""
         return "lost" if self.plan is None else self.plan.fate
 
-    def rewritten(self, written: Rewritten) -> RewrittenTopic | None:
+    def rewritten(self, written: Rewritten) -> conversion.RewrittenTopic | None:
         """Return the fate of these messages in a recording that was written."""
         if self.several:
             return written.definitions.get((self.topic, self.definition))
@@ -128,7 +122,7 @@ class UndefinedTopic(NamedTuple):
 
     topic: str
     version: Version
-    definition: DefinitionKey
+    definition: conversion.DefinitionKey
     several: bool = False
 
 
@@ -280,11 +274,7 @@ def _check_lengths(
             if topic.encoding != CDR or typed.name not in models[package].messages:
                 continue
             structure = TopicType(models, typed.name).structure
-            raws: list[Any] = []
-            for batch in container.messages(topic, ALWAYS):
-                raws += batch.first_views(SAMPLE - len(raws))
-                if len(raws) >= SAMPLE:
-                    break
+            raws = sample(container.messages(topic, ALWAYS))
             unread = unread_bytes(structure, raws)
             hint: str | None = wrong_definition(topic, option=FROM)
             problem = ""
@@ -317,7 +307,7 @@ def _of_types(
             known.append((topic, old, name))
         elif target.defines(topic.name.package):
             recorded = topic.recorded.topic
-            key = definition_key(recorded.type, recorded.schema)
+            key = conversion.definition_key(recorded.type, recorded.schema)
             yield TopicPlan(recording, recorded.name, str(topic.name), None, key)
     models = compiled(compiler, {interface_of(name) for *_, name in known}, report)
     plans: dict[tuple[ir.TypeName, ir.TypeName], Plan | None] = {}
@@ -328,7 +318,7 @@ def _of_types(
             is_same = is_same and not _renumbers(old, new)
             plans[topic.name, name] = None if is_same else make_plan(old, new, rules)
         plan, recorded = plans[topic.name, name], topic.recorded.topic
-        key = definition_key(recorded.type, recorded.schema)
+        key = conversion.definition_key(recorded.type, recorded.schema)
         if plan is not None:
             yield TopicPlan(recording, recorded.name, str(topic.name), plan, key)
         elif recorded.schema is None:
@@ -478,11 +468,11 @@ def _has_db3(path: Path) -> bool:
 
 def _conversions(
     plans: Iterable[TopicPlan], undefined: Iterable[UndefinedTopic], run: RunRules
-) -> Conversions:
+) -> conversion.Conversions:
     """Return the conversions of each topic; raise UpgradeError if rules cannot be run."""
-    conversions: dict[str, Conversion | tuple[Conversion, ...]] = {}
+    conversions: dict[str, conversion.Conversion | tuple[conversion.Conversion, ...]] = {}
 
-    def add(entry: TopicPlan | UndefinedTopic, own: Conversion) -> None:
+    def add(entry: TopicPlan | UndefinedTopic, own: conversion.Conversion) -> None:
         if not entry.several:
             conversions[entry.topic] = own
             return
@@ -492,7 +482,7 @@ def _conversions(
 
     for topic in undefined:
         key, text = topic.version.key, definition_of(topic.version)
-        add(topic, Conversion(key.type, MSG, text, key.hash))
+        add(topic, conversion.Conversion(key.type, MSG, text, key.hash))
     ways: dict[int, Payloads] = {}
     for entry in plans:
         plan = entry.plan
@@ -504,7 +494,7 @@ def _conversions(
             structure = TopicType(dict(plan.old.models), plan.old.name).structure
             convert = partial(converted, way, structure, entry.topic)
         definition, new = definition_of(plan.new), plan.new.key
-        add(entry, Conversion(new.type, MSG, definition, new.hash, convert))
+        add(entry, conversion.Conversion(new.type, MSG, definition, new.hash, convert))
     return conversions
 
 

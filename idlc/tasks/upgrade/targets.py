@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
+
+import msgspec
 
 from idlc.api.sources import read_source
 from idlc.compiler.compiler import Compiler, sources_of
@@ -13,15 +15,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import Distro
-from idlc.project import inputs
-from idlc.project.find import (
-    Exclusions,
-    FileListing,
-    InterfaceFile,
-    list_files,
-    no_interfaces,
-    unread_idl,
-)
+from idlc.project import find, inputs
 from idlc.project.library import IDL, InterfaceTexts, Library
 from idlc.project.package_xml import declared_name
 from idlc.project.settings import Scope
@@ -56,26 +50,18 @@ class _NewTypes(Library):
         return super().source(name) or self._recorded.get(name)
 
 
-class UpgradeTarget:
+class UpgradeTarget(msgspec.Struct, frozen=True, eq=False):
     """The types to upgrade to.
 
     `texts` are those of its own packages, whose folders are `homes`; `distro` is the distribution
     that it is. Without both it is this machine's types.
     """
 
-    def __init__(
-        self,
-        scope: Scope,
-        texts: InterfaceTexts,
-        homes: Mapping[str, Path],
-        whole: frozenset[str] = frozenset(),
-        distro: Distro | None = None,
-    ) -> None:
-        self.scope = scope
-        self.texts = texts
-        self.homes = dict(homes)
-        self.distro = distro
-        self.whole = whole
+    scope: Scope
+    texts: InterfaceTexts
+    homes: dict[str, Path]
+    whole: frozenset[str] = frozenset()
+    distro: Distro | None = None
 
     def defines(self, package: str) -> bool:
         """Return whether the target has all interfaces of a package, so that others are gone."""
@@ -134,16 +120,16 @@ def _of_recording(path: str, scope: Scope, report: Report) -> UpgradeTarget:
 
 def _of_path(path: str, scope: Scope, report: Report) -> UpgradeTarget:
     """Return the types of an interface file, or of all packages in a folder."""
-    listing = list_files([path], scope.root, report, scope.exclude)
+    listing = find.list_files([path], scope.root, report, scope.exclude)
     target = _of_listing(listing, scope.exclude, scope.root.shown, scope, report)
     if not target.texts:
-        report.extend(no_interfaces(each, scope.root, scope.exclude) for each in listing.empty)
+        report.extend(find.no_interfaces(each, scope.root, scope.exclude) for each in listing.empty)
     return target
 
 
 def _of_listing(
-    listing: FileListing,
-    exclude: Exclusions,
+    listing: find.FileListing,
+    exclude: find.Exclusions,
     shown: Callable[[Path], str],
     scope: Scope,
     report: Report,
@@ -156,7 +142,7 @@ def _of_listing(
         manifest = root.manifest(folder)
         declared = declared_name(manifest, root, Report()) if manifest else None
         package = declared or folder.name
-        for name in unread_idl([folder], exclude):
+        for name in find.unread_idl([folder], exclude):
             kind, _, file = name.partition("/")
             source = root.read_source(folder / name, shown(folder / name), report)
             if source is not None:
@@ -170,7 +156,7 @@ def _of_listing(
     return UpgradeTarget(scope, texts, homes | target.homes, target.whole | homes.keys())
 
 
-def _of_files(files: tuple[InterfaceFile, ...], scope: Scope, report: Report) -> UpgradeTarget:
+def _of_files(files: tuple[find.InterfaceFile, ...], scope: Scope, report: Report) -> UpgradeTarget:
     packages = inputs.packages(files, scope, report)
     texts = {name: source for package in packages for name, source in sources_of(package, report)}
     report.raise_errors()
