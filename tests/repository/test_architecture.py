@@ -41,7 +41,7 @@ SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 #: The pages that name the tests which hold the house.
 HOUSE_PAGES = ("architecture.md", "contributing/type-support.md", "contributing/tests.md")
 
-MOST_MODULES = 319
+MOST_MODULES = 318
 MOST_IN_A_FOLDER = 15
 #: The share of the imports of idlc's own modules that stands in functions.
 MOST_IN_FUNCTIONS = 0.05
