@@ -144,6 +144,13 @@ def test_the_text_must_define_what_it_is_said_to():
     assert [(one.code, one.span.text) for one in report] == [("IDL114", "other")]
 
 
+def test_a_module_of_another_package_is_not_reported_as_missing_as_well():
+    report = Report()
+    text = "module other { module srv { struct A_Request { int32 a; }; }; };"
+    lower(parse_any(Source("x.idl", text)), ir.TypeName("demo", "srv", "A"), report)
+    assert [(problem.code, problem.span.text) for problem in report] == [("IDL114", "other")]
+
+
 def test_a_name_of_a_type_may_be_defined_after_its_uses():
     found, problems = read("struct Example { a__2 b; }; typedef int32 a__2[2];")
     assert problems == []

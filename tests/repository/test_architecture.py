@@ -41,7 +41,7 @@ SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 #: The pages that name the tests which hold the house.
 HOUSE_PAGES = ("architecture.md", "contributing/type-support.md", "contributing/tests.md")
 
-MOST_MODULES = 318
+MOST_MODULES = 319
 MOST_IN_A_FOLDER = 15
 #: The share of the imports of idlc's own modules that stands in functions.
 MOST_IN_FUNCTIONS = 0.05
@@ -54,7 +54,7 @@ OFFERED_AT_ONCE = {"runtime", "build", "robot"}
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
 #: What of the core reads files of idlc: the grammars, the catalogue.
-READS_ITS_OWN = {"idlc.language.definition", "idlc.language.parse", "idlc.model.catalog"}
+READS_ITS_OWN = {"idlc.language.definition", "idlc.language.idl", "idlc.model.catalog"}
 #: What prints besides `cli` -> why.
 PRINTS = {
     "idlc.build.setup_command": "a build that pip runs has no other way to say why it stops",

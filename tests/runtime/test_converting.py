@@ -16,6 +16,7 @@ FILES = {
     "msg/Lists.msg": "string[] names\nInner[] inners\nbool[2] flags\nbyte[] raw\n"
     "wstring[<=3] wide\nfloat64[] numbers\nint32[2] pair\nInner inner\n",
 }
+SERVICE = {"srv/Ask.srv": "int32 a\n---\nint32 b\n"}
 LISTS = {
     "names": ["a", "b"],
     "wide": ["a", "b"],
@@ -31,7 +32,8 @@ def kinds(tmp_path_factory):
     folder = tmp_path_factory.mktemp("classes")
     for distro in DISTROS:
         package = f"of_{distro.name}"
-        generated.write_model(folder, generated.model_of(package, FILES, distro))
+        files = FILES | SERVICE if distro.converts_values else FILES
+        generated.write_model(folder, generated.model_of(package, files, distro))
     with generated.importable(folder):
         yield lambda distro, name: generated.class_of(f"of_{distro}/msg/{name}")
 
@@ -54,6 +56,16 @@ def test_none_is_the_default_of_every_field(kinds, distro, options):
         assert kind(*[None] * len(kind.__match_args__), **options) == kind()
     message = kinds(distro, "Scalars")(**options)
     assert [message.text, message.number, message.flag] == ["t", 5, True]
+
+
+@CONVERTING
+def test_the_lists_of_an_event_take_any_iterable(kinds, distro):
+    service = generated.class_of(f"of_{distro}/srv/Ask")
+    for make in (tuple, deque, iter):
+        event = service.Event(request=make([service.Request(a=1)]))
+        assert event.request == [service.Request(a=1)]
+        event.response = make([service.Response(b=2)])
+        assert event.response == [service.Response(b=2)]
 
 
 @CONVERTING

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import takewhile
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
 
@@ -13,7 +13,6 @@ from idlc.diagnostics.report import Edit, Report
 from idlc.diagnostics.source import Span
 from idlc.language import tree
 from idlc.language.escapes import EscapeError, through_idl
-from idlc.language.parse import IdlFile
 from idlc.language.tree import Fault
 from idlc.model import ir, names
 from idlc.model.comments import Comment, condense, problem
@@ -21,6 +20,10 @@ from idlc.model.distros import DEFAULT, Distro
 from idlc.model.lowering import lower_types
 from idlc.model.lowering.lower_types import STRINGS, as_parsed, fault_at, lower_type
 from idlc.model.lowering.lower_values import default, scalar
+
+if TYPE_CHECKING:
+    from idlc.language import idl
+
 
 #: A definition on its line, the lines whose comments belong to it, and whether it is `@optional`.
 _Element: TypeAlias = tuple[tree.Line, tree.Field | tree.Constant, list[tree.Line], bool]
@@ -256,7 +259,7 @@ _NUMBERS = ("no", "one", "two")
 
 
 def lower(
-    file: tree.File | IdlFile, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
+    file: tree.File | idl.IdlFile, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
 ) -> ir.Interface:
     """Return the interface that a file defines for a distribution; missing sections are empty.
 

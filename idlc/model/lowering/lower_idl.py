@@ -18,7 +18,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import including
 from idlc.language.escapes import inside_literal
-from idlc.language.parse import IdlFile
+from idlc.language.idl import IdlFile
 from idlc.language.tree import OPTIONAL, Fault, Piece, piece
 from idlc.model import ir, names
 from idlc.model.lowering import lower_types, lower_values
