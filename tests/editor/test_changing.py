@@ -237,7 +237,7 @@ def test_an_interface_is_renamed_with_its_file_and_users(opened):
     ("line", "character", "new", "why"),
     [
         (2, 9, "Speed", "is not a valid name"),
-        (2, 9, "mode", "already"),
+        (2, 9, "mode", "`mode` already exists"),
         (0, 7, "fast", "is not a valid name"),
     ],
 )

@@ -12,6 +12,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
+from idlc.model.distros import BY_NAME
 from idlc.model.idl_text import file_text, idl
 from idlc.model.link import link
 from idlc.model.lowering.lower import lower
@@ -19,6 +20,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
 from idlc.recordings.definitions import RECORDING, ROBOT, mcap_text, read_definition, type_name
+from idlc.recordings.lengths import wrong_definition
 from idlc.recordings.types import LocalTypes, contradictions, recorded_types, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
@@ -346,3 +348,18 @@ def test_problems_name_where_definitions_come_from(case, origin):
     assert not [words for words in other if words in said]
     if "same name" in said:
         assert f"check that it equals {origin.type}; `distro=NAME` or" in problem.hint
+
+
+@pytest.mark.parametrize(
+    ("distro", "option", "hint"),
+    [
+        (None, "", "choose the publisher's version with `distro=` or `include=`"),
+        (None, "--from", "choose the publisher's version with `--from`"),
+        (BY_NAME["humble"], "", "use `distro='humble'`"),
+        (BY_NAME["humble"], "--from", "use `--from distro:humble`"),
+    ],
+)
+def test_what_to_do_where_a_recording_without_definitions_is_of_another_version(
+    distro, option, hint
+):
+    assert wrong_definition(Topic("/a", "demo/msg/A", 1, None, "cdr", None), distro, option) == hint

@@ -144,8 +144,8 @@ class Service(_Introspected, Generic[RequestT, ResponseT]):
 
     async def _answer(self, request: Request, attachment: Attachment, message: RequestT) -> None:
         kind = self.interface.kind.Response
-        self.report(_EventType.REQUEST_RECEIVED, attachment, message)
         try:
+            self.report(_EventType.REQUEST_RECEIVED, attachment, message)
             response = await call(self.callback, message, kind())
             payload = self.encode(kind, response)
             # first, as a client in this process receives the response at once
