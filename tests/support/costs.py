@@ -27,8 +27,7 @@ TABLE = ROOT / "tests/costs.tsv"
 QUICK = 0.1
 LONG = 0.4
 TIERS = ("quick", "test", "long")
-#: CPU-seconds above which a test is costly. With `--turn`, it runs in one of so many turns.
-COSTLY = 1.0
+#: With `--turn`, a long test runs in one of so many turns.
 TURNS = 3
 #: The names of all tests of a run, before any is left out.
 COLLECTED = pytest.StashKey[set[str]]()
@@ -86,9 +85,9 @@ def tiers(item: pytest.Item) -> set[str]:
 
 
 def is_due(test: str, turn: int) -> bool:
-    """Return whether a test runs in a turn. Costly tests of one file share fixtures, and turns."""
+    """Return whether a test runs in a turn. Long tests of one file share fixtures, and turns."""
     file = test.partition("::")[0]
-    return committed().of(test) <= COSTLY or (crc32(file.encode()) + turn) % TURNS == 0
+    return committed().tier(test) != "long" or (crc32(file.encode()) + turn) % TURNS == 0
 
 
 class Meter:
