@@ -27,6 +27,7 @@ ARCHIVES, SHOWN = (text for info, text in FENCES if not info)
 HATCHLING = FILES["pyproject.toml"].partition("\n[project]")[0]
 
 
+@pytest.mark.timeout(900)  # it makes four environments and builds in each
 @pytest.mark.parametrize("backend", ["hatchling", "setuptools"])
 def test_the_page_can_be_followed(backend, distributions, tmp_path, lonely_environment):
     """One test, as building takes longest."""
