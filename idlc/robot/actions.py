@@ -147,8 +147,6 @@ class ActionServer:
         self._cancel_callback = cancel_callback or (lambda _: CancelResponse.REJECT)
         self._timeout = result_timeout if result_timeout >= 0 else math.inf
         self._goals: dict[bytes, ServerGoalHandle] = {}
-        #: By its id, each response that accepts a goal and is not sent yet, and the goal.
-        self._new_goals: dict[int, tuple[Any, ServerGoalHandle]] = {}
         #: For the states of goals, which are published in the order in which they change.
         self.lock = RLock()
         names, impl = action_names(node.resolve_service_name(action_name)), action_type.Impl
@@ -215,15 +213,15 @@ class ActionServer:
         if answer is GoalResponse.ACCEPT and key not in self._goals:
             response.accepted = True
             response.stamp = self._node.get_clock().now().to_msg()
-            goal = self._goals[key] = ServerGoalHandle(self, request, response.stamp)
+            self._goals[key] = ServerGoalHandle(self, request, response.stamp)
             self.publish_status()
-            self._new_goals[id(response)] = response, goal
         return response
 
-    async def _begin(self, response: Any) -> None:
+    async def _begin(self, request: Any, response: Any) -> None:
         """Begin a new goal; its client knows by now that it is accepted."""
-        if (accepted := self._new_goals.pop(id(response), None)) is not None:
-            await _result_of(self._accepted_callback(accepted[1]))
+        goal = self._goals.get(bytes(request.goal_id.uuid)) if response.accepted else None
+        if goal is not None:
+            await _result_of(self._accepted_callback(goal))
 
     async def _answer_result(self, request: Any, response: Any) -> Any:
         goal = self._kept_goals().get(bytes(request.goal_id.uuid))

@@ -14,7 +14,6 @@ from idlc.robot.nodes.interfaces import standard
 
 #: The types of numpy by the constants of PointField.
 _TYPES = dict(enumerate("i1 u1 i2 u2 i4 u4 f4 f8".split(), 1))
-_FLOAT32 = 7
 
 
 def _point_type(fields: Iterable[Any], point_step: int | None = None) -> Any:
@@ -96,7 +95,7 @@ def create_cloud_xyz32(header: Any, points: Any) -> Any:
     """Return a PointCloud2 with x, y and z."""
     kind = standard("sensor_msgs/msg/PointField").kind
     fields = [
-        kind(name=name, offset=offset, datatype=_FLOAT32, count=1)
+        kind(name=name, offset=offset, datatype=kind.FLOAT32, count=1)
         for name, offset in (("x", 0), ("y", 4), ("z", 8))
     ]
     return create_cloud(header, fields, points)

@@ -8,7 +8,7 @@ from concurrent import futures
 from enum import IntEnum
 from functools import partial
 from itertools import count
-from typing import Any, ClassVar, Generic
+from typing import Any, ClassVar, Generic, Literal, TypeAlias
 
 from msgspec.structs import replace
 
@@ -33,21 +33,18 @@ _TICK = 0.5
 MOST_OPEN = 10_000
 
 
+#: The constants of service_msgs/msg/ServiceEventInfo.
+_EventType: TypeAlias = Literal[
+    "REQUEST_SENT", "REQUEST_RECEIVED", "RESPONSE_SENT", "RESPONSE_RECEIVED"
+]
+
+
 class ServiceIntrospectionState(IntEnum):
     """The content of events: none are published, or without messages, or with messages."""
 
     OFF = 0
     METADATA = 1
     CONTENTS = 2
-
-
-class _EventType(IntEnum):
-    """The numbers of service_msgs/msg/ServiceEventInfo."""
-
-    REQUEST_SENT = 0
-    REQUEST_RECEIVED = 1
-    RESPONSE_SENT = 2
-    RESPONSE_RECEIVED = 3
 
 
 class _Introspected(Endpoint):
@@ -74,19 +71,19 @@ class _Introspected(Endpoint):
             has_contents = introspection_state is ServiceIntrospectionState.CONTENTS
             self._introspection = publisher, clock, has_contents
 
-    def report(self, type_: _EventType, call: Attachment, message: Any) -> None:
+    def report(self, event_type: _EventType, call: Attachment, message: Any) -> None:
         """Publish an event about a request or response of a call."""
         if self._introspection is None:
             return
         publisher, clock, has_contents = self._introspection
         event = publisher.interface.kind()
-        event.info.event_type = type_
+        event.info.event_type = getattr(event.info, event_type)
         event.info.stamp = clock.now().to_msg()
         event.info.client_gid = [*call.gid]
         event.info.sequence_number = call.sequence
         if has_contents:
-            is_request = type_ in (_EventType.REQUEST_SENT, _EventType.REQUEST_RECEIVED)
-            setattr(event, "request" if is_request else "response", [message])
+            field = "request" if event_type.startswith("REQUEST") else "response"
+            setattr(event, field, [message])
         publisher.publish(event)
 
     def destroy(self) -> None:
@@ -102,8 +99,8 @@ class Service(_Introspected, Generic[RequestT, ResponseT]):
     kind = EntityKind.SERVICE
     #: The requests that wait, if these are more than the announced depth.
     depth: ClassVar[int] = 0
-    #: Called with each response when it has been sent.
-    after_response: Callable[[ResponseT], Any] | None = None
+    #: Called with each request and its response when the response has been sent.
+    after_response: Callable[[RequestT, ResponseT], Any] | None = None
 
     def open(self) -> tuple[Closeable, ...]:
         """Declare the service."""
@@ -145,11 +142,11 @@ class Service(_Introspected, Generic[RequestT, ResponseT]):
     async def _answer(self, request: Request, attachment: Attachment, message: RequestT) -> None:
         kind = self.interface.kind.Response
         try:
-            self.report(_EventType.REQUEST_RECEIVED, attachment, message)
+            self.report("REQUEST_RECEIVED", attachment, message)
             response = await call(self.callback, message, kind())
             payload = self.encode(kind, response)
             # first, as a client in this process receives the response at once
-            self.report(_EventType.RESPONSE_SENT, attachment, response)
+            self.report("RESPONSE_SENT", attachment, response)
             request.reply(payload, pack_attachment(*attachment._replace(time=time.time_ns())))
         except BaseException:
             request.drop()
@@ -157,7 +154,7 @@ class Service(_Introspected, Generic[RequestT, ResponseT]):
         finally:
             self._open.discard(id(request))
         if self.after_response is not None:
-            await call(self.after_response, response)
+            await call(self.after_response, message, response)
 
     def destroy(self) -> None:
         """Withdraw the service; requests in the queue get no response."""
@@ -213,7 +210,7 @@ class Client(_Introspected, Generic[RequestT, ResponseT]):
         except Exception as error:
             future.cancel()
             raise RobotError(f"`{self.srv_name}`: {one_line(str(error))}") from None
-        self.report(_EventType.REQUEST_SENT, attachment, request)
+        self.report("REQUEST_SENT", attachment, request)
         return future
 
     def _receive(self, number: int, sample: Sample | None) -> None:
@@ -243,7 +240,7 @@ class Client(_Introspected, Generic[RequestT, ResponseT]):
             problem = f"sent data that is not its response: {one_line(str(error))}"
             future.set_exception(RobotError(f"`{self.srv_name}` {problem}"))
             return
-        self.report(_EventType.RESPONSE_RECEIVED, attachment, response)
+        self.report("RESPONSE_RECEIVED", attachment, response)
         future.set_result(response)
 
     def service_is_ready(self) -> bool:
