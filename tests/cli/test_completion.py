@@ -1,14 +1,17 @@
 """Completion in shells: click's protocol in a process of its own, and a real bash."""
 
+import inspect
 import os
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 
-from idlc.cli.app import COMMANDS
+from idlc.cli.app import COMMANDS, app
+from idlc.cli.run import completion
 from idlc.diagnostics.codes import CODES
 from tests.support import recorded_text
 
@@ -54,6 +57,22 @@ def complete(*words):
     """Return what is offered besides files."""
     lines = [line.partition(",") for line in ask("bash", *words).splitlines()]
     return [value for kind, _, value in lines if kind == "plain"]
+
+
+def parameters(command):
+    """Yield the parameters of a command and of those below it."""
+    yield from command.params
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            yield from parameters(command.get_command(context, name))
+
+
+def test_each_function_that_completes_exists():
+    offers = [each._custom_shell_complete for each in parameters(app)]
+    variables = [inspect.getclosurevars(offer).nonlocals for offer in offers if offer]
+    names = {each["by"] for each in variables if "by" in each}
+    assert {"topics", "robot_names", "endpoint"} <= names <= vars(completion).keys()
 
 
 def test_commands_options_and_choices_are_completed():
