@@ -1,6 +1,6 @@
-"""The content of a wheel: classes, files that tools of ROS 2 look for, and a `[project]` table.
+"""The content of a wheel: classes, files that tools of ROS 2 look for, and metadata.
 
-The table has what package.xml declares.
+The metadata is a `[project]` table of what package.xml declares.
 """
 
 from __future__ import annotations
@@ -134,6 +134,11 @@ _VERSION = re.compile(r"\d+\.\d+\.\d+", re.ASCII)
 _ADDRESS = re.compile(r"[\w.+-]+@[\w-]+(\.[\w-]+)*", re.ASCII)
 _URLS = {"website": "Homepage", "repository": "Repository", "bugtracker": "Issues"}
 _READMES = ("README.md", "README.rst", "README.txt")
+#: Fields that package.xml, and files beside it, can provide.
+_DYNAMIC = (
+    *("version", "description", "readme", "requires-python", "license"),
+    *("authors", "maintainers", "urls", "dependencies"),
+)
 
 
 def project(runtime: Runtime | None, report: Report) -> dict[str, Any]:
@@ -240,10 +245,3 @@ def complete_table(declared: dict[str, Any], report: Report) -> dict[str, Any]:
             report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint="remove one of them"))
     taken = {key: declared[key] for key in dynamic if key in declared}
     return {**table, **taken, "dynamic": []}
-
-
-#: Fields that package.xml, and files beside it, can provide.
-_DYNAMIC = (
-    *("version", "description", "readme", "requires-python", "license"),
-    *("authors", "maintainers", "urls", "dependencies"),
-)

@@ -21,7 +21,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def completed(by: str) -> Callable[[click.Context, click.Parameter, str], Any]:
-    """Return the function of `run/completion.py` that offers words; a shell's question loads it."""
+    """Return what completes words, by a function of `run/completion.py`.
+
+    Only the completion of a shell imports that module.
+    """
 
     def offer(context: click.Context, parameter: click.Parameter, word: str) -> Any:
         from idlc.cli.run import completion

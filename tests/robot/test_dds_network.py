@@ -254,7 +254,7 @@ def test_strangers_get_three_announcements_where_their_packets_come_from():
 
 @pytest.mark.parametrize("qos", [QoSProfile(depth=3), LATCHED], ids=["volatile", "latched"])
 def test_a_reader_of_cyclone_dds_gets_samples_after_its_first_answer(qos):
-    """A volatile one skips what the first heartbeat tells of, as if it had come too late for it."""
+    """A volatile reader skips the samples that the first heartbeat announces."""
     shared = formats.Shared(lambda _: 60_000)
     writer = Writer(wire.VENDOR + bytes(10) + b"\0\0\1\3", LATCHED, shared)
     guid = b"\x01\x10" + bytes(10) + b"\0\0\2\4"

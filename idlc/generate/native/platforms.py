@@ -1,6 +1,6 @@
-"""What differs between platforms: layouts of C structures by distribution, and machine code.
+"""The layouts of C structures in each distribution, and the machine code for each processor.
 
-The code is for each processor, by its ABI's calling convention.
+The code follows the calling convention of the processor's ABI.
 """
 
 from __future__ import annotations

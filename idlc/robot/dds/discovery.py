@@ -63,7 +63,8 @@ class ParticipantData(NamedTuple):
 class EndpointData(NamedTuple):
     """A writer or a reader as its participant announces it; `port` is 0 if it has no own one.
 
-    `hash` is that of the message, and `service` that of the service which Lyrical announces, too.
+    `hash` is the type hash of the message. `service` is the type hash of its service, which nodes
+    announce since Lyrical.
     """
 
     guid: bytes
@@ -267,9 +268,9 @@ def format_participant(prefix: bytes, addresses: Iterable[Address]) -> bytes:
 
 
 def _user_data(end: EndpointData) -> str:
-    """Return the hash of a topic or service, and what names both ends of a service or client.
+    """Return the type hashes, and for services and clients an id that both endpoints share.
 
-    By this name, a server of rmw_cyclonedds waits for the reader of its reply.
+    A server of rmw_cyclonedds waits until it knows both endpoints of a client by this id.
     """
     half = end.topic[:3]
     hashes = {"typehash": end.hash, "sertypehash": end.service}

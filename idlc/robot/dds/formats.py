@@ -1,7 +1,7 @@
 """The packets to send: their bytes, always little-endian, and what the ends of a participant share.
 
-The ends share the time, the packets to send, and the room for samples. How requests and replies
-name each other is here, too.
+The ends share the time, the packets to send, and the room for samples. Requests and replies refer
+to each other in the forms of Fast DDS and of Cyclone DDS.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LIST = b"\x00\x03\x00\x00"
 Address: TypeAlias = tuple[str, int]
 #: The parameters by which Fast DDS names the request of a reply; the second is its older one.
 _RELATED = (0x83, 0x800F)
-#: Of a request in the form of Cyclone DDS: where what names it begins, and the rest.
+#: Offsets in a request or reply of Cyclone DDS: of the client and the number, and of the message.
 _NAMED, _REST = 4, 20
 #: Bytes of all samples that cannot be delivered yet.
 MOST_WAITING = 512 << 20
@@ -132,8 +132,8 @@ def is_cyclone(guid: bytes) -> bool:
     return guid.startswith(b"\x01\x10")
 
 
-# requests and replies name each other: for Fast DDS by inline parameters; those of rmw_cyclonedds
-# begin with 8 bytes that the client chose, and a number
+# Fast DDS names the request by inline parameters. Requests and replies of rmw_cyclonedds begin with
+# 8 bytes that the client chose, and a number.
 
 
 def _related(parameters: wire.Parameters) -> tuple[bytes, int] | None:

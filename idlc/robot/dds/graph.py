@@ -30,8 +30,8 @@ _MOST, _MOST_NAME = 2**20, 512
 WRITER, READER = b"\x03", b"\x04"
 #: The ends of the names and types of a service's topics.
 HALVES = {"rq": ("Request", "Request_"), "rr": ("Reply", "Response_")}
-#: The end of topics on which Lyrical's nodes exchange buffers; idlc gets these messages on the
-#: topic itself.
+#: The suffix of the topics on which Lyrical's nodes exchange buffers. idlc receives the messages
+#: on the topic without it.
 _BUFFERS = "/_buf_cpu"
 #: The node of an endpoint that no node owns, as rcl calls it.
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
@@ -72,7 +72,7 @@ type_description_interfaces/srv/GetTypeDescription
   470f56ccbcf13d55c78c8b735fb12da03e639e5acded994426c89d94778d9e28
   648c49d976240861a482f961c5621ddd0d2135d8cce6f297a76d4f6376d93b75
 """.split()
-#: The hashes of these services by their types, and by both hashes that DDS tells.
+#: The hashes of these services, by type and the hashes of request and response.
 SERVICES: dict[tuple[str, ...], str] = {
     (name, f"RIHS01_{request}", f"RIHS01_{response}"): standard(name).hash
     for name, request, response in zip(*(_OF_NODES[part::3] for part in range(3)), strict=True)
@@ -290,7 +290,7 @@ def _endpoint(end: EndpointData, owner: Entity | None, service: str) -> Entity |
     if kind is None or owner is None or is_hidden:
         return None
     if half in HALVES:
-        hash_ = service  # that of the endpoint is of the request or of the response
+        hash_ = service  # the endpoint announces the hash of the request or the response
     number = int.from_bytes(end.guid[12:15], "big")
     with suppress(ValueError):  # it is not a type of ROS 2
         return owner.replace(id=number, kind=kind, name=name, type=type_, hash=hash_, qos=end.qos)

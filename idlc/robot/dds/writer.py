@@ -27,8 +27,8 @@ class RemoteReader(Remote):
         self.count = -1
         #: True after it has said which number it wants, as it then has a heartbeat.
         self.is_told = False
-        #: True while samples wait for its answer to a heartbeat: a volatile reader of Cyclone DDS
-        #: skips all samples that the first heartbeat after its match tells of.
+        #: True until it answers the first heartbeat. A volatile reader of Cyclone DDS skips the
+        #: samples that this heartbeat announces, so new samples wait for its answer.
         self.waits = False
 
 
