@@ -41,7 +41,7 @@ def pytest_addoption(parser):
         action="store_true",
         help="run what has not passed in earlier runs, besides what takes long with --tier long",
     )
-    parser.addoption("--turn", type=int, help="leave out long tests that other turns run")
+    parser.addoption("--turn", type=int, help="leave out what other turns run of the tier long")
     parser.addoption("--only", type=Path, help="run what this JSON file names, in its order")
     parser.addoption("--costs", type=Path, help="measure what tests cost, in files of this folder")
 
@@ -74,7 +74,7 @@ def pytest_collection_modifyitems(config, items):
         selected = [item for item in items if item in wanted]
     turn = config.getoption("turn")
     if turn is not None:
-        selected = [item for item in selected if costs.is_due(item.nodeid, turn)]
+        selected = [item for item in selected if costs.is_due(item, turn)]
     if config.getoption("only"):
         order = json.loads(config.getoption("only").read_text(encoding="ascii"))
         by_name = {item.nodeid: item for item in selected}

@@ -56,14 +56,26 @@ def test_a_test_is_in_its_tiers(marks, seconds, tiers, request, monkeypatch):
     assert costs.tiers(item) == tiers
 
 
-def test_long_tests_have_their_turns_and_others_always_run(monkeypatch):
-    files = ["tests/a.py", "tests/b.py", "tests/c.py", "tests/d.py"]
-    seconds = {f"{file}::test_{number}": 1.5 for file in files for number in range(2)}
-    monkeypatch.setattr(costs, "committed", lambda: costs.Costs({**seconds, "a.py::cheap": 0.4}))
-    turns = [{test for test in seconds if costs.is_due(test, turn)} for turn in range(9)]
-    assert turns[:3] == turns[3:6] == turns[6:]
-    assert set().union(*turns) == set(seconds)
-    assert sum(map(len, turns[:3])) == len(seconds), "each in one turn of three"
-    assert all(costs.is_due("a.py::cheap", turn) for turn in range(3))
-    for turn in turns[:3]:
+def test_long_tests_have_their_turns_and_others_always_run(request, monkeypatch):
+    files = [f"tests/{name}.py" for name in "abcd"]
+    slow = {f"{file}::test_{number}": 1.5 for file in files for number in range(2)}
+    monkeypatch.setattr(costs, "committed", lambda: costs.Costs({**slow, "tests/a.py::mild": 0.4}))
+    monkeypatch.setattr(costs, "turns", costs.turns.__wrapped__)
+
+    class Item:
+        get_closest_marker = staticmethod(request.node.get_closest_marker)
+
+        def __init__(self, nodeid):
+            self.nodeid = nodeid
+
+    def run(turn):
+        return {test for test in [*slow, "tests/a.py::mild"] if costs.is_due(Item(test), turn)}
+
+    turns = [run(turn) - {"tests/a.py::mild"} for turn in range(3 * costs.TURNS)]
+    cycle = turns[: costs.TURNS]
+    assert turns == 3 * cycle
+    assert set().union(*turns) == set(slow)
+    assert sum(map(len, cycle)) == len(slow), "each in one turn"
+    assert all("tests/a.py::mild" in run(turn) for turn in range(costs.TURNS))
+    for turn in cycle:
         assert {test.replace("test_0", "test_1") for test in turn} <= turn, "whole files"

@@ -10,13 +10,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
-from zlib import crc32
 
 import pytest
 
@@ -27,8 +26,8 @@ TABLE = ROOT / "tests/costs.tsv"
 QUICK = 0.1
 LONG = 0.4
 TIERS = ("quick", "test", "long")
-#: With `--turn`, a long test runs in one of so many turns.
-TURNS = 3
+#: Over how many turns `--turn` spreads the tests of the tier long.
+TURNS = 4
 #: The names of all tests of a run, before any is left out.
 COLLECTED = pytest.StashKey[set[str]]()
 HEADER = f"""\
@@ -84,10 +83,19 @@ def tiers(item: pytest.Item) -> set[str]:
     return {tier, "test"}
 
 
-def is_due(test: str, turn: int) -> bool:
+@cache
+def turns() -> dict[str, int]:
+    """Return the turn of each file in the table: files of similar cost have different turns."""
+    files = Counter()
+    for test, seconds in committed().seconds.items():
+        files[test.partition("::")[0]] += seconds
+    return {file: number % TURNS for number, (file, _) in enumerate(files.most_common())}
+
+
+def is_due(item: pytest.Item, turn: int) -> bool:
     """Return whether a test runs in a turn. Long tests of one file share fixtures, and turns."""
-    file = test.partition("::")[0]
-    return committed().tier(test) != "long" or (crc32(file.encode()) + turn) % TURNS == 0
+    file = item.nodeid.partition("::")[0]
+    return "long" not in tiers(item) or turns().get(file, 0) == turn % TURNS
 
 
 class Meter:
