@@ -95,8 +95,9 @@ def record(folder: Path, lines: Path, tier: str | None) -> None:
     # as many processes as `make test` has, since many tests wait
     words = ["-p", "maintenance.mutants.plugin", "--lines", str(lines), "-n", "6"]
     words += ["--tier", tier] if tier else []
-    pytest = [python(folder), "-m", "pytest", "-q", "--timeout", "900", *words]
-    done = subprocess.run(pytest, cwd=folder, check=False)
+    # without --rootdir, pytest takes the folder of lines for tests, as soon as a worker has made it
+    words += ["-q", "--timeout", "900", "--rootdir", ".", "tests"]
+    done = subprocess.run([python(folder), "-m", "pytest", *words], cwd=folder, check=False)
     if done.returncode > 1:
         sys.exit("the tests cannot be recorded")
 
