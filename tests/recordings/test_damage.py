@@ -167,6 +167,20 @@ def test_what_the_mcap_library_reads_of_a_damaged_file_is_read(tmp_path):
     assert lost > 0
 
 
+@pytest.mark.parametrize("indexes", ["ALL", "NONE"])
+def test_a_damaged_head_of_a_chunk_costs_no_other_chunk(indexes, tmp_path):
+    options = {"chunk_size": 3000, "index_types": made.INDEX_TYPES[indexes]}
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, **options)
+    data = path.read_bytes()
+    records = mcap_mutations.records(data[:-8], 8)
+    chunks = [one for one in records if one.op == mcap_mutations.CHUNK]
+    data = data[: next(one.at for one in records if one.op == 15)]  # without a list of chunks
+    for chunk in chunks[1:-1]:
+        path.write_bytes(data[: chunk.at] + bytes(9) + data[chunk.at + 9 :])
+        inside = [one.op for one in mcap_mutations.in_chunk(chunk)]
+        assert (WHOLE - read(path)[0]).total() == inside.count(mcap_mutations.MESSAGE)
+
+
 #: Damage of which copies once were damaged, or lacked messages; and more of these kinds.
 COPIED = (2, 15, 36, 117, 129, 165, 170)
 

@@ -18,7 +18,8 @@ from tests.recordings.test_mixed_mcap import DEFINED, SCHEMA, File, record, text
 from tests.support import recordings as made
 from tests.support.examples import given, settings, st
 from tests.support.mcap_content import check_indexes, content
-from tests.support.mcap_mutations import MAGIC
+from tests.support.mcap_mutations import CHANNEL, MAGIC, joined, records
+from tests.support.mcap_mutations import SCHEMA as SCHEMA_OP
 from tests.support.rounds import SEED, rounds
 
 NEW = Conversion("new_msgs/msg/New", "ros2msg", "int8 a\nint8 b\n", "RIHS01_new")
@@ -257,6 +258,27 @@ def test_definitions_that_come_late_are_written_in_front(tmp_path):
     found = content(tmp_path / "b.mcap")
     assert [len(one.data) for one in found.messages] == [5, 13]
     check_indexes(tmp_path / "b.mcap", found)
+
+
+def test_a_summary_need_not_list_channels_without_messages(tmp_path):
+    """What the first pass did not know is found by a second one, which reads the whole file."""
+    path, target = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, enable_crcs=False)
+        writer.start()
+        for topic in ("/used", "/unused"):
+            schema = writer.register_schema(f"a_msgs/msg/{topic[1:].title()}", "ros2msg", b"int8 a")
+            channel = writer.register_channel(topic, "cdr", schema)
+        writer.add_message(channel - 1, 1, b"\0\1\0\0\7", 1)
+        writer.finish()
+    listed = records(path.read_bytes()[:-8], 8)
+    of_unused = [
+        one for one in listed if one.op in (SCHEMA_OP, CHANNEL) and one.content[:2] == pack("<H", 2)
+    ]
+    kept = [one for one in listed if one not in of_unused]
+    path.write_bytes(joined(kept, up_to_date=True))
+    rewrite(str(path), str(target), {"/used": CONVERTED})
+    check(path, target, {"/used": CONVERTED})
 
 
 def test_one_conversion_is_not_for_two_types(tmp_path):
