@@ -150,6 +150,8 @@ def try_mutation(folder: Path, mutation: Mutation, tests: list[str], costs: Cost
                 if not fails_anyway and first_failure(folder, [failed]):
                     return Outcome(mutation, failed, ran, time.monotonic() - started)
                 step = step[step.index(failed) + 1 :]
+    except subprocess.TimeoutExpired:
+        return Outcome(mutation, "a process that does not end", ran, time.monotonic() - started)
     finally:
         write(path, source)
     return Outcome(mutation, None, ran, time.monotonic() - started)
@@ -163,7 +165,10 @@ def write(path: Path, text: str) -> None:
 
 
 def first_failure(folder: Path, tests: list[str]) -> str | None:
-    """Return the first of the tests that fails, or None."""
+    """Return the first of the tests that fails, or None.
+
+    Raises TimeoutExpired if their process does not end: a thread of theirs goes on, for example.
+    """
     names = folder / "build/mutant-tests.json"
     names.parent.mkdir(exist_ok=True)
     names.write_text(json.dumps(tests), encoding="ascii")
@@ -177,6 +182,7 @@ def first_failure(folder: Path, tests: list[str]) -> str | None:
         capture_output=True,
         text=True,
         errors="replace",
+        timeout=HANG + 2 * len(tests),
     )
     if done.returncode in (0, 5):
         return None

@@ -229,6 +229,14 @@ def test_waits_end(executor):
     executor.spin_once()
 
 
+def test_shutdown_ends_a_thread_that_spins(executor):
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    executor.shutdown()
+    thread.join(LIMIT)
+    assert not thread.is_alive()
+
+
 # threads
 
 

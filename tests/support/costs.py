@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
 from math import inf
@@ -86,10 +86,11 @@ def tiers(item: pytest.Item) -> set[str]:
 @cache
 def turns() -> dict[str, int]:
     """Return the turn of each file in the table: files of similar cost have different turns."""
-    files = Counter()
+    files: dict[str, float] = defaultdict(float)
     for test, seconds in committed().seconds.items():
         files[test.partition("::")[0]] += seconds
-    return {file: number % TURNS for number, (file, _) in enumerate(files.most_common())}
+    dearest_first = sorted(files, key=files.__getitem__, reverse=True)
+    return {file: number % TURNS for number, file in enumerate(dearest_first)}
 
 
 def is_due(item: pytest.Item, turn: int) -> bool:
