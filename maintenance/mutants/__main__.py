@@ -145,11 +145,11 @@ def try_mutation(folder: Path, mutation: Mutation, tests: list[str], costs: Cost
             while step and (failed := first_failure(folder, step)):
                 # a test that also fails without the mistake, or not again with it, says nothing
                 write(path, source)
-                fails_anyway = first_failure(folder, [failed])
+                fails_anyway = first_failure(folder, failed)
                 write(path, mistaken)
-                if not fails_anyway and first_failure(folder, [failed]):
-                    return Outcome(mutation, failed, ran, time.monotonic() - started)
-                step = step[step.index(failed) + 1 :]
+                if not fails_anyway and first_failure(folder, failed):
+                    return Outcome(mutation, failed[0], ran, time.monotonic() - started)
+                step = step[step.index(failed[-1]) + 1 :]
     except subprocess.TimeoutExpired:
         return Outcome(mutation, "a process that does not end", ran, time.monotonic() - started)
     finally:
@@ -164,8 +164,8 @@ def write(path: Path, text: str) -> None:
     os.utime(path, (before + 2, before + 2))
 
 
-def first_failure(folder: Path, tests: list[str]) -> str | None:
-    """Return the first of the tests that fails, or None.
+def first_failure(folder: Path, tests: list[str]) -> list[str]:
+    """Return the first of the tests that fails; all of them if their run fails and names none.
 
     Raises TimeoutExpired if their process does not end: a thread of theirs goes on, for example.
     """
@@ -185,11 +185,11 @@ def first_failure(folder: Path, tests: list[str]) -> str | None:
         timeout=HANG + 2 * len(tests),
     )
     if done.returncode in (0, 5):
-        return None
+        return []
     # a module that cannot be imported is named without a test, and a crash names none
     lines = re.findall(r"(?m)^(?:FAILED|ERROR) (.*)", done.stdout)
     named = (test for line in lines for test in tests if f"{line} - ".startswith(f"{test} - "))
-    return next(named, tests[0])
+    return next(([test] for test in named), tests)
 
 
 def row(outcome: Outcome, costs: Costs) -> str:
