@@ -136,6 +136,27 @@ def test_reliable_samples_arrive_in_order_and_complete(loss, size):
         ]
 
 
+def test_packets_of_its_own_and_for_others_are_not_read():
+    network = Network()
+    left, right, other = (network.add(number) for number in (1, 2, 3))
+    writer = network.writer(left, ALL)
+    received = [network.reader(participant, ALL)[1] for participant in (right, other)]
+    network.run(5)
+    network.isolated = {"10.0.0.3"}
+    known = len(network.sent)
+    network.write(left, writer, text(1))
+    network.run(0.01)
+    assert received == [[text(1)], []]
+    for source, target, packet in network.sent[known:]:
+        if target[0] != "10.0.0.3":
+            assert not other.receive(packet, (source, PORT), network.now)
+    for source, _, packet in network.sent:
+        if source == "10.0.0.1":
+            assert not left.receive(packet, (source, PORT), network.now)
+    assert received == [[text(1)], []]
+    assert left.peers.keys() == {right.prefix, other.prefix}
+
+
 @pytest.mark.parametrize("loss", [0.0, 0.2])
 def test_late_readers_get_what_is_kept(loss):
     network = Network(SEED, loss)

@@ -187,7 +187,11 @@ def test_files_keep_their_mode(package):
         (["node", "a", "--param", "x:int=1.5"], "needs an integer, not `1.5`"),
         (["node", "a", "--timer", "soon"], "number of seconds"),
         (["interface", "msg", "my_message", "int8 a"], "cannot be an interface"),
-        (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "one `---` too many"),
+        (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "has 1 part, here are 2"),
+        (
+            ["interface", "srv", "Ask", "int8 a", *["---", "int8 b"] * 2],
+            "has 2 parts, here are 3",
+        ),
         (["interface", "msg", "Message", "int8 a\nint8 b"], "a field must be one line"),
         (["interface", "msg", "Message", "flot32 a"], "IDL201"),
         (["node", "a", "--publisher", "String:a"], "or `std_msgs/String`?"),
