@@ -187,9 +187,12 @@ def first_failure(folder: Path, tests: list[str]) -> list[str]:
     if done.returncode in (0, 5):
         return []
     # a module that cannot be imported is named without a test, and a crash names none
-    lines = re.findall(r"(?m)^(?:FAILED|ERROR) (.*)", done.stdout)
-    named = (test for line in lines for test in tests if f"{line} - ".startswith(f"{test} - "))
-    return next(([test] for test in named), tests)
+    for line in re.findall(r"(?m)^(?:FAILED|ERROR) (.*)", done.stdout):
+        for test in tests:
+            file = test.partition("::")[0]
+            if f"{line} - ".startswith((f"{test} - ", f"{file} - ")):
+                return [test]
+    return tests
 
 
 def row(outcome: Outcome, costs: Costs) -> str:
