@@ -44,8 +44,12 @@ def mcap_files(folder):
             data = path.read_bytes()
             is_proven = name in ("chunks", "bare")
             yield data, is_proven
-            end = next(one.at for one in mcap_mutations.records(data[:-8], 8) if one.op == 15)
-            yield data[:end], is_proven
+            yield not_closed(data), is_proven
+
+
+def not_closed(data):
+    """Return an MCAP file without what follows its messages."""
+    return data[: next(one.at for one in mcap_mutations.records(data[:-8], 8) if one.op == 15)]
 
 
 def database(path, page):
@@ -171,13 +175,12 @@ def test_what_the_mcap_library_reads_of_a_damaged_file_is_read(tmp_path):
 def test_a_damaged_head_of_a_chunk_costs_no_other_chunk(indexes, tmp_path):
     options = {"chunk_size": 3000, "index_types": made.INDEX_TYPES[indexes]}
     path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, **options)
-    data = path.read_bytes()
-    records = mcap_mutations.records(data[:-8], 8)
-    chunks = [one for one in records if one.op == mcap_mutations.CHUNK]
-    data = data[: next(one.at for one in records if one.op == 15)]  # without a list of chunks
+    data = not_closed(path.read_bytes())  # so nothing lists the chunks
+    records = mcap_mutations.records(data, 8)
+    chunks = [record for record in records if record.op == mcap_mutations.CHUNK]
     for chunk in chunks[1:-1]:
         path.write_bytes(data[: chunk.at] + bytes(9) + data[chunk.at + 9 :])
-        inside = [one.op for one in mcap_mutations.in_chunk(chunk)]
+        inside = [record.op for record in mcap_mutations.in_chunk(chunk)]
         assert (WHOLE - read(path)[0]).total() == inside.count(mcap_mutations.MESSAGE)
 
 

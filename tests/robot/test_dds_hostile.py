@@ -284,6 +284,8 @@ def test_what_participants_tell_of_nodes_is_bounded():
             taken += remote.learn(wire.Data(b"", name + bytes(4), 1, wire.NONE, told, False, 0))
     assert taken == 2
     with pytest.raises(wire.WireError):
+        graph.parse_info(bytes(2_000_000))
+    with pytest.raises(wire.WireError, match="too large"):
         graph.parse_info(graph.format_info(SOURCE, nodes * 2))
 
 

@@ -136,7 +136,7 @@ def test_reliable_samples_arrive_in_order_and_complete(loss, size):
         ]
 
 
-def test_packets_of_its_own_and_for_others_are_not_read():
+def test_a_participant_ignores_its_own_packets_and_those_for_others():
     network = Network()
     left, right, other = (network.add(number) for number in (1, 2, 3))
     writer = network.writer(left, ALL)

@@ -231,7 +231,10 @@ def test_waits_end(executor):
 
 def test_shutdown_ends_a_thread_that_spins(executor):
     thread = threading.Thread(target=executor.spin, daemon=True)
+    spins = threading.Event()
+    executor.create_task(spins.set)
     thread.start()
+    assert spins.wait(LIMIT)
     executor.shutdown()
     thread.join(LIMIT)
     assert not thread.is_alive()

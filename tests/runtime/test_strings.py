@@ -77,13 +77,13 @@ def test_they_are_written_and_read_as_cdr_says(notes, order, strings):
 @pytest.mark.usefixtures("notes")
 @pytest.mark.parametrize("order", ["little", "big"])
 def test_numbers_after_text_that_does_not_end_are_read(order):
-    """Middlewares take such text; another reader than for sound messages reads it."""
+    """Middlewares accept such text, and the fast codecs do not: CarefulReader reads the message."""
     message = generated.class_of("texts_msgs/msg/Log")(
         text="text!", many=[1.5, -2.0], three=[1, -2, 3]
     )
     raw = message.serialize(byteorder=order).replace(b"text!\0", b"text!!")
     again = type(message).deserialize(raw)
-    assert again.text.startswith("text!")
+    assert again.text == "text!!"
     message.text = again.text
     assert again == message
     assert type(again.many) is type(message.many)

@@ -187,7 +187,7 @@ def test_files_keep_their_mode(package):
         (["node", "a", "--param", "x:int=1.5"], "needs an integer, not `1.5`"),
         (["node", "a", "--timer", "soon"], "number of seconds"),
         (["interface", "msg", "my_message", "int8 a"], "cannot be an interface"),
-        (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "has 1 part, here are 2"),
+        (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "one `---` too many"),
         (
             ["interface", "srv", "Ask", "int8 a", *["---", "int8 b"] * 2],
             "has 2 parts, here are 3",
