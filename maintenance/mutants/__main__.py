@@ -95,7 +95,7 @@ def record(folder: Path, lines: Path, tier: str | None) -> None:
     # as many processes as `make test` has, since many tests wait
     words = ["-p", "maintenance.mutants.plugin", "--lines", str(lines), "-n", "6"]
     words += ["--tier", tier] if tier else []
-    # without --rootdir, pytest takes the folder of lines for tests, as soon as a worker has made it
+    # once the folder of --lines exists, pytest would look for its root and for tests from there
     words += ["-q", "--timeout", "900", "--rootdir", ".", "tests"]
     done = subprocess.run([python(folder), "-m", "pytest", *words], cwd=folder, check=False)
     if done.returncode > 1:
@@ -150,8 +150,6 @@ def try_mutation(folder: Path, mutation: Mutation, tests: list[str], costs: Cost
                 if not fails_anyway and first_failure(folder, failed):
                     return Outcome(mutation, failed[0], ran, time.monotonic() - started)
                 step = step[step.index(failed[-1]) + 1 :]
-    except subprocess.TimeoutExpired:
-        return Outcome(mutation, "a process that does not end", ran, time.monotonic() - started)
     finally:
         write(path, source)
     return Outcome(mutation, None, ran, time.monotonic() - started)
@@ -167,7 +165,7 @@ def write(path: Path, text: str) -> None:
 def first_failure(folder: Path, tests: list[str]) -> list[str]:
     """Return the first of the tests that fails; all of them if their run fails and names none.
 
-    Raises TimeoutExpired if their process does not end: a thread of theirs goes on, for example.
+    A run also fails if its process does not end, for example because a thread of a test goes on.
     """
     names = folder / "build/mutant-tests.json"
     names.parent.mkdir(exist_ok=True)
@@ -175,15 +173,18 @@ def first_failure(folder: Path, tests: list[str]) -> list[str]:
     files = dict.fromkeys(test.partition("::")[0] for test in tests)
     words = ["--only", str(names), "-x", "-q"]
     words += ["--timeout", str(HANG), "-p", "no:cacheprovider"]
-    done = subprocess.run(
-        [python(folder), "-m", "pytest", *words, *files],
-        cwd=folder,
-        check=False,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        timeout=HANG + 2 * len(tests),
-    )
+    try:
+        done = subprocess.run(
+            [python(folder), "-m", "pytest", *words, *files],
+            cwd=folder,
+            check=False,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=HANG + 2 * len(tests),
+        )
+    except subprocess.TimeoutExpired:
+        return tests
     if done.returncode in (0, 5):
         return []
     # a module that cannot be imported is named without a test, and a crash names none
