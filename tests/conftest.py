@@ -41,7 +41,7 @@ def pytest_addoption(parser):
         action="store_true",
         help="run what has not passed in earlier runs, besides what takes long with --tier long",
     )
-    parser.addoption("--turn", type=int, help="leave out what other turns run of the tier long")
+    parser.addoption("--turn", type=int, help="leave out long tests that have another turn")
     parser.addoption("--only", type=Path, help="run what this JSON file names, in its order")
     parser.addoption("--costs", type=Path, help="measure what tests cost, in files of this folder")
 

@@ -57,9 +57,10 @@ def test_a_test_is_in_its_tiers(marks, seconds, tiers, request, monkeypatch):
 
 
 def test_long_tests_have_their_turns_and_others_always_run(request, monkeypatch):
-    files = [f"tests/{name}.py" for name in "abcd"]
+    files = [f"tests/{number}.py" for number in range(costs.TURNS)]
     slow = {f"{file}::test_{number}": 1.5 for file in files for number in range(2)}
-    monkeypatch.setattr(costs, "committed", lambda: costs.Costs({**slow, "tests/a.py::mild": 0.4}))
+    mild = f"{files[0]}::mild"
+    monkeypatch.setattr(costs, "committed", lambda: costs.Costs({**slow, mild: 0.4}))
     monkeypatch.setattr(costs, "turns", costs.turns.__wrapped__)
 
     class Item:
@@ -69,13 +70,16 @@ def test_long_tests_have_their_turns_and_others_always_run(request, monkeypatch)
             self.nodeid = nodeid
 
     def run(turn):
-        return {test for test in [*slow, "tests/a.py::mild"] if costs.is_due(Item(test), turn)}
+        return {test for test in [*slow, mild] if costs.is_due(Item(test), turn)}
 
-    turns = [run(turn) - {"tests/a.py::mild"} for turn in range(3 * costs.TURNS)]
+    turns = [run(turn) - {mild} for turn in range(3 * costs.TURNS)]
     cycle = turns[: costs.TURNS]
     assert turns == 3 * cycle
     assert set().union(*turns) == set(slow)
     assert sum(map(len, cycle)) == len(slow), "each in one turn"
-    assert all("tests/a.py::mild" in run(turn) for turn in range(costs.TURNS))
+    assert {len(turn) for turn in cycle} == {2}, "files of the same cost are not in one turn"
+    assert all(mild in run(turn) for turn in range(costs.TURNS))
     for turn in cycle:
         assert {test.replace("test_0", "test_1") for test in turn} <= turn, "whole files"
+    request.node.add_marker(pytest.mark.long)
+    assert sum(mild in run(turn) for turn in range(costs.TURNS)) == 1, "what the mark makes long"

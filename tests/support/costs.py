@@ -26,7 +26,7 @@ TABLE = ROOT / "tests/costs.tsv"
 QUICK = 0.1
 LONG = 0.4
 TIERS = ("quick", "test", "long")
-#: Over how many turns `--turn` spreads the tests of the tier long.
+#: The number of turns among which `--turn` divides the tests of the tier long.
 TURNS = 4
 #: The names of all tests of a run, before any is left out.
 COLLECTED = pytest.StashKey[set[str]]()
@@ -89,8 +89,8 @@ def turns() -> dict[str, int]:
     files: dict[str, float] = defaultdict(float)
     for test, seconds in committed().seconds.items():
         files[test.partition("::")[0]] += seconds
-    dearest_first = sorted(files, key=files.__getitem__, reverse=True)
-    return {file: number % TURNS for number, file in enumerate(dearest_first)}
+    by_cost = sorted(files, key=files.__getitem__, reverse=True)
+    return {file: number % TURNS for number, file in enumerate(by_cost)}
 
 
 def is_due(item: pytest.Item, turn: int) -> bool:
